@@ -1,0 +1,144 @@
+//! The one user-facing error: what is wrong, where, and what to do about it.
+//! Door for `annotate-snippets`.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+
+/// The result of everything that can fail for a reason a user can act on.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// One thing that is wrong with an input, and its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Diagnostic {
+    /// The rule that was broken, as a sentence: ``unknown key `albdo` ``.
+    pub rule: String,
+    /// Where: the text it stands in and the bytes it covers.
+    pub place: Option<Place>,
+    /// What to do: ``did you mean `albedo`?``.
+    pub help: Option<String>,
+}
+
+/// A range of bytes in a text that has a name (a file's path, or `--set`).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Place {
+    /// The name of the text: a path, or `--set`.
+    pub name: Arc<str>,
+    /// The text itself.
+    pub text: Arc<str>,
+    /// The bytes the finding covers.
+    pub span: Range<usize>,
+}
+
+impl Place {
+    /// Line and column, counted from 1, of the first byte.
+    pub fn line_column(&self) -> (usize, usize) {
+        let before = &self.text[..self.span.start.min(self.text.len())];
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
+        (line, column)
+    }
+}
+
+/// Everything that can go wrong, by what the caller should do; `exit_code` states it to a shell.
+#[derive(Debug)]
+pub enum Error {
+    /// Bad input: an experiment file, a mesh, a map, an argument. Every finding at once.
+    Input(Vec<Diagnostic>),
+    /// Reading or writing failed.
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was being done, as `write the record`.
+        doing: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// What stands on disk is not what it should be (a truncated or foreign record).
+    Record {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong with it and what to do.
+        message: String,
+    },
+    /// The person pressed Ctrl-C; the blocks done so far are kept.
+    Interrupted(String),
+}
+
+impl Error {
+    /// A finding without a place in a text.
+    pub fn input(rule: impl Into<String>) -> Error {
+        Error::Input(vec![Diagnostic { rule: rule.into(), place: None, help: None }])
+    }
+
+    /// A finding without a place, and what to do about it.
+    pub fn input_help(rule: impl Into<String>, help: impl Into<String>) -> Error {
+        Error::Input(vec![Diagnostic { rule: rule.into(), place: None, help: Some(help.into()) }])
+    }
+
+    /// For `map_err`: an I/O failure at `path` while `doing`.
+    pub fn io(path: &Path, doing: &str) -> impl FnOnce(std::io::Error) -> Error {
+        let (path, doing) = (path.to_path_buf(), doing.to_string());
+        move |source| Error::Io { path, doing, source }
+    }
+
+    /// A record that cannot be used.
+    pub fn record(path: &Path, message: impl Into<String>) -> Error {
+        Error::Record { path: path.to_path_buf(), message: message.into() }
+    }
+
+    /// The process exit code: 2 bad input, 3 I/O or unusable record, 130 interrupted.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Input(_) => 2,
+            Error::Io { .. } | Error::Record { .. } => 3,
+            Error::Interrupted(_) => 130,
+        }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Error::Input(findings) => {
+                for (i, finding) in findings.iter().enumerate() {
+                    if i > 0 {
+                        writeln!(f)?;
+                    }
+                    write!(f, "{}", render(finding))?;
+                }
+                if findings.len() > 1 {
+                    write!(f, "\n\n{} errors", findings.len())?;
+                }
+                Ok(())
+            }
+            Error::Io { path, doing, source } => {
+                write!(f, "error: could not {doing}: {}: {source}", path.display())
+            }
+            Error::Record { path, message } => write!(f, "error: {}: {message}", path.display()),
+            Error::Interrupted(message) => write!(f, "interrupted: {message}"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+fn render(finding: &Diagnostic) -> String {
+    let Some(place) = &finding.place else {
+        let help = finding.help.as_ref().map(|h| format!("\n  help: {h}")).unwrap_or_default();
+        return format!("error: {}{help}", finding.rule);
+    };
+    let snippet = Snippet::source(&*place.text)
+        .path(&*place.name)
+        .annotation(AnnotationKind::Primary.span(place.span.clone()));
+    let title = Level::ERROR.primary_title(&*finding.rule).element(snippet);
+    let mut groups: Vec<Group> = Vec::new();
+    match &finding.help {
+        Some(help) => groups.push(title.element(Level::HELP.message(&**help))),
+        None => groups.push(title),
+    }
+    Renderer::plain().render(&groups).to_string()
+}

@@ -1,0 +1,698 @@
+//! What an experiment file may say. The types below are the single source: `scatterproof schema`
+//! prints the JSON Schema that they generate, and `validate` walks a file along that same schema.
+//! Keys carry units. Physics has no defaults; run control has.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// One experiment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExperimentFile {
+    /// Name of the experiment and of its folder under `results/`: letters, digits, `-`, `_`.
+    #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_-]*$"))]
+    pub name: String,
+    /// What the experiment shows, for reports.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description: Option<String>,
+    /// Root of all random streams.
+    #[schemars(range(min = 0, max = 9223372036854775807u64))]
+    pub seed: u64,
+    /// The wavelength bands; each is rendered by itself.
+    pub bands: Bands,
+    /// The body.
+    pub object: Object,
+    /// What is measured.
+    pub sensor: Sensor,
+    /// The lights, all shining at once.
+    #[schemars(length(min = 1))]
+    pub light: Vec<LightEntry>,
+    /// The estimators that are compared.
+    #[schemars(length(min = 1))]
+    pub estimator: Vec<EstimatorEntry>,
+    /// Axes of the sweep; they multiply.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sweep: Vec<Sweep>,
+    /// Cells that share random streams.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pair: Option<Pair>,
+    /// How much work.
+    pub budget: Budget,
+    /// What must hold.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub claim: Vec<ClaimEntry>,
+    /// Named sets of overrides, chosen by `--setting NAME`: dotted key -> value.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub setting: BTreeMap<String, BTreeMap<String, Value>>,
+    /// How pictures are shown; never changes a number.
+    #[serde(default)]
+    pub display: Display,
+}
+
+/// The wavelength bands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Bands {
+    /// Three bands R, G, B without wavelengths.
+    Rgb {},
+    /// Equal bins over a range of wavelengths.
+    Spectral {
+        /// Lower end, nm.
+        #[schemars(range(min = 100.0, max = 100000.0))]
+        from_nm: f64,
+        /// Upper end, nm.
+        #[schemars(range(min = 100.0, max = 100000.0))]
+        to_nm: f64,
+        /// Number of bins.
+        #[schemars(range(min = 1, max = 1024))]
+        count: usize,
+    },
+    /// A list of named bands.
+    #[schemars(length(min = 1, max = 1024))]
+    Explicit(Vec<ExplicitBand>),
+}
+
+/// One band of an explicit list.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExplicitBand {
+    /// Its name, unique in the list.
+    pub name: String,
+    /// Lower wavelength, nm; needed by dispersion formulas and for colour.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 100.0, max = 100000.0))]
+    pub from_nm: Option<f64>,
+    /// Upper wavelength, nm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 100.0, max = 100000.0))]
+    pub to_nm: Option<f64>,
+}
+
+/// A value per band: one number for all of them, or a list with one number per band.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Spectrum {
+    /// The same in every band.
+    Grey(f64),
+    /// One number per band, in the order of the bands.
+    PerBand(Vec<f64>),
+}
+
+/// A direction: a vector of any length, or its cosine to +z and its azimuth about it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Direction {
+    /// x, y, z; normalised when read.
+    Vector([f64; 3]),
+    /// Spherical.
+    Polar(Polar),
+}
+
+/// A direction by its cosine to +z.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Polar {
+    /// Cosine to the +z axis.
+    #[schemars(range(min = -1.0, max = 1.0))]
+    pub cos_z: f64,
+    /// Angle from +x towards +y, degrees.
+    pub azimuth_deg: f64,
+}
+
+/// The body: a shape, its boundary, the medium in it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Object {
+    /// Geometry.
+    pub shape: Shape,
+    /// The refractive surface.
+    pub boundary: Boundary,
+    /// The homogeneous medium inside.
+    pub medium: Medium,
+}
+
+/// Geometry, mm. Bodies stand at the origin; the top face of `half_space` and `slab` is z = 0.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Shape {
+    /// Everything below z = 0.
+    HalfSpace {},
+    /// -thickness <= z <= 0.
+    Slab {
+        /// Thickness, mm.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        thickness_mm: f64,
+    },
+    /// An axis-aligned box about the origin.
+    Box {
+        /// Edge lengths along x, y, z, mm.
+        #[schemars(inner(extend("exclusiveMinimum" = 0)))]
+        size_mm: [f64; 3],
+    },
+    /// A sphere about the origin, exact.
+    Sphere {
+        /// Radius, mm.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius_mm: f64,
+    },
+    /// A closed triangle mesh from a Wavefront OBJ file.
+    Mesh {
+        /// Path, relative to the experiment file.
+        path: String,
+        /// Scale the longest side of its bounding box to this, and centre the box at the origin;
+        /// without it the file's numbers are mm and stay where they are.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        longest_side_mm: Option<f64>,
+        /// Which normal the boundary sees.
+        normals: Normals,
+    },
+    /// A sphere of 20 * 4^subdivisions triangles.
+    Icosphere {
+        /// Radius, mm; vertices lie on it.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius_mm: f64,
+        /// Number of subdivisions of the icosahedron.
+        #[schemars(range(min = 0, max = 9))]
+        subdivisions: u32,
+        /// Which normal the boundary sees.
+        normals: Normals,
+    },
+    /// A sphere displaced along its radius by amplitude * sin(kx) sin(ky) sin(kz) of the unit vector.
+    BumpySphere {
+        /// Mean radius, mm.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius_mm: f64,
+        /// Number of subdivisions of the icosahedron.
+        #[schemars(range(min = 0, max = 9))]
+        subdivisions: u32,
+        /// Largest displacement as a fraction of the radius.
+        #[schemars(range(min = 0.0, max = 0.5))]
+        amplitude: f64,
+        /// Wavenumber k per radius.
+        #[schemars(range(min = 0.0, max = 1000.0))]
+        wavenumber: f64,
+        /// Which normal the boundary sees.
+        normals: Normals,
+    },
+    /// A torus about the z axis.
+    Torus {
+        /// Radius of the ring, mm.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        major_radius_mm: f64,
+        /// Radius of the tube, mm; smaller than the ring's.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        minor_radius_mm: f64,
+        /// Segments around the ring and around the tube.
+        #[schemars(inner(range(min = 3, max = 4096)))]
+        segments: [u32; 2],
+        /// Which normal the boundary sees.
+        normals: Normals,
+    },
+    /// A sphere with a concentric empty cavity.
+    CavitySphere {
+        /// Outer radius, mm.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius_mm: f64,
+        /// Radius of the cavity, mm; smaller than the outer one.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        cavity_radius_mm: f64,
+        /// Number of subdivisions of both icosahedra.
+        #[schemars(range(min = 0, max = 9))]
+        subdivisions: u32,
+        /// Which normal the boundary sees.
+        normals: Normals,
+    },
+    /// A box with square holes through it along z.
+    DrilledBox {
+        /// Edge lengths along x, y, z, mm.
+        #[schemars(inner(extend("exclusiveMinimum" = 0)))]
+        size_mm: [f64; 3],
+        /// Number of holes along x and y.
+        #[schemars(inner(range(min = 1, max = 64)))]
+        holes: [u32; 2],
+        /// Side of a hole as a fraction of the distance between hole centres.
+        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+        hole_fraction: f64,
+    },
+}
+
+/// Which normal the boundary of a mesh sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Normals {
+    /// The triangle's own.
+    Flat,
+    /// Interpolated between vertex normals (the file's, or else angle-weighted).
+    Interpolated,
+}
+
+/// The refractive surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Boundary {
+    /// A smooth dielectric.
+    Smooth {
+        /// Refractive index inside over outside.
+        eta: Eta,
+    },
+    /// A rough dielectric of microfacets with separable Smith masking (Walter et al. 2007).
+    Rough {
+        /// Distribution of microfacet normals.
+        distribution: Distribution,
+        /// Its roughness.
+        #[schemars(range(min = 0.0001, max = 1.0))]
+        alpha: f64,
+        /// Refractive index inside over outside.
+        eta: Eta,
+    },
+    /// No surface: the same index inside and outside.
+    Matched {},
+}
+
+/// Microfacet distributions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Distribution {
+    /// Trowbridge-Reitz.
+    Ggx,
+    /// Gaussian slopes.
+    Beckmann,
+}
+
+/// A relative refractive index.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Eta {
+    /// The same in every band.
+    Grey(f64),
+    /// One per band.
+    PerBand(Vec<f64>),
+    /// By formula or from a built-in material.
+    Formula(EtaFormula),
+}
+
+/// Dispersion formulas; they take the middle wavelength of a band.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum EtaFormula {
+    /// n = a + b/l^2 + c/l^4, l in um.
+    Cauchy {
+        /// Constant term.
+        a: f64,
+        /// Coefficient of l^-2, um^2.
+        b_um2: f64,
+        /// Coefficient of l^-4, um^4.
+        #[serde(default)]
+        c_um4: f64,
+    },
+    /// n^2 = 1 + sum_i b_i l^2 / (l^2 - c_i), l in um.
+    Sellmeier {
+        /// Strengths.
+        b: Vec<f64>,
+        /// Squared resonance wavelengths, um^2.
+        c_um2: Vec<f64>,
+    },
+    /// The index of a built-in material (`scatterproof list`).
+    Material(String),
+}
+
+/// The medium.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Medium {
+    /// Explicit coefficients.
+    Coefficients(Coefficients),
+    /// A built-in measured material (`scatterproof list`), rgb bands only.
+    Preset {
+        /// Its name.
+        name: String,
+        /// Multiplies both coefficients: 2 is a body twice as large.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        scale: f64,
+        /// Mean cosine; sigma_s = sigma_s' / (1 - g). Without it g = 0 and sigma_s = sigma_s'.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 1))]
+        g: Option<f64>,
+    },
+}
+
+/// Coefficients: exactly one of the pairs (`sigma_t_per_mm`, `albedo`), (`sigma_a_per_mm`,
+/// `sigma_s_per_mm`), (`sigma_a_per_mm`, `reduced_sigma_s_per_mm`), and `g`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Coefficients {
+    /// Extinction, 1/mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_t_per_mm: Option<Spectrum>,
+    /// sigma_s / sigma_t, 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub albedo: Option<Spectrum>,
+    /// Absorption, 1/mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_a_per_mm: Option<Spectrum>,
+    /// Scattering, 1/mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_s_per_mm: Option<Spectrum>,
+    /// Reduced scattering sigma_s (1 - g), 1/mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reduced_sigma_s_per_mm: Option<Spectrum>,
+    /// Mean cosine of the Henyey-Greenstein phase function, -1 < g < 1; 0 is isotropic.
+    pub g: Spectrum,
+}
+
+/// What is measured. Light that reaches the sensor without meeting the body is not scored.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Sensor {
+    /// Parallel rays: radiance per pixel, box filter.
+    Orthographic {
+        /// Columns and rows.
+        #[schemars(inner(range(min = 1, max = 16384)))]
+        resolution: [usize; 2],
+        /// Middle of the image plane, mm; outside the body.
+        center_mm: [f64; 3],
+        /// Direction of the rays.
+        toward: Direction,
+        /// Points up in the image.
+        up: [f64; 3],
+        /// Width of the image plane, mm; the height follows from square pixels.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        width_mm: f64,
+    },
+    /// A pinhole: radiance per pixel, box filter.
+    Perspective {
+        /// Columns and rows.
+        #[schemars(inner(range(min = 1, max = 16384)))]
+        resolution: [usize; 2],
+        /// The pinhole, mm; outside the body.
+        position_mm: [f64; 3],
+        /// The point at the middle of the image, mm.
+        look_at_mm: [f64; 3],
+        /// Points up in the image.
+        up: [f64; 3],
+        /// Vertical opening angle, degrees.
+        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 180))]
+        fov_deg: f64,
+    },
+    /// Radiance along one ray.
+    Probe {
+        /// Its origin, mm; outside the body.
+        point_mm: [f64; 3],
+        /// Its direction.
+        toward: Direction,
+        /// Independent paths whose mean is one pass.
+        #[serde(default = "default_paths_per_pass")]
+        #[schemars(range(min = 1, max = 1048576))]
+        paths_per_pass: usize,
+    },
+    /// Flux that leaves the body, by bins of the cosine between exit direction and axis.
+    /// `half_space` and `slab`: radiant exitance per face, observables `top_i`, `bottom_i` (W/mm^2).
+    /// Other shapes: flux of the whole body, observables `flux_i` (W).
+    Flux {
+        /// Number of bins: of equal width in the cosine, over 0..1 on each face, over -1..1 else.
+        #[schemars(range(min = 1, max = 1024))]
+        bins: usize,
+        /// Axis of the cosine; +z on `half_space` and `slab` (the outward normal of each face).
+        axis: [f64; 3],
+        /// Independent paths per bin whose mean is one pass.
+        #[serde(default = "default_paths_per_pass")]
+        #[schemars(range(min = 1, max = 1048576))]
+        paths_per_pass: usize,
+    },
+}
+
+fn default_paths_per_pass() -> usize {
+    1024
+}
+
+/// One light: an optional name and exactly one kind.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LightEntry {
+    /// Name in observables (`mean@sun`); without it `light_1`, `light_2`, ...
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Parallel light.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub directional: Option<Directional>,
+    /// A disc of directions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solid_angle: Option<SolidAngle>,
+    /// All directions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub environment: Option<Environment>,
+}
+
+/// Parallel light.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Directional {
+    /// From the scene towards the light.
+    pub toward: Direction,
+    /// Irradiance on a plane that faces the light, W/mm^2.
+    pub irradiance: Spectrum,
+}
+
+/// A disc of directions of uniform radiance; exactly one of `radiance`, `irradiance`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SolidAngle {
+    /// From the scene towards the middle of the disc.
+    pub toward: Direction,
+    /// Its size, sr.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 12.566370614359172))]
+    pub solid_angle_sr: f64,
+    /// Radiance, W/(mm^2 sr).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radiance: Option<Spectrum>,
+    /// Irradiance on a plane that faces the middle; the disc must be smaller than a hemisphere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub irradiance: Option<Spectrum>,
+}
+
+/// Light from all directions; exactly one of `radiance`, `map`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Environment {
+    /// Constant radiance, W/(mm^2 sr).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radiance: Option<Spectrum>,
+    /// Only directions with a positive cosine to this axis shine (a slab lit on one face).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hemisphere: Option<[f64; 3]>,
+    /// Latitude-longitude OpenEXR map, relative to the experiment file; +z is up, the middle column
+    /// is +x. Channels R, G, B for rgb bands, Y for any bands, else a channel named like each band.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<String>,
+    /// Multiplies the map.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
+    pub scale: Option<f64>,
+}
+
+/// One estimator: a unique `name` and exactly one kind with its options, as `path = {}`.
+/// The kinds are those that the program registers (`scatterproof list`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EstimatorEntry {
+    /// Name in tables and claims.
+    pub name: String,
+    /// The kind and its options.
+    #[serde(flatten)]
+    pub kind: BTreeMap<String, Value>,
+}
+
+/// One axis of the sweep: `keys` with `rows`, one `key` with `values`, or rows from a CSV file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sweep {
+    /// Name of the axis in tables and in `where`; without it the last word of its first key.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// One dotted key, as `object.boundary.rough.alpha` or `light.0.solid_angle.solid_angle_sr`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub key: Option<String>,
+    /// Its values; their texts are the labels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub values: Option<Vec<Value>>,
+    /// Several dotted keys that change together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub keys: Option<Vec<String>>,
+    /// One row per point of the axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rows: Option<Vec<SweepRow>>,
+    /// Rows from a table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub csv: Option<SweepCsv>,
+}
+
+/// One row of a sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SweepRow {
+    /// Label in tables.
+    pub label: String,
+    /// A value for each of `keys`.
+    pub values: Vec<Value>,
+}
+
+/// A sweep read from a CSV file with a header row; lines that start with # are comments.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SweepCsv {
+    /// Path, relative to the experiment file.
+    pub path: String,
+    /// Column -> dotted key that it sets; numbers become numbers, other texts strings.
+    pub columns: BTreeMap<String, String>,
+}
+
+/// Cells that differ only in these keys are played on the same random streams.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pair {
+    /// Dotted keys left out of the streams' key, as `object.shape`.
+    pub over: Vec<String>,
+}
+
+/// How much work; exactly one key.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Budget {
+    /// Passes per estimator and cell.
+    Passes(#[schemars(range(min = 2, max = 1099511627776u64))] u64),
+    /// CPU seconds per estimator and cell; a pilot turns them into passes.
+    CpuSeconds(#[schemars(extend("exclusiveMinimum" = 0))] f64),
+    /// Relative standard error of the observables that claims name; a pilot turns it into passes.
+    RelativeError(RelativeError),
+}
+
+/// A relative standard error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RelativeError {
+    /// Largest standard error over value.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub at_most: f64,
+    /// Another bound for small values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub small_values: Option<SmallValues>,
+}
+
+/// A relative standard error for values below a limit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SmallValues {
+    /// The limit.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub below: f64,
+    /// Largest standard error over value below it.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub at_most: f64,
+}
+
+/// One claim: exactly one kind.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ClaimEntry {
+    /// Label in verdict tables.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// The outcome that makes the claim green, where it is not a pass (controls).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expect: Option<Expect>,
+    /// A quantity equals a known value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub equals: Option<Equals>,
+    /// Two measurements of one integral agree.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub agree: Option<Agree>,
+}
+
+/// Outcomes that controls expect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Expect {
+    /// The test must find a difference.
+    Differs,
+    /// The test must be refused as statistically invalid.
+    Invalid,
+}
+
+/// A quantity equals a known value in every cell and band: `value` and `error`, or the `column`
+/// (and `error_column`) of the row that the cell took from a CSV sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Equals {
+    /// The estimator; all of them without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimator: Option<String>,
+    /// The observable; the sensor's first one without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observable: Option<String>,
+    /// The transport class; `all` without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<String>,
+    /// The expected value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// Its stated standard error; exact without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
+    pub error: Option<f64>,
+    /// Column of the expected value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub column: Option<String>,
+    /// Column of its stated error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error_column: Option<String>,
+    /// Where the expected value comes from.
+    pub source: String,
+    /// The largest relative defect that may go unseen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub detect: Option<f64>,
+    /// Only cells with these labels: axis -> label.
+    #[serde(default, rename = "where", skip_serializing_if = "BTreeMap::is_empty")]
+    pub only: BTreeMap<String, String>,
+}
+
+/// Estimators agree in every cell, or cells that differ only `across` one axis agree.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Agree {
+    /// The estimators: two or more, or one with `across`.
+    pub estimators: Vec<String>,
+    /// Axis of the sweep whose cells must agree.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub across: Option<String>,
+    /// The observable; the sensor's first one without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observable: Option<String>,
+    /// The transport class; `all` without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<String>,
+    /// The largest relative difference that may go unseen.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub detect: f64,
+    /// Only cells with these labels: axis -> label.
+    #[serde(default, rename = "where", skip_serializing_if = "BTreeMap::is_empty")]
+    pub only: BTreeMap<String, String>,
+}
+
+/// How pictures are shown.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Display {
+    /// Stops by which PNG pictures are brightened.
+    #[serde(default)]
+    pub exposure_stops: f64,
+}
+
+impl Default for Display {
+    fn default() -> Self {
+        Display { exposure_stops: 0.0 }
+    }
+}

@@ -1,0 +1,4 @@
+//! Records, provenance, the atomic store, images.
+
+/// The record's layout.
+pub mod record;

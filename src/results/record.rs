@@ -1,0 +1,175 @@
+//! The record: what a run writes and the only thing that verification and reports read.
+//! Byte-identical for any number of threads, block size, kill and resume.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// Version of this layout; a reader refuses others.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// `record.json`: everything but the arrays, which stand in `.npy` files beside it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// [`SCHEMA_VERSION`] of the writer.
+    pub schema_version: u32,
+    /// The experiment's name.
+    pub experiment: String,
+    /// What fixes the bits: numerical version, crates, target (see `results::provenance`).
+    pub fingerprint: String,
+    /// blake3 of the resolved experiment without claims, hex.
+    pub experiment_hash: String,
+    /// The resolved experiment without claims: every value that was used, defaults included.
+    pub resolved: serde_json::Value,
+    /// blake3 of `claims`, hex.
+    pub claims_hash: String,
+    /// The claims as the file states them.
+    pub claims: serde_json::Value,
+    /// The claims expanded over cells, bands and tables, with the values they are held against.
+    pub comparisons: Vec<Comparison>,
+    /// The bands, in the order of every array's band axis.
+    pub bands: Vec<Band>,
+    /// The cells in the order of the sweep.
+    pub cells: Vec<Cell>,
+    /// blake3 of every array file, hex, by its path relative to the record's folder.
+    pub checksums: BTreeMap<String, String>,
+}
+
+/// One wavelength interval.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Band {
+    /// `R`, `G`, `B`, `400-420nm`, or the name an explicit list gives.
+    pub name: String,
+    /// Lower and upper wavelength, nm, where the experiment states them.
+    pub range_nm: Option<[f64; 2]>,
+    /// Linear sRGB (D65) that one unit of this band's radiance shows as.
+    pub display_rgb: [f64; 3],
+}
+
+/// One point of the sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// The axes' labels joined by `,`; empty where there is no sweep.
+    pub label: String,
+    /// Sweep axis -> this cell's label on it.
+    pub axes: BTreeMap<String, String>,
+    /// blake3 of the cell's physics in canonical form, hex.
+    pub content_hash: String,
+    /// What each estimator measured here.
+    pub runs: Vec<EstimatorRun>,
+}
+
+/// One estimator's measurement of one cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EstimatorRun {
+    /// The name the experiment gives it.
+    pub estimator: String,
+    /// Its kind, as `path`.
+    pub kind: String,
+    /// What it promises of its mean.
+    pub bias: Bias,
+    /// What a reader must know (a transport that it cannot sample).
+    pub notes: Vec<String>,
+    /// Number of independent passes.
+    pub passes: u64,
+    /// The gate observables, in the order of the gate array's observable axis.
+    pub observables: Vec<Observable>,
+    /// Path of the gate moments, `[batch][observable][band][5]` f64: count, mean, and the sums of
+    /// second, third and fourth powers of deviations from the mean.
+    pub gates: String,
+    /// The image, where the sensor has pixels.
+    pub image: Option<Image>,
+    /// Deterministic counts of work done, summed over bands and passes.
+    pub cost: BTreeMap<String, u64>,
+    /// Counts of what must not go unseen, by name (`nonfinite`, `lost_ray`, `wrong_side`).
+    pub anomalies: BTreeMap<String, u64>,
+}
+
+/// What an estimator promises of its mean.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Bias {
+    /// The expectation is the integral.
+    Unbiased,
+    /// The expectation tends to the integral as passes grow.
+    Consistent,
+    /// The expectation differs, for this reason.
+    Biased(String),
+}
+
+/// A quantity that claims and tables speak of.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Observable {
+    /// `mean`, `tile_0_3`, `probe`, `top_0`, ...; with `@light` appended for one light's share.
+    pub name: String,
+    /// `all`, or a transport class: `surface`, `single`, `single_internal`, `multiple`,
+    /// `multiple_internal`.
+    pub class: String,
+}
+
+/// The pixel arrays of one run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Image {
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows, from the top.
+    pub height: usize,
+    /// Path of the `[2][row][column][band]` f64 array: mean over passes, and its standard error.
+    pub pixels: String,
+}
+
+/// Which number of a record: one band of one observable of one estimator in one cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quantity {
+    /// Index into [`Record::cells`].
+    pub cell: usize,
+    /// Estimator name.
+    pub estimator: String,
+    /// The observable.
+    pub observable: Observable,
+    /// Index into [`Record::bands`].
+    pub band: usize,
+}
+
+/// One elementary statement of a claim.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Comparison {
+    /// Index of the claim in the file.
+    pub claim: usize,
+    /// The number under test.
+    pub quantity: Quantity,
+    /// What it is held against.
+    pub against: Against,
+    /// The largest relative defect that may go unseen; a coarser test is underpowered.
+    pub detect: Option<f64>,
+}
+
+/// What a quantity is held against.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Against {
+    /// A published or computed value with its stated error (one standard error; 0 = exact).
+    Value {
+        /// The expected value.
+        value: f64,
+        /// Its stated error.
+        error: f64,
+        /// Where it comes from.
+        source: String,
+    },
+    /// Another quantity of this record.
+    Quantity {
+        /// The other quantity.
+        other: Quantity,
+        /// True where both were played on the same random streams, pass by pass.
+        paired: bool,
+    },
+}
