@@ -70,8 +70,7 @@ pub enum Bands {
         #[schemars(range(min = 1, max = 1024))]
         count: usize,
     },
-    /// A list of named bands.
-    #[schemars(length(min = 1, max = 1024))]
+    /// A list of 1 to 1024 named bands.
     Explicit(Vec<ExplicitBand>),
 }
 
@@ -148,8 +147,7 @@ pub enum Shape {
     },
     /// An axis-aligned box about the origin.
     Box {
-        /// Edge lengths along x, y, z, mm.
-        #[schemars(inner(extend("exclusiveMinimum" = 0)))]
+        /// Edge lengths along x, y, z, mm; positive.
         size_mm: [f64; 3],
     },
     /// A sphere about the origin, exact.
@@ -228,8 +226,7 @@ pub enum Shape {
     },
     /// A box with square holes through it along z.
     DrilledBox {
-        /// Edge lengths along x, y, z, mm.
-        #[schemars(inner(extend("exclusiveMinimum" = 0)))]
+        /// Edge lengths along x, y, z, mm; positive.
         size_mm: [f64; 3],
         /// Number of holes along x and y.
         #[schemars(inner(range(min = 1, max = 64)))]
