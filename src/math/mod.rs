@@ -2,3 +2,34 @@
 //! Doors for `glam` and `libm`: the C library chooses its sine by CPU, libm's is the same everywhere.
 
 pub use glam::{DVec2, DVec3, Vec3};
+
+macro_rules! portable {
+    ($($name:ident $(, $second:ident)? = $libm:ident : $doc:literal;)*) => { $(
+        #[doc = $doc]
+        #[inline]
+        pub fn $name(x: f64 $(, $second: f64)?) -> f64 {
+            libm::$libm(x $(, $second)?)
+        }
+    )* };
+}
+
+portable! {
+    exp = exp: "e^x.";
+    exp_m1 = expm1: "e^x - 1, accurate near 0.";
+    ln = log: "Natural logarithm.";
+    ln_1p = log1p: "ln(1 + x), accurate near 0.";
+    log2 = log2: "Logarithm to base 2.";
+    log10 = log10: "Logarithm to base 10.";
+    pow, y = pow: "x^y.";
+    cbrt = cbrt: "Cube root.";
+    sin = sin: "Sine.";
+    cos = cos: "Cosine.";
+    tan = tan: "Tangent.";
+    asin = asin: "Arc sine.";
+    acos = acos: "Arc cosine.";
+    atan = atan: "Arc tangent.";
+    atan2, y = atan2: "Angle of the point (y, x): `atan2(y, x)` as in C, first argument the ordinate.";
+    erf = erf: "Error function.";
+    erfc = erfc: "Complementary error function, relative accuracy kept in the tail.";
+    ln_gamma = lgamma: "Logarithm of |Gamma(x)|.";
+}
