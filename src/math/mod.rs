@@ -33,3 +33,13 @@ portable! {
     erfc = erfc: "Complementary error function, relative accuracy kept in the tail.";
     ln_gamma = lgamma: "Logarithm of |Gamma(x)|.";
 }
+
+mod frame;
+mod inverse;
+mod quadrature;
+mod turns;
+
+pub use frame::Frame;
+pub use inverse::{erf_inv, increasing_root};
+pub use quadrature::{Integral, integrate};
+pub use turns::sin_cos_turns;

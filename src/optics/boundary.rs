@@ -1,0 +1,359 @@
+//! The refractive surface as a whole: a lobe of reflection and a lobe of refraction.
+//!
+//! Local frame: +z is the outward normal; `wo` points towards the sensor, `wi` towards the light, both
+//! away from the surface; a direction with z > 0 is outside. `eta` is inside over outside. What flows
+//! is radiance from `wi` to `wo`: refraction changes it by the squared index of the receiving side over
+//! that of the sending side.
+//!
+//! Rough surface (Walter, Marschner, Li & Torrance 2007), index n_o on the side of wo, n_i on that of wi:
+//!   reflection  h ~ wo + wi,           f |cos_i| = F D G1(wo) G1(wi) / (4 |cos_o|)              (eq. 20)
+//!   refraction  h ~ n_o wo + n_i wi,   f |cos_i| = |wo.h| |wi.h| D G1(wo) G1(wi) (1 - F) n_o^2
+//!                                                  / (|cos_o| (n_o wo.h + n_i wi.h)^2)          (eq. 21)
+//! with h turned to the side of wo. Their n_i^2 is our n_o^2: eq. 21 transports importance, here it is
+//! radiance. Sampling: h from the visible normals of wo, reflection with probability F(wo.h). Then
+//!   pdf = F G1(wo) D / (4 |cos_o|),   (1 - F) G1(wo) D |wo.h| n_i^2 |wi.h| / (|cos_o| (...)^2)
+//!   weight = f |cos_i| / pdf = G1(wi)   and   G1(wi) (n_o / n_i)^2.
+
+use super::fresnel::fresnel;
+use super::microfacet::Microfacets;
+use crate::math::DVec3;
+
+/// The surface, one band.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Boundary {
+    /// A smooth dielectric: two delta lobes.
+    Smooth {
+        /// Index inside over outside.
+        eta: f64,
+    },
+    /// A rough dielectric.
+    Rough {
+        /// Index inside over outside, not 1.
+        eta: f64,
+        /// Its microfacets.
+        facets: Microfacets,
+    },
+    /// No surface; light passes straight through.
+    Matched,
+}
+
+/// How densely a direction was sampled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Density {
+    /// Per solid angle.
+    Finite(f64),
+    /// A delta lobe: no other technique can draw this direction.
+    Delta,
+}
+
+/// What happened at the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// `wi` is on the side of `wo`.
+    Reflect,
+    /// `wi` is on the other side.
+    Refract,
+}
+
+/// A sampled direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundarySample {
+    /// Towards the light.
+    pub wi: DVec3,
+    /// f |cos_i| / pdf.
+    pub weight: f64,
+    /// Density of `wi`, the choice of lobe included.
+    pub density: Density,
+    /// Which lobe.
+    pub event: Event,
+}
+
+impl Boundary {
+    /// Draws `wi` for `wo`; `u[0]` chooses the lobe. `None`: the microfacet sends the light into the
+    /// surface, the sample scores 0 (what multiple scattering between facets would carry is lost).
+    #[inline]
+    pub fn sample(&self, wo: DVec3, u: [f64; 3]) -> Option<BoundarySample> {
+        match *self {
+            Boundary::Matched => Some(BoundarySample {
+                wi: -wo,
+                weight: 1.0,
+                density: Density::Delta,
+                event: Event::Refract,
+            }),
+            Boundary::Smooth { eta } => {
+                let h = DVec3::new(0.0, 0.0, 1f64.copysign(wo.z));
+                let (wi, event) = split(wo, h, side_eta(eta, wo), u[0]);
+                let radiance =
+                    if event == Event::Refract { 1.0 / square(side_eta(eta, wo)) } else { 1.0 };
+                Some(BoundarySample { wi, weight: radiance, density: Density::Delta, event })
+            }
+            Boundary::Rough { eta, ref facets } => {
+                let relative = side_eta(eta, wo);
+                let sign = 1f64.copysign(wo.z);
+                // The distribution is even: mirror wo to the upper side, and the facet back.
+                let upper = DVec3::new(wo.x, wo.y, wo.z * sign);
+                let h = facets.sample_visible(upper, [u[1], u[2]]);
+                let h = DVec3::new(h.x, h.y, h.z * sign);
+                let (wi, event) = split(wo, h, relative, u[0]);
+                let expected_side = if event == Event::Reflect { sign } else { -sign };
+                if wi.z * expected_side <= 0.0 {
+                    return None;
+                }
+                let radiance = if event == Event::Refract { 1.0 / square(relative) } else { 1.0 };
+                let (_, pdf) = rough(eta, facets, wo, wi);
+                let weight = facets.g1(wi) * radiance;
+                Some(BoundarySample { wi, weight, density: Density::Finite(pdf), event })
+            }
+        }
+    }
+
+    /// f |cos_i| (1/sr) and the density of `wi` given `wo` (1/sr), both without delta lobes: the pair
+    /// (value, pdf) that light sampling and MIS need.
+    #[inline]
+    pub fn eval(&self, wo: DVec3, wi: DVec3) -> (f64, f64) {
+        match self {
+            Boundary::Rough { eta, facets } => rough(*eta, facets, wo, wi),
+            Boundary::Smooth { .. } | Boundary::Matched => (0.0, 0.0),
+        }
+    }
+
+    /// True where the surface has delta lobes alone.
+    pub fn is_delta(&self) -> bool {
+        !matches!(self, Boundary::Rough { .. })
+    }
+}
+
+#[inline]
+fn square(x: f64) -> f64 {
+    x * x
+}
+
+/// Index of the far side over the side of `wo`.
+#[inline]
+fn side_eta(eta: f64, wo: DVec3) -> f64 {
+    if wo.z > 0.0 { eta } else { 1.0 / eta }
+}
+
+/// Reflects `wo` about `h` with the probability of Fresnel's reflectance, else refracts it through;
+/// `wo.h` > 0, `eta` = far side over near side.
+#[inline]
+fn split(wo: DVec3, h: DVec3, eta: f64, u: f64) -> (DVec3, Event) {
+    let cos = wo.dot(h);
+    let surface = fresnel(cos, eta);
+    if u < surface.reflectance {
+        (2.0 * cos * h - wo, Event::Reflect)
+    } else {
+        // Snell: the tangential part shrinks by eta, the normal part is -cos_t.
+        ((cos / eta - surface.cos_t) * h - wo / eta, Event::Refract)
+    }
+}
+
+/// Value f |cos_i| and density of the rough surface; (0, 0) where no facet joins the directions.
+#[inline]
+fn rough(eta: f64, facets: &Microfacets, wo: DVec3, wi: DVec3) -> (f64, f64) {
+    let relative = side_eta(eta, wo);
+    let sign = 1f64.copysign(wo.z);
+    let reflects = wo.z * wi.z > 0.0;
+    // In units of n_o: n_i = relative on the far side.
+    let sum = if reflects { wo + wi } else { wo + relative * wi };
+    let sum = if sum.z * sign < 0.0 { -sum } else { sum };
+    let h = sum.normalize();
+    let (oh, ih) = (wo.dot(h), wi.dot(h));
+    let facet_faces = oh > 0.0 && if reflects { ih > 0.0 } else { ih < 0.0 };
+    if !facet_faces || wo.z == 0.0 || wi.z == 0.0 {
+        return (0.0, 0.0);
+    }
+    let d = facets.d(DVec3::new(h.x, h.y, h.z * sign));
+    let visible = facets.g1(wo) * d / wo.z.abs();
+    let reflectance = fresnel(oh, relative).reflectance;
+    let pdf = if reflects {
+        reflectance * visible * 0.25
+    } else {
+        (1.0 - reflectance) * visible * oh * square(relative) * -ih / square(oh + relative * ih)
+    };
+    let radiance = if reflects { 1.0 } else { 1.0 / square(relative) };
+    (pdf * facets.g1(wi) * radiance, pdf)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Integral, integrate, sin_cos_turns};
+    use crate::optics::microfacet::MicrofacetKind;
+    use std::f64::consts::PI;
+
+    fn direction(cos: f64, phi: f64) -> DVec3 {
+        let sin = (1.0 - cos * cos).sqrt();
+        let (s, c) = sin_cos_turns(phi);
+        DVec3::new(sin * c, sin * s, cos)
+    }
+
+    fn rough_surfaces() -> impl Iterator<Item = Boundary> {
+        [MicrofacetKind::Ggx, MicrofacetKind::Beckmann].into_iter().flat_map(|kind| {
+            [(1.3, 0.2), (1.5, 0.04), (1.5, 0.5), (0.8, 0.3)]
+                .map(|(eta, alpha)| Boundary::Rough { eta, facets: Microfacets { kind, alpha } })
+        })
+    }
+
+    fn pieces(a: f64, b: f64, n: u32, tolerance: f64, f: impl Fn(f64) -> f64) -> Integral {
+        let edge = |i: u32| a + (b - a) * f64::from(i) / f64::from(n);
+        let sum =
+            |x: Integral, y: Integral| Integral { value: x.value + y.value, error: x.error + y.error };
+        (0..n)
+            .map(|i| integrate(&f, edge(i), edge(i + 1), tolerance / f64::from(n)))
+            .fold(Integral { value: 0.0, error: 0.0 }, sum)
+    }
+
+    fn grid(n: u32) -> impl Iterator<Item = f64> {
+        (0..n).map(move |i| (f64::from(i) + 0.43) / f64::from(n))
+    }
+
+    /// D5: every sample's weight times its density is the value, the density asked again is the one
+    /// reported, and both lobes and failures occur.
+    #[test]
+    fn sample_weight_times_density_is_the_value() {
+        for surface in rough_surfaces() {
+            for cos in [0.95, 0.4, 0.05, -0.05, -0.4, -0.95] {
+                let wo = direction(cos, 0.21);
+                let mut drawn = 0;
+                for u0 in grid(16) {
+                    for u1 in grid(16) {
+                        for u2 in grid(16) {
+                            let Some(s) = surface.sample(wo, [u0, u1, u2]) else { continue };
+                            let Density::Finite(pdf) = s.density else { panic!("delta") };
+                            let (value, again) = surface.eval(wo, s.wi);
+                            assert!(pdf > 0.0 && (again / pdf - 1.0).abs() < 1e-10);
+                            assert!(
+                                (s.weight * pdf / value - 1.0).abs() < 1e-10,
+                                "{surface:?} {cos}: {s:?} {value}"
+                            );
+                            assert_eq!(s.event == Event::Reflect, s.wi.z * wo.z > 0.0);
+                            assert!((s.wi.length() - 1.0).abs() < 1e-13);
+                            drawn += 1;
+                        }
+                    }
+                }
+                assert!(drawn > 1500, "{surface:?} {cos}: {drawn}");
+            }
+        }
+    }
+
+    /// D8: reciprocity f(a -> b) / n_b^2 = f(b -> a) / n_a^2, f without the cosine of the source.
+    #[test]
+    fn reciprocity() {
+        for surface in rough_surfaces() {
+            let Boundary::Rough { eta, .. } = surface else { unreachable!() };
+            let index2 = |w: DVec3| if w.z > 0.0 { 1.0 } else { eta * eta };
+            let mut joined = 0;
+            for a in [0.9, 0.3, -0.3, -0.8] {
+                for b in grid(40) {
+                    for phi in grid(8) {
+                        let (wo, wi) = (direction(a, 0.1), direction(2.0 * b - 1.0, phi));
+                        let forward = surface.eval(wo, wi).0 / (wi.z.abs() * index2(wo));
+                        let backward = surface.eval(wi, wo).0 / (wo.z.abs() * index2(wi));
+                        if forward.max(backward) > 1e-200 {
+                            assert!((forward / backward - 1.0).abs() < 1e-10, "{wo} {wi}");
+                            joined += 1;
+                        }
+                    }
+                }
+            }
+            assert!(joined > 50);
+        }
+    }
+
+    /// D3: the lobe is chosen with exactly Fresnel's reflectance, counted over 2^16 values of u.
+    #[test]
+    fn lobe_choice_by_enumeration() {
+        for eta in [1.3, 1.5, 1.0] {
+            for cos in [1.0, 0.3, -0.9, -0.2] {
+                let wo = direction(cos, 0.4);
+                let n = 1 << 16;
+                let reflected = (0..n)
+                    .filter(|&k| {
+                        let u = (f64::from(k) + 0.5) / f64::from(n);
+                        let sample = Boundary::Smooth { eta }.sample(wo, [u, 0.5, 0.5]);
+                        sample.is_some_and(|s| s.event == Event::Reflect)
+                    })
+                    .count();
+                let expected = fresnel(cos.abs(), side_eta(eta, wo)).reflectance;
+                let share = reflected as f64 / f64::from(n);
+                assert!((share - expected).abs() <= 1.0 / f64::from(n), "{eta} {cos}");
+            }
+        }
+    }
+
+    /// The smooth surface obeys Snell's law and conserves radiance over a there-and-back.
+    #[test]
+    fn smooth_refraction_follows_snell() {
+        let surface = Boundary::Smooth { eta: 1.4 };
+        for cos in [0.9, 0.5, 0.1] {
+            let wo = direction(cos, 0.7);
+            let s = surface.sample(wo, [0.999_999, 0.0, 0.0]).expect("refracts");
+            assert!(((1.0 - cos * cos).sqrt() / (1.0 - s.wi.z * s.wi.z).sqrt() - 1.4).abs() < 1e-12);
+            assert!((s.weight - 1.0 / (1.4 * 1.4)).abs() < 1e-15);
+            let back = surface.sample(s.wi, [0.999_999, 0.0, 0.0]).expect("refracts back");
+            assert!((back.wi - wo).length() < 1e-12);
+            assert!((s.weight * back.weight - 1.0).abs() < 1e-15);
+        }
+    }
+
+    /// D7: the density over all directions and the probability of a failed sample add up to 1. The
+    /// failures are integrated over the unit square of the facet sample, the density over the sphere.
+    #[test]
+    fn densities_and_failures_sum_to_one() {
+        for surface in rough_surfaces() {
+            let Boundary::Rough { eta, facets } = surface else { unreachable!() };
+            if facets.alpha < 0.1 {
+                continue; // the sphere integral of a narrow peak; D5 and the facets' D7 cover it
+            }
+            for cos in [0.8, 0.2, -0.7] {
+                let wo = direction(cos, 0.0);
+                // In the angle theta (sin theta is the Jacobian) and apart on the two sides, so that the
+                // horizon, where masking bends sharply, is an end point.
+                let hemisphere = |from: f64| {
+                    pieces(from, from + 0.5 * PI, 16, 1e-9, |theta| {
+                        let (sin, cos) = (crate::math::sin(theta), crate::math::cos(theta));
+                        let ring = |phi: f64| surface.eval(wo, direction(cos, phi)).1;
+                        4.0 * PI * sin * pieces(0.0, 0.5, 8, 1e-11, ring).value
+                    })
+                };
+                let over_sphere = [hemisphere(0.0), hemisphere(0.5 * PI)];
+                // Failure probability over half-vector slopes, as in the facets' own normalisation.
+                let sign = 1f64.copysign(cos);
+                let upper = DVec3::new(wo.x, wo.y, wo.z * sign);
+                let failed = |s: f64, t: f64| {
+                    let h = DVec3::new(-s, -t, 1.0).normalize();
+                    let pdf = facets.pdf_visible(upper, h) * h.z * h.z * h.z;
+                    let h = DVec3::new(h.x, h.y, h.z * sign);
+                    let relative = side_eta(eta, wo);
+                    let reflectance = fresnel(wo.dot(h), relative).reflectance;
+                    let lost = |u: f64, side: f64, share: f64| {
+                        let (wi, _) = split(wo, h, relative, u);
+                        if wi.z * side <= 0.0 { share } else { 0.0 }
+                    };
+                    let refracted =
+                        if reflectance < 1.0 { lost(1.0, -sign, 1.0 - reflectance) } else { 0.0 };
+                    pdf * (lost(-1.0, sign, reflectance) + refracted)
+                };
+                // The indicator of failure jumps: many short intervals, so that no jump hides between
+                // the nodes of a first, coarse rule.
+                let inner = |s: f64| {
+                    pieces(0.0, 1.0, 64, 1e-10, |q| {
+                        let t = facets.alpha * q / (1.0 - q);
+                        failed(s, t) * facets.alpha / ((1.0 - q) * (1.0 - q))
+                    })
+                };
+                let null = pieces(-1.0, 1.0, 64, 1e-9, |p| {
+                    let s = facets.alpha * p / (1.0 - p * p);
+                    let ds = facets.alpha * (1.0 + p * p) / ((1.0 - p * p) * (1.0 - p * p));
+                    2.0 * inner(s).value * ds
+                });
+                let total = over_sphere[0].value + over_sphere[1].value + null.value;
+                let resolved = over_sphere[0].error + over_sphere[1].error + null.error;
+                assert!(resolved < 1e-8, "the quadrature did not resolve: {resolved}");
+                assert!((total - 1.0).abs() < 1e-8, "{surface:?} {cos}: {total}");
+            }
+        }
+    }
+}
