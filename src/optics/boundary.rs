@@ -316,11 +316,11 @@ mod tests {
             for cos in [0.8, 0.2, -0.7] {
                 let wo = direction(cos, 0.0);
                 let lobe = |from: f64, reflects: bool| {
-                    pieces(from, from + 0.5 * PI, 16, 1e-9, |theta| {
+                    pieces(from, from + 0.5 * PI, 32, 1e-10, |theta| {
                         let (sin, cos) = (crate::math::sin(theta), crate::math::cos(theta));
                         let ring =
                             |phi: f64| rough_lobe(eta, &facets, wo, direction(cos, phi), reflects).1;
-                        4.0 * PI * sin * pieces(0.0, 0.5, 8, 1e-11, ring).value
+                        4.0 * PI * sin * pieces(0.0, 0.5, 32, 1e-12, ring).value
                     })
                 };
                 let (above, below) = (0.0, 0.5 * PI);
