@@ -2,6 +2,23 @@
 //! All lengths in mm, all arithmetic that a result sees in f64; scaling a scene by a power of two
 //! scales every result exactly (no absolute epsilon anywhere).
 
+mod analytic;
+pub mod audit;
+mod clearance;
+mod mesh;
+mod normals;
+mod obj;
+pub mod procedural;
+#[cfg(test)]
+mod testing;
+mod topology;
+mod tree;
+mod triangle;
+
+pub use mesh::Mesh;
+pub use normals::Normals;
+pub use obj::load_obj;
+
 use crate::math::DVec3;
 
 /// A ray: `origin + t dir`, `dir` a unit vector.
@@ -47,4 +64,115 @@ pub struct Hit {
     pub shading_normal: DVec3,
     /// The primitive.
     pub face: FaceId,
+}
+
+/// A sphere that holds a whole body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundingSphere {
+    /// Its middle, mm.
+    pub center: DVec3,
+    /// Its radius, mm.
+    pub radius: f64,
+}
+
+/// The body. Its faces, as [`Hit::face`] numbers them:
+///
+/// | shape | faces |
+/// |---|---|
+/// | half-space | 0 |
+/// | slab | 0 top (z = 0), 1 bottom |
+/// | box | 0 -x, 1 +x, 2 -y, 3 +y, 4 -z, 5 +z |
+/// | sphere | 0 |
+/// | mesh | the triangle's index |
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one body in a scene")]
+pub enum Shape {
+    /// z < 0.
+    HalfSpace,
+    /// -thickness < z < 0.
+    Slab {
+        /// Thickness, mm; positive.
+        thickness: f64,
+    },
+    /// An axis-aligned box about the origin.
+    Box {
+        /// Half its edge lengths, mm; positive.
+        half: DVec3,
+    },
+    /// A sphere about the origin.
+    Sphere {
+        /// Radius, mm; positive.
+        radius: f64,
+    },
+    /// A closed triangle mesh.
+    Mesh(Mesh),
+}
+
+impl Shape {
+    /// The closest crossing with `t` in (0, `t_max`] at which a ray that travels on `side` leaves
+    /// it: `dir . normal > 0` for a ray inside, `< 0` outside. Crossings of the other orientation
+    /// are not seen, so a ray that starts on the surface meets no rounding ghost of a neighbour.
+    ///
+    /// `from` is the face that the ray starts on. A planar face is never met again; the sphere
+    /// reports its other root. The ray must start on `side`, or on the surface and go to `side`;
+    /// where rounding has put the origin a last digit beyond a half-space, slab, box or sphere, a
+    /// ray inside leaves at once (`t` is the smallest positive number).
+    pub fn intersect(&self, ray: &Ray, side: Side, from: Option<FaceId>, t_max: f64) -> Option<Hit> {
+        let hit = match *self {
+            Shape::HalfSpace => analytic::half_space(ray, side, from),
+            Shape::Slab { thickness } => analytic::slab(thickness, ray, side, from),
+            Shape::Box { half } => analytic::cuboid(half, ray, side, from),
+            Shape::Sphere { radius } => analytic::sphere(radius, ray, side, from),
+            Shape::Mesh(ref mesh) => return mesh.intersect(ray, side, from, t_max),
+        };
+        hit.filter(|hit| hit.t <= t_max)
+    }
+
+    /// Whether a ray outside meets the body at all: the shadow ray of a light at infinity. The same
+    /// answer as `intersect(ray, Side::Outside, from, INFINITY).is_some()`, sooner.
+    pub fn occluded(&self, ray: &Ray, from: Option<FaceId>) -> bool {
+        match self {
+            Shape::Mesh(mesh) => mesh.occluded(ray, from),
+            _ => self.intersect(ray, Side::Outside, from, f64::INFINITY).is_some(),
+        }
+    }
+
+    /// A sphere around the body; none for the unbounded half-space and slab.
+    pub fn bounds(&self) -> Option<BoundingSphere> {
+        match *self {
+            Shape::HalfSpace | Shape::Slab { .. } => None,
+            Shape::Box { half } => Some(BoundingSphere { center: DVec3::ZERO, radius: half.length() }),
+            Shape::Sphere { radius } => Some(BoundingSphere { center: DVec3::ZERO, radius }),
+            Shape::Mesh(ref mesh) => Some(mesh.bounds()),
+        }
+    }
+
+    /// Whether the point is inside the body. A point on the surface is not inside an analytic
+    /// shape; on a mesh, rounding decides.
+    pub fn contains(&self, point: DVec3) -> bool {
+        match *self {
+            Shape::HalfSpace => point.z < 0.0,
+            Shape::Slab { thickness } => -thickness < point.z && point.z < 0.0,
+            Shape::Box { half } => point.abs().cmplt(half).all(),
+            Shape::Sphere { radius } => point.length() < radius,
+            Shape::Mesh(ref mesh) => mesh.contains(point),
+        }
+    }
+
+    /// Number of triangles; 0 for analytic shapes.
+    pub fn triangle_count(&self) -> usize {
+        match self {
+            Shape::Mesh(mesh) => mesh.triangles().len(),
+            _ => 0,
+        }
+    }
+
+    /// Estimate of the memory that the shape holds, bytes.
+    pub fn memory_bytes(&self) -> usize {
+        size_of::<Shape>()
+            + match self {
+                Shape::Mesh(mesh) => mesh.heap_bytes(),
+                _ => 0,
+            }
+    }
 }

@@ -1,0 +1,200 @@
+//! Self checks of a shape: does a ray inside ever fail to leave? Run by the tests on the built-in
+//! bodies, and on any shape that an experiment uses.
+
+use super::{Hit, Ray, Shape, Side};
+use crate::math::DVec3;
+
+/// A source of uniform numbers in [0, 1).
+pub type Source<'a> = &'a mut dyn FnMut() -> f64;
+
+/// What [`audit_aim`] found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AimAudit {
+    /// Rays from inside.
+    pub rays: u64,
+    /// Rays that met no surface, though the body is bounded.
+    pub lost: u64,
+}
+
+/// What [`audit_walk`] found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WalkAudit {
+    /// Flights of the walk.
+    pub segments: u64,
+    /// Flights that ended on the surface.
+    pub hits: u64,
+    /// Unbounded flights that met no surface, though they had to.
+    pub lost: u64,
+    /// Points (every [`PROBE`]-th segment) whose ray enters the body before it leaves it.
+    pub escaped: u64,
+    /// Hits outside (0, t_max], off the ray, or with the normal against it.
+    pub wrong: u64,
+}
+
+/// Every so many segments the walk checks by a second ray that it is still inside.
+pub const PROBE: u64 = 16;
+
+/// Aims rays from random points inside a bounded shape: a third each in random directions, at
+/// points on edges, and at vertices (without a mesh, all in random directions).
+///
+/// # Panics
+/// If the shape is unbounded.
+pub fn audit_aim(shape: &Shape, rays: u64, u: Source) -> AimAudit {
+    let mut audit = AimAudit { rays, lost: 0 };
+    for i in 0..rays {
+        let origin = interior_point(shape, u);
+        let dir = match (shape, i % 3) {
+            (Shape::Mesh(mesh), kind @ 1..) => {
+                let [a, b, _] = mesh.triangles()[pick(mesh.triangles().len(), u)]
+                    .map(|i| mesh.vertices()[i as usize]);
+                let along = if kind == 1 { u() } else { 0.0 };
+                (a + (b - a) * along - origin).normalize()
+            }
+            _ => direction(u),
+        };
+        let hit = shape.intersect(&Ray { origin, dir }, Side::Inside, None, f64::INFINITY);
+        audit.lost += u64::from(hit.is_none());
+    }
+    audit
+}
+
+/// Walks inside a shape as transport does: from the surface with `from` and from points of the
+/// volume, in random directions, by flights from 1e-9 of the body's size to unbounded ones.
+///
+/// In an unbounded shape a flight that meets nothing is lost only if it heads for a face.
+pub fn audit_walk(shape: &Shape, segments: u64, u: Source) -> WalkAudit {
+    let mut audit = WalkAudit { segments, ..WalkAudit::default() };
+    let size = shape.bounds().map_or(1.0, |bounds| bounds.radius);
+    let mut ray = Ray { origin: interior_point(shape, u), dir: direction(u) };
+    let mut from = None;
+    for i in 0..segments {
+        // Half of the flights unbounded, the rest log-uniform over nine decades.
+        let t_max = if u() < 0.5 { f64::INFINITY } else { size * decades(9.0 * u()) };
+        match shape.intersect(&ray, Side::Inside, from, t_max) {
+            Some(hit) => {
+                audit.hits += 1;
+                audit.wrong += u64::from(is_wrong(&ray, &hit, t_max, size));
+                ray = Ray { origin: hit.point, dir: inward(hit.normal, u) };
+                from = Some(hit.face);
+            }
+            None if t_max < f64::INFINITY => {
+                ray = Ray { origin: ray.at(t_max), dir: direction(u) };
+                from = None;
+            }
+            None => {
+                audit.lost += u64::from(must_leave(shape, &ray));
+                ray = Ray { origin: interior_point(shape, u), dir: direction(u) };
+                from = None;
+            }
+        }
+        if i % PROBE == 0 && from.is_none() && enters_first(shape, &ray, size) {
+            audit.escaped += 1;
+            ray.origin = interior_point(shape, u);
+        }
+    }
+    audit
+}
+
+/// A point inside, by rejection from the bounding sphere; near the origin of an unbounded shape.
+pub fn interior_point(shape: &Shape, u: Source) -> DVec3 {
+    match (*shape).bounds() {
+        Some(bounds) => loop {
+            let cube = DVec3::new(u(), u(), u()) * 2.0 - 1.0;
+            let point = bounds.center + cube * bounds.radius;
+            if shape.contains(point) {
+                return point;
+            }
+        },
+        None => {
+            let depth = if let Shape::Slab { thickness } = *shape { thickness } else { 1.0 };
+            DVec3::new(u(), u(), -depth * (u() + 0.5) / 2.0)
+        }
+    }
+}
+
+/// A uniform direction: a point of the unit ball, by rejection, put onto its sphere.
+pub fn direction(u: Source) -> DVec3 {
+    loop {
+        let cube = DVec3::new(u(), u(), u()) * 2.0 - 1.0;
+        let length2 = cube.length_squared();
+        if length2 > 1e-3 && length2 <= 1.0 {
+            return cube.normalize();
+        }
+    }
+}
+
+/// A uniform direction with `dir . normal < 0`.
+pub fn inward(normal: DVec3, u: Source) -> DVec3 {
+    loop {
+        let dir = direction(u);
+        if dir.dot(normal) < 0.0 {
+            return dir;
+        }
+    }
+}
+
+/// 10^-x without a transcendental: a power of ten, linear between.
+fn decades(x: f64) -> f64 {
+    let whole = x.floor();
+    0.1f64.powi(whole as i32) * (1.0 - 0.9 * (x - whole))
+}
+
+fn pick(n: usize, u: Source) -> usize {
+    (u() * n as f64) as usize
+}
+
+fn must_leave(shape: &Shape, ray: &Ray) -> bool {
+    match shape {
+        Shape::HalfSpace => ray.dir.z > 0.0,
+        Shape::Slab { .. } => ray.dir.z != 0.0,
+        _ => true,
+    }
+}
+
+/// Rounding may move the hit along a surface seen edge on, so the ray is allowed 1e-9 of the size.
+fn is_wrong(ray: &Ray, hit: &Hit, t_max: f64, size: f64) -> bool {
+    let off = hit.point.distance(ray.at(hit.t)) > 1e-9 * size;
+    !(hit.t > 0.0 && hit.t <= t_max) || off || ray.dir.dot(hit.normal) < -1e-9
+}
+
+/// A point outside: its ray enters the body before it leaves it. A ray that touches an edge does
+/// both at one distance, hence the slack.
+fn enters_first(shape: &Shape, ray: &Ray, size: f64) -> bool {
+    let distance =
+        |side| shape.intersect(ray, side, None, f64::INFINITY).map_or(f64::INFINITY, |hit| hit.t);
+    distance(Side::Outside) < distance(Side::Inside) - 1e-9 * size
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Uniform, bodies};
+    use super::*;
+
+    const RAYS: u64 = 150_000;
+    const SEGMENTS: u64 = 1_000_000;
+
+    #[test]
+    fn no_ray_from_inside_is_lost() {
+        for (name, shape) in bodies() {
+            let mut u = Uniform::new(1);
+            let audit = audit_aim(&shape, RAYS, &mut || u.next());
+            assert_eq!(audit, AimAudit { rays: RAYS, lost: 0 }, "{name}");
+        }
+    }
+
+    #[test]
+    fn no_walk_escapes() {
+        let analytic = [
+            ("half-space", Shape::HalfSpace),
+            ("slab", Shape::Slab { thickness: 0.1 }),
+            ("box", Shape::Box { half: DVec3::new(1.0, 2.0, 0.1) }),
+            ("sphere", Shape::Sphere { radius: 2.5 }),
+        ];
+        for (name, shape) in bodies().into_iter().chain(analytic) {
+            let mut u = Uniform::new(2);
+            let audit = audit_walk(&shape, SEGMENTS, &mut || u.next());
+            assert_eq!((audit.lost, audit.escaped, audit.wrong), (0, 0, 0), "{name} {audit:?}");
+            assert!(audit.hits > SEGMENTS / 8, "{name} {audit:?}");
+        }
+    }
+}

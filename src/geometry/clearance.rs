@@ -1,0 +1,179 @@
+//! How far a point surely is from the surface: rules out short flights without the tree.
+//!
+//! A uniform grid of cubic cells over the mesh's box. A cell is occupied if a triangle may touch it.
+//! Cells at an offset (i, j, k) are apart by at least `size sqrt(f(i)^2 + f(j)^2 + f(k)^2)` with
+//! `f(i) = max(|i| - 1, 0)`; the least such distance to an occupied cell bounds the distance to the
+//! surface from every point of the cell. Since f(i) is the least |i + e| with e in {-1, 0, 1}, it
+//! is the plain distance transform of the occupied set grown by one cell each way, and both steps
+//! go axis by axis (Saito, Toriwaki, "New algorithms for Euclidean distance transformation of an
+//! n-dimensional digitized picture", Pattern Recognition 27(11), 1994).
+
+use super::tree::{Frame, PAD};
+use crate::math::DVec3;
+
+/// Edge of a cell, units of the frame: 64 cells along the longest side.
+const CELL: f64 = 32.0;
+
+/// Squared distance, in cells, of what has no occupied cell in sight.
+const FAR: u32 = u32::MAX / 2;
+
+/// The grid.
+#[derive(Clone, Debug)]
+pub struct Clearance {
+    /// Least corner, units of the frame.
+    corner: DVec3,
+    cells: [usize; 3],
+    /// Lower bound of the distance to the surface, units of the frame, x fastest.
+    bounds: Vec<f32>,
+}
+
+impl Clearance {
+    /// The grid of a mesh with the box (`min`, `max`), mm, around its triangles.
+    pub fn new<'a>(
+        frame: &Frame,
+        (min, max): (DVec3, DVec3),
+        triangles: impl Iterator<Item = &'a [DVec3; 3]>,
+    ) -> Clearance {
+        let corner = frame.place(min) - PAD;
+        let size = frame.place(max) + PAD - corner;
+        let cells = size.to_array().map(|side| (side / CELL) as usize + 1);
+        let mut grid = Clearance { corner, cells, bounds: Vec::new() };
+        let mut distance2 = vec![FAR; cells.iter().product()];
+        for triangle in triangles {
+            grid.occupy(&triangle.map(|vertex| frame.place(vertex)), &mut distance2);
+        }
+        for axis in 0..3 {
+            grid.along(axis, &mut distance2, grow);
+        }
+        for axis in 0..3 {
+            grid.along(axis, &mut distance2, transform);
+        }
+        // The padding pays for the rounding of points at cell borders and of f32.
+        let bound = |&d2: &u32| (f64::from(d2).sqrt() * CELL - PAD).max(0.0) as f32;
+        grid.bounds = distance2.iter().map(bound).collect();
+        grid
+    }
+
+    /// A lower bound of the distance to the surface, units of the frame; 0 outside the grid.
+    pub fn at(&self, point: DVec3) -> f64 {
+        let cell = (point - self.corner) * (1.0 / CELL);
+        // A negative number, or NaN, fails the test here and not as a cast to 0.
+        if !(cell.min_element() >= 0.0) {
+            return 0.0;
+        }
+        let [i, j, k] = cell.to_array().map(|c| c as usize);
+        let [nx, ny, nz] = self.cells;
+        if i < nx && j < ny && k < nz { self.bounds[i + nx * (j + ny * k)].into() } else { 0.0 }
+    }
+
+    /// Memory behind the grid, bytes.
+    pub fn heap_bytes(&self) -> usize {
+        size_of_val(&*self.bounds)
+    }
+
+    /// Sets the cells that the triangle, units of the frame, may touch to 0: those in its box that
+    /// its plane passes.
+    fn occupy(&self, triangle: &[DVec3; 3], distance2: &mut [u32]) {
+        let [a, b, c] = *triangle;
+        let cell = |point: DVec3| ((point - self.corner) / CELL).to_array().map(|x| x as usize);
+        let (low, high) = (cell(a.min(b).min(c) - PAD), cell(a.max(b).max(c) + PAD));
+        let normal = super::triangle::normal(triangle);
+        let reach = (0.5 * CELL + PAD) * normal.abs().element_sum();
+        let [nx, ny, nz] = self.cells;
+        for k in low[2]..=high[2].min(nz - 1) {
+            for j in low[1]..=high[1].min(ny - 1) {
+                for i in low[0]..=high[0].min(nx - 1) {
+                    let index = DVec3::new(i as f64, j as f64, k as f64);
+                    let middle = self.corner + (index + 0.5) * CELL;
+                    if normal.dot(middle - a).abs() <= reach {
+                        distance2[i + nx * (j + ny * k)] = 0;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Applies `step` to every line of cells along an axis.
+    fn along(&self, axis: usize, field: &mut [u32], step: fn(&[u32], usize) -> u32) {
+        let n = self.cells[axis];
+        let stride: usize = self.cells[..axis].iter().product();
+        let mut line = vec![0; n];
+        for start in (0..field.len()).filter(|i| (i / stride) % n == 0) {
+            for (i, value) in line.iter_mut().enumerate() {
+                *value = field[start + i * stride];
+            }
+            for i in 0..n {
+                field[start + i * stride] = step(&line, i);
+            }
+        }
+    }
+}
+
+/// The least of a cell and its two neighbours.
+fn grow(line: &[u32], i: usize) -> u32 {
+    line[i.saturating_sub(1)..(i + 2).min(line.len())].iter().copied().fold(FAR, u32::min)
+}
+
+/// The least of value plus squared distance.
+fn transform(line: &[u32], i: usize) -> u32 {
+    let far = |j: usize| (i.abs_diff(j) * i.abs_diff(j)) as u32;
+    line.iter().enumerate().map(|(j, &value)| value.saturating_add(far(j))).fold(FAR, u32::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Shape;
+    use super::super::testing::{Uniform, bodies, direction};
+    use super::super::{Ray, Side};
+    use crate::math::DVec3;
+
+    const RAYS: usize = 20_000;
+
+    #[test]
+    fn bound_is_never_above_the_distance_to_what_any_ray_meets() {
+        let mut u = Uniform::new(1);
+        for (name, shape) in bodies() {
+            let Shape::Mesh(mesh) = &shape else { unreachable!("bodies are meshes") };
+            let sphere = mesh.bounds();
+            let mut used = 0;
+            for _ in 0..RAYS {
+                let cube = DVec3::new(u.next(), u.next(), u.next()) * 2.0 - 1.0;
+                let origin = sphere.center + cube * sphere.radius;
+                let bound = mesh.clearance(origin);
+                used += usize::from(bound > 0.0);
+                let ray = Ray { origin, dir: direction(&mut u) };
+                for side in [Side::Inside, Side::Outside] {
+                    if let Some(hit) = mesh.search(&ray, side, None, f64::INFINITY) {
+                        assert!(hit.t > bound, "{name}: {} <= {bound} at {origin}", hit.t);
+                    }
+                }
+                // The nearest vertex is a sharper test than a ray.
+                let nearest = |near: f64, v: &DVec3| near.min(v.distance(origin));
+                if used % 50 == 1 {
+                    let near = mesh.vertices().iter().fold(f64::INFINITY, nearest);
+                    assert!(near > bound, "{name}: {near} <= {bound} at {origin}");
+                }
+            }
+            assert!(used > RAYS / 50, "{name}: the bound is positive at {used} points only");
+        }
+    }
+
+    #[test]
+    fn short_flights_end_as_they_do_without_the_grid() {
+        let mut u = Uniform::new(2);
+        for (name, shape) in bodies() {
+            let Shape::Mesh(mesh) = &shape else { unreachable!("bodies are meshes") };
+            let sphere = mesh.bounds();
+            for _ in 0..RAYS {
+                let origin = sphere.center + direction(&mut u) * (u.next() * sphere.radius);
+                let ray = Ray { origin, dir: direction(&mut u) };
+                let t_max = u.next().powi(4) * sphere.radius;
+                let (with, without) = (
+                    mesh.intersect(&ray, Side::Inside, None, t_max),
+                    mesh.search(&ray, Side::Inside, None, t_max),
+                );
+                assert_eq!(with, without, "{name}");
+            }
+        }
+    }
+}

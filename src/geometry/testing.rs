@@ -1,0 +1,58 @@
+//! What the tests of geometry share: a small uniform source, directions, and test bodies.
+
+use super::{Mesh, Shape, procedural};
+use crate::math::DVec3;
+
+/// SplitMix64 (Steele, Lea, Flood 2014): the tests' own source of uniform numbers in [0, 1).
+pub struct Uniform(u64);
+
+impl Uniform {
+    pub fn new(seed: u64) -> Uniform {
+        Uniform(seed)
+    }
+
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 * f64::EPSILON * 0.5
+    }
+}
+
+/// A uniform direction, by rejection from the ball.
+pub fn direction(u: &mut Uniform) -> DVec3 {
+    super::audit::direction(&mut || u.next())
+}
+
+/// A uniform direction with `dir . normal < 0`.
+pub fn inward(normal: DVec3, u: &mut Uniform) -> DVec3 {
+    super::audit::inward(normal, &mut || u.next())
+}
+
+/// The bodies of the watertightness tests, by name.
+pub fn bodies() -> Vec<(&'static str, Shape)> {
+    let bodies = [
+        ("icosphere", procedural::icosphere(1.0, 4, false)),
+        ("bumpy sphere", procedural::bumpy_sphere(3.0, 5, 0.2, 9.0, true)),
+        ("torus", procedural::torus(2.0, 0.7, [48, 24], true)),
+        ("cavity sphere", procedural::cavity_sphere(5.0, 2.0, 3, false)),
+        ("drilled box", procedural::drilled_box(DVec3::new(3.0, 2.0, 0.5), [3, 2], 0.4)),
+        ("creature", Ok(creature())),
+    ];
+    bodies.map(|(name, mesh)| (name, Shape::Mesh(mesh.expect(name)))).into()
+}
+
+/// An irregular body like a scanned animal: a sphere pulled into lobes, its vertices shaken, far
+/// from the origin, with triangles of very different sizes.
+pub fn creature() -> Mesh {
+    let ball = procedural::icosphere(1.0, 4, false).expect("sphere");
+    let mut u = Uniform::new(99);
+    let lobes: Vec<DVec3> = (0..5).map(|_| direction(&mut u)).collect();
+    let pulled = ball.vertices().iter().map(|&n| {
+        let reach: f64 = lobes.iter().map(|&lobe| n.dot(lobe).max(0.0).powi(8)).sum();
+        let shaken = n + (DVec3::new(u.next(), u.next(), u.next()) - 0.5) * 0.02;
+        shaken * (1.0 + 1.5 * reach) + DVec3::new(100.0, -30.0, 7.0)
+    });
+    Mesh::new(pulled.collect(), ball.triangles().to_vec(), None, true).expect("closed")
+}

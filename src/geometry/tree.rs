@@ -1,0 +1,152 @@
+//! The border between f32 culling and f64 intersection. Door for `obvhs`.
+//!
+//! The tree only rules triangles out; every number a result sees is computed in f64 by the caller.
+//! What culls is conservative, so results do not depend on the tree.
+//!
+//! # Frame
+//!
+//! The tree lives in units where the mesh's box is centred and its longest side is in [1024, 2048).
+//! The scale is a power of two: scaling a scene by 2^k gives the same tree and the same bits.
+//!
+//! # Behind the origin
+//!
+//! obvhs 0.4.0 rejects boxes that a ray leaves before t = 1e-4. The f32 ray starts [`BEHIND`] = 2^-6
+//! before the true one, and `tau = scale t - skip` counts from there, so a hit has `tau >= 2^-6`.
+//! A ray from afar skips to the bounding sphere, so all f32 coordinates stay below 2^11.
+//!
+//! # Padding
+//!
+//! The node test computes the time of the plane `p + q e` as `q (e inv) + (p - o) inv`. Let u = 2^-24
+//! be f32's rounding. Per axis, in units of length (a time error times the direction's component):
+//!
+//! | source | error | bound |
+//! |---|---|---|
+//! | rounding of the origin | u abs(o) | 1.1e-4 |
+//! | direction, inverse, two products, sum | 5 u (q e + abs(p - o)), q e <= 2100, abs(p - o) <= 2810 | 1.5e-3 |
+//! | node corner and 8-bit steps from rounded differences | 2 u 2048 | 2.5e-4 |
+//! | step exponent from a rounded log2, box cut at 255 steps | 2048 3e-7 | 6e-4 |
+//! | `safe_inverse` takes components below 2^-23 as 2^-23 | 2^-22 tau, tau <= 3600 | 8.6e-4 |
+//!
+//! Their sum, 3.4e-3, is less than half of [`PAD`] = 2^-7. A box padded by that much is entered, in
+//! f32, no later than the ray truly meets the triangle in it; and the bound on tau that the tree
+//! holds against it is rounded up.
+
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::build_cwbvh;
+use obvhs::ray::{Ray as CullRay, RayHit};
+
+use super::Ray;
+use crate::math::{DVec3, Vec3};
+
+/// Start of the f32 ray before the true origin, units of the frame.
+const BEHIND: f64 = 0.015625;
+
+/// Growth of every box on every side, units of the frame.
+pub const PAD: f64 = 0.0078125;
+
+/// The normalised units.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    center: DVec3,
+    /// Units per mm, a power of two.
+    pub scale: f64,
+    /// Radius of a sphere about the centre that holds the mesh, units.
+    radius: f64,
+}
+
+impl Frame {
+    /// The frame of an axis-aligned box, mm. Its longest side must be a normal number.
+    pub fn new(min: DVec3, max: DVec3) -> Frame {
+        let size = max - min;
+        let exponent = (size.max_element().to_bits() >> 52) as i64 - 1023;
+        let scale = f64::from_bits(((1023 + 10 - exponent) as u64) << 52);
+        Frame { center: (min + max) * 0.5, scale, radius: (size * (0.5 * scale)).length() }
+    }
+
+    /// A point in units of the frame.
+    pub fn place(&self, point: DVec3) -> DVec3 {
+        (point - self.center) * self.scale
+    }
+
+    /// The f32 ray and its skip; none if it passes beside the mesh or stops before it.
+    fn cull_ray(&self, ray: &Ray, t_max: f64) -> Option<(CullRay, f64)> {
+        let origin = self.place(ray.origin);
+        let skip = self.distance(origin, ray.dir)? - BEHIND;
+        let tau_max = round_up(self.scale * t_max - skip);
+        if tau_max < 0.0 {
+            return None;
+        }
+        let start = (origin + ray.dir * skip).as_vec3();
+        // Adding 0 turns -0 into +0: obvhs swaps the planes of an axis by `dir < 0` but takes the
+        // sign of the inverse from the sign bit, and would cull everything.
+        let dir = ray.dir.as_vec3() + Vec3::ZERO;
+        Some((CullRay::new(start.into(), dir.into(), 0.0, tau_max), skip))
+    }
+
+    /// Distance to the bounding sphere, 0 inside; none if it is missed or lies behind. The sphere
+    /// is grown by the padding and by the rounding of coordinates of the origin's size.
+    fn distance(&self, origin: DVec3, dir: DVec3) -> Option<f64> {
+        let away2 = origin.length_squared();
+        if away2 <= self.radius * self.radius {
+            return Some(0.0);
+        }
+        let radius = self.radius + PAD + 8.0 * f64::EPSILON * away2.sqrt();
+        let b = origin.dot(dir);
+        let miss = (origin - dir * b).length();
+        let half_chord2 = (radius - miss) * (radius + miss);
+        let half_chord = if half_chord2 >= 0.0 { half_chord2.sqrt() } else { return None };
+        (half_chord >= b).then(|| (-b - half_chord).max(0.0))
+    }
+}
+
+/// An f32 above the number.
+fn round_up(x: f64) -> f32 {
+    (x as f32).next_up()
+}
+
+/// The tree over the boxes of a mesh's triangles.
+#[derive(Clone, Debug)]
+pub struct Tree {
+    /// The units that the tree lives in.
+    pub frame: Frame,
+    bvh: CwBvh,
+}
+
+impl Tree {
+    /// Builds the tree over boxes (least and greatest corner, mm).
+    pub fn new(frame: Frame, boxes: impl Iterator<Item = (DVec3, DVec3)>) -> Tree {
+        let corner = |point: DVec3, pad: f64| (frame.place(point) + pad).as_vec3().into();
+        let boxes: Vec<Aabb> =
+            boxes.map(|(min, max)| Aabb::new(corner(min, -PAD), corner(max, PAD))).collect();
+        let bvh = build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Default::default());
+        Tree { frame, bvh }
+    }
+
+    /// Slot -> box: the order in which a visit finds neighbours close in memory.
+    pub fn order(&self) -> &[u32] {
+        &self.bvh.primitive_indices
+    }
+
+    /// Calls `visit` for every slot whose box the ray may meet within `t_max`, nearer nodes first.
+    /// It returns the `t` beyond which nothing is of interest any more.
+    pub fn closest(&self, ray: &Ray, t_max: f64, mut visit: impl FnMut(usize) -> f64) {
+        let Some((cull_ray, skip)) = self.frame.cull_ray(ray, t_max) else { return };
+        self.bvh.ray_traverse(cull_ray, &mut RayHit::none(), |_, slot| {
+            round_up(self.frame.scale * visit(slot) - skip)
+        });
+    }
+
+    /// Whether `visit` says yes to any slot whose box the ray may meet; it is not asked again.
+    pub fn any(&self, ray: &Ray, mut visit: impl FnMut(usize) -> bool) -> bool {
+        let Some((cull_ray, _)) = self.frame.cull_ray(ray, f64::INFINITY) else { return false };
+        // Not `ray_traverse_anyhit`, which visits all boxes on the ray.
+        !self.bvh.ray_traverse_miss(cull_ray, |_, slot| if visit(slot) { 0.0 } else { f32::INFINITY })
+    }
+
+    /// Memory behind the tree, bytes.
+    pub fn heap_bytes(&self) -> usize {
+        size_of_val(&*self.bvh.nodes) + size_of_val(&*self.bvh.primitive_indices)
+    }
+}

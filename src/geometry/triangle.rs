@@ -1,0 +1,151 @@
+//! The watertight ray-triangle test, in f64.
+//!
+//! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. The ray is made
+//! the z axis by a shear, so that the test is whether the origin of the plane lies in the projected
+//! triangle. Why no ray slips through between two triangles:
+//! - a vertex is projected by the same operations for each of its triangles, so they agree on it to
+//!   the bit: the projected surface is closed as the surface is;
+//! - rounding is monotone, so `fl(px qy) - fl(py qx)` has the exact sign or is zero; a zero is
+//!   computed again from the products' exact remainders, so the sign is exact throughout;
+//! - a zero (the ray meets the very edge) counts as a hit on both sides of the edge.
+//!
+//! So for the projected surface the test is exact and closed, and the triangles whose signs agree
+//! with the wanted orientation cover whatever the ray leaves through.
+
+use super::{Ray, Side};
+use crate::math::DVec3;
+
+/// A ray prepared for many triangles.
+pub struct Sheared {
+    origin: DVec3,
+    /// The axes that become x, y, z: z is the ray's dominant one; x and y are swapped where the ray
+    /// runs against it, so that orientation is kept.
+    axes: [usize; 3],
+    shear: [f64; 2],
+    /// `t` per unit of z.
+    t_per_z: f64,
+    /// +1 to see the triangles that are left (`dir . normal > 0`), -1 those that are entered.
+    orientation: f64,
+}
+
+/// Where a ray meets a triangle.
+#[derive(Clone, Copy)]
+pub struct Crossing {
+    /// Distance, mm.
+    pub t: f64,
+    /// Barycentric coordinates, of sum 1.
+    pub weights: [f64; 3],
+}
+
+impl Sheared {
+    /// Prepares a ray that travels on `side`.
+    pub fn new(ray: &Ray, side: Side) -> Sheared {
+        let size = ray.dir.abs();
+        let z = match () {
+            _ if size.x >= size.y && size.x >= size.z => 0,
+            _ if size.y >= size.z => 1,
+            _ => 2,
+        };
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let axes = if ray.dir[z] < 0.0 { [y, x, z] } else { [x, y, z] };
+        let t_per_z = 1.0 / ray.dir[z];
+        let shear = [ray.dir[axes[0]] * t_per_z, ray.dir[axes[1]] * t_per_z];
+        let orientation = if side == Side::Inside { 1.0 } else { -1.0 };
+        Sheared { origin: ray.origin, axes, shear, t_per_z, orientation }
+    }
+
+    /// The crossing with t > 0, if the orientation is the wanted one.
+    #[inline]
+    pub fn meet(&self, triangle: &[DVec3; 3]) -> Option<Crossing> {
+        let [a, b, c] = triangle.map(|vertex| self.project(vertex));
+        let u = edge(b, c) * self.orientation;
+        let v = edge(c, a) * self.orientation;
+        let w = edge(a, b) * self.orientation;
+        if u < 0.0 || v < 0.0 || w < 0.0 {
+            return None;
+        }
+        let sum = u + v + w;
+        if sum <= 0.0 {
+            return None; // seen exactly edge on
+        }
+        let weights = [u / sum, v / sum, w / sum];
+        let t = (weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) * self.t_per_z;
+        (t > 0.0).then_some(Crossing { t, weights })
+    }
+
+    #[inline]
+    fn project(&self, vertex: DVec3) -> [f64; 3] {
+        let [x, y, z] = self.axes;
+        let v = vertex - self.origin;
+        [v[x] - self.shear[0] * v[z], v[y] - self.shear[1] * v[z], v[z]]
+    }
+}
+
+/// Twice the signed area of (0, p, q) in the plane: exact in sign, and `edge(q, p) == -edge(p, q)`
+/// to the bit.
+#[inline]
+fn edge(p: [f64; 3], q: [f64; 3]) -> f64 {
+    let (first, second) = (p[0] * q[1], p[1] * q[0]);
+    match first - second {
+        0.0 => edge_remainder(p, q, first, second),
+        area => area,
+    }
+}
+
+/// The difference of two products that round to the same number, from their exact remainders.
+#[cold]
+fn edge_remainder(p: [f64; 3], q: [f64; 3], first: f64, second: f64) -> f64 {
+    p[0].mul_add(q[1], -first) - p[1].mul_add(q[0], -second)
+}
+
+/// The unit normal of a triangle whose corners turn counter-clockwise seen from its tip.
+pub fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Uniform, direction};
+    use super::*;
+
+    #[test]
+    fn edge_is_antisymmetric_and_exact_in_sign() {
+        let mut u = Uniform::new(1);
+        for _ in 0..100_000 {
+            let p = [u.next() - 0.5, u.next() - 0.5, 0.0];
+            // q on the line through 0 and p up to one rounding: the products agree to a last digit.
+            let s = u.next() + 0.5;
+            let q = [p[0] * s, p[1] * s, 0.0];
+            assert_eq!(edge(p, q).to_bits(), (-edge(q, p)).to_bits());
+            // p times a power of two lies exactly on the line.
+            assert_eq!(edge(p, [p[0] * 0.25, p[1] * 0.25, 0.0]), 0.0);
+            let above = [p[0] * 0.25, (p[1] * 0.25).next_up(), 0.0];
+            assert_eq!(edge(p, above) > 0.0, p[0] > 0.0);
+        }
+    }
+
+    #[test]
+    fn orientation_is_that_of_the_normal() {
+        let mut u = Uniform::new(2);
+        for _ in 0..100_000 {
+            let triangle = [(); 3].map(|()| direction(&mut u));
+            let [a, b, c] = triangle;
+            let target = a * 0.2 + b * 0.3 + c * 0.5;
+            let origin = direction(&mut u) * 3.0;
+            let to = target - origin;
+            let ray = Ray { origin, dir: to.normalize() };
+            let cosine = ray.dir.dot(normal(&triangle));
+            if cosine.abs() < 1e-6 {
+                continue;
+            }
+            let side = if cosine > 0.0 { Side::Inside } else { Side::Outside };
+            let other = if cosine > 0.0 { Side::Outside } else { Side::Inside };
+            let crossing = Sheared::new(&ray, side).meet(&triangle).expect("aimed at it");
+            assert!((crossing.t - to.length()).abs() < 1e-8, "{} {}", crossing.t, to.length());
+            assert!(Sheared::new(&ray, other).meet(&triangle).is_none());
+            let away = Ray { origin, dir: -ray.dir };
+            assert!(Sheared::new(&away, side).meet(&triangle).is_none());
+            assert!(Sheared::new(&away, other).meet(&triangle).is_none());
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! OpenEXR files: a run's image with its error in every band, and images made elsewhere.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
+    LayerAttributes, ReadChannels, ReadLayers, SmallVec, Text, WritableImage,
+};
+
+use super::atomic;
+use super::image::Picture;
+use crate::error::{Error, Result};
+
+/// Planes of f32 by channel name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExrImage {
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows, from the top.
+    pub height: usize,
+    /// Row by row. Channels of the first part have their own names, those of later parts
+    /// `part.channel`.
+    pub channels: BTreeMap<String, Vec<f32>>,
+}
+
+/// Writes a picture: a first part `rgb` that any viewer shows (channels R, G, B), then a part for each
+/// band with channels `mean` and `std_error`. Values are rounded to f32; the record has them whole.
+/// Every part carries `attributes` as lines of its standard attribute `comments`.
+pub fn write_exr(path: &Path, picture: &Picture, attributes: &[(&str, &str)]) -> Result<()> {
+    let rgb = |c: usize| picture.rgb().map(|rgb| rgb[c] as f32).collect();
+    let mut layers =
+        vec![layer(picture, "rgb", [("R", rgb(0)), ("G", rgb(1)), ("B", rgb(2))], attributes)];
+    for (b, band) in picture.bands.iter().enumerate() {
+        let mean = picture.mean(b).map(|x| x as f32).collect();
+        let std_error = picture.std_error(b).map(|x| x as f32).collect();
+        layers.push(layer(picture, &band.name, [("mean", mean), ("std_error", std_error)], attributes));
+    }
+    let window = IntegerBounds::from_dimensions((picture.width, picture.height));
+    let image = Image::from_layers(ImageAttributes::new(window), layers);
+    let mut bytes = Cursor::new(Vec::new());
+    let encoded = image.write().non_parallel().to_buffered(&mut bytes);
+    encoded.map_err(|e| Error::record(path, format!("could not encode the image: {e}")))?;
+    atomic::write(path, &bytes.into_inner(), "write the image")
+}
+
+fn layer<const N: usize>(
+    picture: &Picture,
+    name: &str,
+    channels: [(&str, Vec<f32>); N],
+    attributes: &[(&str, &str)],
+) -> Layer<AnyChannels<FlatSamples>> {
+    let channels =
+        channels.into_iter().map(|(name, data)| AnyChannel::new(name, FlatSamples::F32(data)));
+    let mut about = LayerAttributes::named(name);
+    // One standard attribute: the crate writes custom ones in a hash map's order, which is random.
+    let lines: String = attributes.iter().map(|(key, value)| format!("{key}: {value}\n")).collect();
+    about.comments = Some(Text::from(&*lines));
+    let channels = AnyChannels::sort(channels.collect::<SmallVec<_>>());
+    Layer::new((picture.width, picture.height), about, Encoding::SMALL_LOSSLESS, channels)
+}
+
+/// Reads every channel of an image as f32: half, float or integer, one part or several of one size.
+pub fn read_exr(path: &Path) -> Result<ExrImage> {
+    let refuse = |what: String| Error::record(path, format!("not a usable OpenEXR image: {what}"));
+    let bytes = fs::read(path).map_err(Error::io(path, "read the image"))?;
+    let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels();
+    let image = reader.all_layers().all_attributes().non_parallel().from_buffered(Cursor::new(bytes));
+    let layers = image.map_err(|e| refuse(e.to_string()))?.layer_data;
+    let size = layers.first().map(|layer| layer.size).ok_or_else(|| refuse("it has no parts".into()))?;
+    let mut channels = BTreeMap::new();
+    for (index, layer) in layers.iter().enumerate() {
+        let part = layer.attributes.layer_name.as_ref().map_or(index.to_string(), ToString::to_string);
+        if layer.size != size {
+            return Err(refuse(format!("part `{part}` has another size than the first")));
+        }
+        for channel in &layer.channel_data.list {
+            let name =
+                if index == 0 { channel.name.to_string() } else { format!("{part}.{}", channel.name) };
+            if channel.sampling.x() != 1 || channel.sampling.y() != 1 {
+                return Err(refuse(format!("channel `{name}` is subsampled")));
+            }
+            channels.insert(name, channel.sample_data.values_as_f32().collect());
+        }
+    }
+    Ok(ExrImage { width: size.x(), height: size.y(), channels })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample;
+    use super::*;
+
+    #[test]
+    fn reads_back_what_was_written_and_is_deterministic() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let stored = sample::stored(0.5);
+        let picture = Picture::of(&stored, &stored.record.cells[0].runs[0]).expect("a picture");
+        let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
+        let attributes = [("experiment", "sample"), ("cell", "smooth"), ("estimator", "mis")];
+        write_exr(&a, &picture, &attributes).expect("a write");
+        write_exr(&b, &picture, &attributes).expect("a write");
+        assert!(fs::read(&a).expect("bytes") == fs::read(&b).expect("bytes"));
+        let image = read_exr(&a).expect("an image");
+        assert_eq!((image.width, image.height), (3, 2));
+        let names: Vec<_> = image.channels.keys().map(String::as_str).collect();
+        assert_eq!(names, ["B", "G", "G.mean", "G.std_error", "R", "R.mean", "R.std_error"]);
+        let mean: Vec<f32> = picture.mean(1).map(|x| x as f32).collect();
+        assert_eq!(image.channels["G.mean"], mean);
+        assert_eq!(image.channels["G"], mean);
+        let meta = exr::meta::MetaData::read_from_file(&a, true).expect("meta data");
+        let comments = meta.headers[2].own_attributes.comments.as_ref().map(ToString::to_string);
+        assert_eq!(comments.as_deref(), Some("experiment: sample\ncell: smooth\nestimator: mis\n"));
+    }
+
+    #[test]
+    fn errors_name_the_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("sky.exr");
+        let message = |path: &Path| read_exr(path).expect_err("a refusal").to_string();
+        assert!(
+            message(&path).contains("could not read the image") && message(&path).contains("sky.exr")
+        );
+        fs::write(&path, b"no image").expect("a write");
+        assert!(message(&path).contains("sky.exr: not a usable OpenEXR image"), "{}", message(&path));
+    }
+}

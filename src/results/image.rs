@@ -1,0 +1,158 @@
+//! A run's image, and the PNG that shows it.
+
+use std::path::Path;
+
+use super::record::{Band, EstimatorRun};
+use super::store::Stored;
+use super::{atomic, npy::Array};
+use crate::error::{Error, Result};
+use crate::math;
+
+/// The pixels of one run: mean and standard error in every band.
+#[derive(Clone, Copy, Debug)]
+pub struct Picture<'a> {
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows, from the top.
+    pub height: usize,
+    /// The bands, in the order of the array's last axis.
+    pub bands: &'a [Band],
+    pixels: &'a [f64],
+}
+
+impl<'a> Picture<'a> {
+    /// A run's image, where it has one.
+    pub fn of(stored: &'a Stored, run: &EstimatorRun) -> Option<Picture<'a>> {
+        let pixels = stored.arrays.get(&run.image.as_ref()?.pixels)?;
+        Some(Picture::new(&stored.record.bands, pixels))
+    }
+
+    /// From an array `[2][row][column][band]`; panics on other shapes.
+    pub fn new(bands: &'a [Band], array: &'a Array) -> Picture<'a> {
+        let [2, height, width, n] = array.shape[..] else { panic!("shape {:?}", array.shape) };
+        assert_eq!(n, bands.len(), "one plane a band");
+        Picture { width, height, bands, pixels: &array.data }
+    }
+
+    /// Mean over passes of a band, row by row.
+    pub fn mean(&self, band: usize) -> impl Iterator<Item = f64> {
+        self.half(0).iter().skip(band).step_by(self.bands.len()).copied()
+    }
+
+    /// Standard error of the mean of a band, row by row.
+    pub fn std_error(&self, band: usize) -> impl Iterator<Item = f64> {
+        self.half(1).iter().skip(band).step_by(self.bands.len()).copied()
+    }
+
+    /// Linear sRGB of every pixel: the sum over bands of radiance times display colour.
+    pub fn rgb(&self) -> impl Iterator<Item = [f64; 3]> {
+        self.half(0).chunks(self.bands.len().max(1)).map(|pixel| {
+            let mut rgb = [0.0; 3];
+            for (radiance, band) in pixel.iter().zip(self.bands) {
+                (0..3).for_each(|c| rgb[c] += radiance * band.display_rgb[c]);
+            }
+            rgb
+        })
+    }
+
+    fn half(&self, index: usize) -> &'a [f64] {
+        let length = self.pixels.len() / 2;
+        &self.pixels[index * length..(index + 1) * length]
+    }
+}
+
+/// A tone-mapped image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Png {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Pixels with a channel above 1 after exposure, shown as 1: brighter than the picture can say.
+    pub clipped: usize,
+    /// Pixels with a channel below 0 (outside the sRGB gamut) or not finite, shown as 0.
+    pub out_of_gamut: usize,
+}
+
+/// An 8-bit sRGB picture: radiance times 2^stops, clipped to [0, 1], sRGB transfer, nothing else.
+pub fn to_png(picture: &Picture, exposure_stops: f64) -> Result<Png> {
+    let gain = math::pow(2.0, exposure_stops);
+    let (mut clipped, mut out_of_gamut) = (0, 0);
+    let mut data = Vec::with_capacity(3 * picture.width * picture.height);
+    for rgb in picture.rgb() {
+        let exposed = rgb.map(|c| c * gain);
+        clipped += usize::from(exposed.iter().any(|c| *c > 1.0));
+        out_of_gamut += usize::from(exposed.iter().any(|c| *c < 0.0 || !c.is_finite()));
+        data.extend(exposed.map(|c| (srgb_transfer(c.clamp(0.0, 1.0)) * 255.0).round() as u8));
+    }
+    let bytes = encode(picture.width, picture.height, &data).map_err(|e| {
+        Error::input(format!("an image of {}x{} pixels: {e}", picture.width, picture.height))
+    })?;
+    Ok(Png { bytes, clipped, out_of_gamut })
+}
+
+/// Writes the PNG and says what it could not show.
+pub fn write_png(path: &Path, picture: &Picture, exposure_stops: f64) -> Result<Png> {
+    let png = to_png(picture, exposure_stops)?;
+    atomic::write(path, &png.bytes, "write the picture")?;
+    Ok(png)
+}
+
+fn encode(width: usize, height: usize, data: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(data)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// The transfer function of IEC 61966-2-1: linear in, display value out.
+fn srgb_transfer(x: f64) -> f64 {
+    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * math::pow(x, 1.0 / 2.4) - 0.055 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample;
+    use super::*;
+
+    fn decoded(bytes: &[u8]) -> Vec<u8> {
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().expect("a PNG");
+        assert!(reader.info().srgb.is_some());
+        let mut data = vec![0; reader.output_buffer_size().expect("a size")];
+        reader.next_frame(&mut data).expect("a frame");
+        data
+    }
+
+    // Linear 0.5 is 188 in sRGB, 0.2 is 124, 0.18 is 118 (IEC 61966-2-1).
+    #[test]
+    fn transfer() {
+        let byte = |x: f64| (srgb_transfer(x) * 255.0).round();
+        assert_eq!([0.0, 0.001, 0.18, 0.5, 1.0].map(byte), [0.0, 3.0, 118.0, 188.0, 255.0]);
+    }
+
+    #[test]
+    fn planes_and_colours() {
+        let stored = sample::stored(0.5);
+        let picture = Picture::of(&stored, &stored.record.cells[0].runs[0]).expect("a picture");
+        assert_eq!((picture.width, picture.height), (3, 2));
+        let expected: Vec<f64> = (0..6).map(|i| 0.1 * (2 * i + 1) as f64).collect();
+        assert_eq!(picture.mean(1).collect::<Vec<_>>(), expected);
+        assert!(picture.std_error(0).all(|e| e == 0.01));
+        assert_eq!(picture.rgb().nth(1), Some([0.2, 0.1 * 3.0, 0.0]));
+    }
+
+    #[test]
+    fn png_shows_and_counts() {
+        let mut stored = sample::stored(0.5);
+        let path = stored.record.cells[0].runs[0].image.as_ref().expect("an image").pixels.clone();
+        let pixels = stored.arrays.get_mut(&path).expect("pixels");
+        pixels.data[..4].copy_from_slice(&[0.25, 0.09, -0.1, f64::NAN]);
+        let picture = Picture::of(&stored, &stored.record.cells[0].runs[0]).expect("a picture");
+        let png = to_png(&picture, 1.0).expect("a PNG");
+        assert_eq!((png.clipped, png.out_of_gamut), (3, 1));
+        assert_eq!(decoded(&png.bytes)[..6], [188, 118, 0, 0, 0, 0]);
+    }
+}

@@ -1,0 +1,92 @@
+//! A small made-up record for tests of the evidence side.
+
+use std::collections::BTreeMap;
+
+use serde_json::json;
+
+use super::npy::Array;
+use super::record::*;
+use super::store::{Arrays, Stored, gates_path, pixels_path};
+use crate::stats::moments::Moments;
+use crate::stats::tree::{Counter, batch_level};
+
+/// Number of passes of every run.
+pub const PASSES: u64 = 256;
+
+/// Two estimators, `mis` and `snee`, two bands, one cell, observables `mean` of all classes and of
+/// `single`, and an image of 3 x 2 pixels. A score of pass i has mean 1 and standard deviation `noise`.
+pub fn stored(noise: f64) -> Stored {
+    let mut arrays = Arrays::new();
+    let runs =
+        ["mis", "snee"].iter().enumerate().map(|(e, name)| run(e, name, noise, &mut arrays)).collect();
+    let band = |name: &str, rgb| Band { name: name.into(), range_nm: None, display_rgb: rgb };
+    let cell = Cell {
+        label: "smooth".into(),
+        axes: BTreeMap::from([("boundary".into(), "smooth".into())]),
+        content_hash: "c0".into(),
+        runs,
+    };
+    let record = Record {
+        schema_version: SCHEMA_VERSION,
+        experiment: "sample".into(),
+        fingerprint: "numerical-1".into(),
+        experiment_hash: "e0".into(),
+        resolved: json!({"display": {"exposure_stops": 0.0}, "name": "sample"}),
+        claims_hash: "a0".into(),
+        claims: json!([]),
+        comparisons: vec![],
+        bands: vec![band("R", [1.0, 0.0, 0.0]), band("G", [0.0, 1.0, 0.0])],
+        cells: vec![cell],
+        checksums: BTreeMap::new(),
+    };
+    Stored { record, arrays }
+}
+
+/// Band `band` of the observable `mean` of all classes of an estimator.
+pub fn quantity(estimator: &str, band: usize) -> Quantity {
+    let observable = Observable { name: "mean".into(), class: "all".into() };
+    Quantity { cell: 0, estimator: estimator.into(), observable, band }
+}
+
+/// Replaces an estimator's gates by what `score(pass, observable, band)` says.
+pub fn set_gates(stored: &mut Stored, estimator: &str, score: impl Fn(u64, usize, usize) -> f64) {
+    stored.arrays.insert(gates_path(0, estimator), gates(PASSES, score));
+}
+
+fn gates(passes: u64, score: impl Fn(u64, usize, usize) -> f64) -> Array {
+    let mut tree = Counter::new(0, batch_level(passes));
+    let pass = |i| (0..4).map(|k| Moments::of(score(i, k / 2, k % 2))).collect::<Vec<_>>();
+    (0..passes).for_each(|i| tree.push(pass(i)));
+    let batches = tree.batches();
+    let data = batches.iter().flatten().flat_map(Moments::to_array).collect();
+    Array::new(vec![batches.len(), 2, 2, 5], data)
+}
+
+fn run(e: usize, name: &str, noise: f64, arrays: &mut Arrays) -> EstimatorRun {
+    let score = |i, o: usize, b: usize| 1.0 + noise * uniform(i + 1000 * (4 * e + 2 * o + b) as u64);
+    arrays.insert(gates_path(0, name), gates(PASSES, score));
+    let pixels = (0..24).map(|i| if i < 12 { 0.1 * i as f64 } else { 0.01 }).collect();
+    arrays.insert(pixels_path(0, name), Array::new(vec![2, 2, 3, 2], pixels));
+    let observable = |class: &str| Observable { name: "mean".into(), class: class.into() };
+    EstimatorRun {
+        estimator: name.into(),
+        kind: "path".into(),
+        bias: Bias::Unbiased,
+        notes: vec![],
+        passes: PASSES,
+        observables: vec![observable("all"), observable("single")],
+        gates: gates_path(0, name),
+        image: Some(Image { width: 3, height: 2, pixels: pixels_path(0, name) }),
+        cost: BTreeMap::from([("rays".into(), 1024)]),
+        anomalies: BTreeMap::new(),
+    }
+}
+
+/// Uniform with mean 0 and variance 1, hashed from `i` (the finaliser of splitmix64).
+pub fn uniform(i: u64) -> f64 {
+    let mut z = i.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    let u = ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64;
+    (u - 0.5) * 12f64.sqrt()
+}

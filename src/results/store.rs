@@ -1,0 +1,273 @@
+//! A record's folder, `results/<experiment>/`:
+//!
+//! ```text
+//! record/record.json              everything but the arrays (see results::record)
+//! record/record.json.b3           its hash, as b3sum writes and checks it
+//! record/cells/<NNN>/<estimator>.gates.npy, <estimator>.pixels.npy
+//! timing.json, provenance.json    beside the record, never byte-identical
+//! ```
+//! and beside those the derived views. The record appears whole or not at all.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::json::{canonical, hash_hex};
+use super::npy::Array;
+use super::record::{EstimatorRun, Quantity, Record, SCHEMA_VERSION};
+use super::{atomic, provenance::Provenance, timing::Timing};
+use crate::error::{Error, Result};
+use crate::stats::moments::Moments;
+
+/// Arrays by their path relative to the record's folder.
+pub type Arrays = BTreeMap<String, Array>;
+
+/// A record with its arrays.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stored {
+    /// The record.
+    pub record: Record,
+    /// Its arrays.
+    pub arrays: Arrays,
+}
+
+/// Where a run's gate moments stand, relative to the record's folder.
+pub fn gates_path(cell: usize, estimator: &str) -> String {
+    format!("cells/{cell:03}/{estimator}.gates.npy")
+}
+
+/// Where a run's pixels stand, relative to the record's folder.
+pub fn pixels_path(cell: usize, estimator: &str) -> String {
+    format!("cells/{cell:03}/{estimator}.pixels.npy")
+}
+
+impl Stored {
+    /// The run that measured a quantity.
+    pub fn run(&self, quantity: &Quantity) -> Option<&EstimatorRun> {
+        let cell = self.record.cells.get(quantity.cell)?;
+        cell.runs.iter().find(|run| run.estimator == quantity.estimator)
+    }
+
+    /// The moments of every batch of a quantity; nothing where the record does not hold it.
+    pub fn batches(&self, quantity: &Quantity) -> Option<Vec<Moments>> {
+        let run = self.run(quantity)?;
+        let observable = run.observables.iter().position(|o| *o == quantity.observable)?;
+        self.gate(run, observable, quantity.band)
+    }
+
+    /// The moments of every batch of one observable of a run, both by index.
+    pub fn gate(&self, run: &EstimatorRun, observable: usize, band: usize) -> Option<Vec<Moments>> {
+        let array = self.arrays.get(&run.gates)?;
+        let [batches, observables, bands, 5] = array.shape[..] else { return None };
+        if observable >= observables || band >= bands {
+            return None;
+        }
+        let rows = array.data.as_chunks::<5>().0;
+        let row = |batch| rows[(batch * observables + observable) * bands + band];
+        Some((0..batches).map(|batch| Moments::from_array(row(batch))).collect())
+    }
+
+    /// What does not fit together, as a sentence.
+    fn defect(&self) -> Option<String> {
+        let bands = self.record.bands.len();
+        for run in self.record.cells.iter().flat_map(|cell| &cell.runs) {
+            let shape = self.arrays.get(&run.gates).map(|a| &a.shape[..]);
+            if !matches!(shape, Some(&[_, o, b, 5]) if o == run.observables.len() && b == bands) {
+                return Some(format!("gates of {} have shape {shape:?}", run.estimator));
+            }
+            let Some(image) = &run.image else { continue };
+            let shape = self.arrays.get(&image.pixels).map(|a| &a.shape[..]);
+            if shape != Some(&[2, image.height, image.width, bands][..]) {
+                return Some(format!("pixels of {} have shape {shape:?}", run.estimator));
+            }
+        }
+        None
+    }
+}
+
+/// The folder of one experiment's results.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordFolder {
+    root: PathBuf,
+}
+
+impl RecordFolder {
+    /// The folder `results/<experiment>`; nothing is read or created yet.
+    pub fn new(root: impl Into<PathBuf>) -> RecordFolder {
+        RecordFolder { root: root.into() }
+    }
+
+    /// The folder itself.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// Is there a record?
+    pub fn exists(&self) -> bool {
+        self.record_dir().join("record.json").exists() || self.aside().join("record.json").exists()
+    }
+
+    /// Writes a record, with the checksums of its arrays filled in, and returns it as written. An
+    /// earlier record stays as it was until this one is complete.
+    pub fn write(&self, record: &Record, arrays: &Arrays) -> Result<Record> {
+        let stored = Stored { record: sealed(record, arrays), arrays: arrays.clone() };
+        if let Some(defect) = stored.defect() {
+            return Err(Error::record(&self.root, format!("will not write a record whose {defect}")));
+        }
+        let (path, stage) = (self.record_dir(), self.root.join(".record.new"));
+        atomic::create_folder(&self.root, "create the results folder")?;
+        atomic::recover(&path, &self.aside())?;
+        let written = write_stage(&stage, &stored)
+            .and_then(|()| atomic::swap_folder(&stage, &path, &self.aside(), "put the record in place"));
+        if written.is_err() {
+            let _ = fs::remove_dir_all(&stage);
+        }
+        written.map(|()| stored.record)
+    }
+
+    /// Reads a record and checks version, checksums and shapes.
+    pub fn read(&self) -> Result<Stored> {
+        let dir = self.record_dir();
+        atomic::recover(&dir, &self.aside())?;
+        let path = dir.join("record.json");
+        if !path.exists() {
+            return Err(Error::record(&self.root, "no record here; `scatterproof run` makes one"));
+        }
+        let record = read_record(&path)?;
+        let mut arrays = Arrays::new();
+        for (name, checksum) in &record.checksums {
+            arrays.insert(name.clone(), read_array(&dir, name, checksum)?);
+        }
+        let stored = Stored { record, arrays };
+        match stored.defect() {
+            Some(defect) => Err(Error::record(&path, format!("inconsistent: {defect}"))),
+            None => Ok(stored),
+        }
+    }
+
+    /// Writes `timing.json`.
+    pub fn write_timing(&self, timing: &Timing) -> Result<()> {
+        self.write_view("timing.json", canonical(timing).as_bytes())
+    }
+
+    /// Reads `timing.json`, where it is there.
+    pub fn read_timing(&self) -> Result<Option<Timing>> {
+        self.read_json("timing.json")
+    }
+
+    /// Writes `provenance.json`.
+    pub fn write_provenance(&self, provenance: &Provenance) -> Result<()> {
+        self.write_view("provenance.json", canonical(provenance).as_bytes())
+    }
+
+    /// Reads `provenance.json`, where it is there.
+    pub fn read_provenance(&self) -> Result<Option<Provenance>> {
+        self.read_json("provenance.json")
+    }
+
+    /// Writes a file beside the record, creating folders on its way; returns its path.
+    pub fn write_view(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        let path = self.root.join(name);
+        atomic::create_folder(path.parent().unwrap_or(&self.root), "create the results folder")?;
+        atomic::write(&path, bytes, "write results")
+    }
+
+    fn read_json<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>> {
+        let path = self.root.join(name);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let text = fs::read_to_string(&path).map_err(Error::io(&path, "read results"))?;
+        let value = serde_json::from_str(&text);
+        value.map(Some).map_err(|e| Error::record(&path, format!("{e}; remove the file or run again")))
+    }
+
+    fn record_dir(&self) -> PathBuf {
+        self.root.join("record")
+    }
+
+    /// Where an earlier record waits while a new one takes its place.
+    fn aside(&self) -> PathBuf {
+        self.root.join(".record.old")
+    }
+}
+
+/// The record with the checksums of its arrays.
+fn sealed(record: &Record, arrays: &Arrays) -> Record {
+    let checksums = arrays.iter().map(|(name, array)| (name.clone(), hash_hex(&array.to_npy())));
+    Record { checksums: checksums.collect(), ..record.clone() }
+}
+
+/// Writes all files of a record into a fresh folder.
+fn write_stage(stage: &Path, stored: &Stored) -> Result<()> {
+    if stage.exists() {
+        fs::remove_dir_all(stage).map_err(Error::io(stage, "remove an unfinished record"))?;
+    }
+    for (name, array) in &stored.arrays {
+        let path = inside(stage, name)?;
+        atomic::create_folder(path.parent().unwrap_or(stage), "create the record's folder")?;
+        atomic::write(&path, &array.to_npy(), "write the record")?;
+    }
+    atomic::create_folder(stage, "create the record's folder")?;
+    let text = readable(&stored.record, stage)?;
+    let line = format!("{}  record.json\n", hash_hex(text.as_bytes()));
+    atomic::write(&stage.join("record.json"), text.as_bytes(), "write the record")?;
+    atomic::write(&stage.join("record.json.b3"), line.as_bytes(), "write the record")
+}
+
+/// The record's canonical JSON, which reads back as the same record: JSON has no NaN or infinity.
+fn readable<T: Serialize + DeserializeOwned + PartialEq>(value: &T, path: &Path) -> Result<String> {
+    let text = canonical(value);
+    match serde_json::from_str::<T>(&text) {
+        Ok(back) if back == *value => Ok(text),
+        _ => Err(Error::record(path, "the record holds a number that is not finite")),
+    }
+}
+
+fn read_record(path: &Path) -> Result<Record> {
+    let bytes = fs::read(path).map_err(Error::io(path, "read the record"))?;
+    let value: serde_json::Value = serde_json::from_slice(&bytes)
+        .map_err(|e| Error::record(path, format!("truncated or not JSON ({e}); run it again")))?;
+    // The version first: another version's layout and hash say nothing to this program.
+    let version = value.get("schema_version").and_then(|v| v.as_u64());
+    if version != Some(u64::from(SCHEMA_VERSION)) {
+        let found = version.map_or("none".to_string(), |v| v.to_string());
+        let message =
+            format!("schema version {found}, this program reads {SCHEMA_VERSION}; run it again");
+        return Err(Error::record(path, message));
+    }
+    let sum = path.with_extension("json.b3");
+    let line = fs::read_to_string(&sum).map_err(Error::io(&sum, "read the record's checksum"))?;
+    if line.split_whitespace().next() != Some(&hash_hex(&bytes)) {
+        return Err(Error::record(path, "checksum mismatch: the file was changed after it was written"));
+    }
+    serde_json::from_value(value).map_err(|e| Error::record(path, format!("not a record: {e}")))
+}
+
+fn read_array(dir: &Path, name: &str, checksum: &str) -> Result<Array> {
+    let path = inside(dir, name)?;
+    let bytes = fs::read(&path).map_err(Error::io(&path, "read the record"))?;
+    let array = Array::from_npy(&bytes, &path)?;
+    if hash_hex(&bytes) != checksum {
+        return Err(Error::record(
+            &path,
+            "checksum mismatch: the file was changed after it was written",
+        ));
+    }
+    Ok(array)
+}
+
+/// A path below `dir`; a record cannot name a file outside its folder.
+fn inside(dir: &Path, name: &str) -> Result<PathBuf> {
+    if Path::new(name).components().all(|c| matches!(c, Component::Normal(_))) {
+        return Ok(dir.join(name));
+    }
+    Err(Error::record(dir, format!("`{name}` is not a path inside the record")))
+}
+
+#[cfg(test)]
+#[path = "store_tests.rs"]
+mod tests;

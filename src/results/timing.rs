@@ -1,0 +1,72 @@
+//! What it cost in time: measured, kept apart from the record, and never byte-identical.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// `timing.json`: by cell label, then estimator name.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Timing {
+    /// Cell label -> estimator -> cost.
+    pub cells: BTreeMap<String, BTreeMap<String, Cost>>,
+}
+
+/// Time spent on one estimator in one cell, all bands together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cost {
+    /// CPU seconds, summed over threads.
+    pub cpu_seconds: f64,
+    /// Wall-clock seconds of its blocks, summed; with several threads they overlap.
+    pub wall_seconds: f64,
+    /// Passes that took that time; fewer than the record's where a resumed run lost its timing.
+    pub passes: u64,
+    /// Paths traced.
+    pub paths: u64,
+}
+
+impl Timing {
+    /// Adds a block's cost.
+    pub fn add(&mut self, cell: &str, estimator: &str, cost: Cost) {
+        let sum = self.cells.entry(cell.into()).or_default().entry(estimator.into()).or_default();
+        sum.cpu_seconds += cost.cpu_seconds;
+        sum.wall_seconds += cost.wall_seconds;
+        sum.passes += cost.passes;
+        sum.paths += cost.paths;
+    }
+
+    /// What was measured of one estimator in one cell.
+    pub fn of(&self, cell: &str, estimator: &str) -> Option<&Cost> {
+        self.cells.get(cell)?.get(estimator)
+    }
+}
+
+impl Cost {
+    /// CPU seconds per pass; nothing where no pass was timed.
+    pub fn cpu_seconds_per_pass(&self) -> Option<f64> {
+        (self.passes > 0).then(|| self.cpu_seconds / self.passes as f64)
+    }
+
+    /// Paths per CPU second.
+    pub fn paths_per_second(&self) -> Option<f64> {
+        (self.cpu_seconds > 0.0).then(|| self.paths as f64 / self.cpu_seconds)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_add_up() {
+        let mut timing = Timing::default();
+        let block = Cost { cpu_seconds: 0.5, wall_seconds: 0.75, passes: 4, paths: 100 };
+        timing.add("a", "mis", block);
+        timing.add("a", "mis", block);
+        let cost = timing.of("a", "mis").expect("a cost");
+        assert_eq!((cost.cpu_seconds_per_pass(), cost.paths_per_second()), (Some(0.125), Some(200.0)));
+        assert!(timing.of("a", "snee").is_none());
+        assert!(Cost::default().cpu_seconds_per_pass().is_none());
+    }
+}
