@@ -1,1 +1,55 @@
-//! Stub.
+//! The one open trait and the estimators, one file each, named as the literature names them.
+//!
+//! An estimator is built for one cell and plays passes: it turns a pass's random streams into scores
+//! and knows no file, thread or statistic. The runner folds scores into moments, zeros included.
+
+mod history;
+pub mod path;
+mod scores;
+
+pub use history::{History, TransportClass};
+pub use scores::{Anomaly, Cost, Layout, ObservableName, Scores};
+
+use crate::sampling::stream::PassKey;
+
+/// Turns random numbers into scores.
+pub trait Estimator: Send + Sync {
+    /// Plays one independent realisation of every observable for these bands and adds it to the
+    /// zeroed scores.
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores);
+
+    /// Whether one call plays each band alone or all of them on shared paths.
+    fn band_use(&self) -> BandUse {
+        BandUse::EachAlone
+    }
+
+    /// What the mean of the scores is.
+    fn bias(&self) -> Bias {
+        Bias::Unbiased
+    }
+
+    /// What a reader of its results must know, as a transport that it cannot sample.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// How an estimator treats bands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BandUse {
+    /// Every band has its own passes, streams and cost.
+    EachAlone,
+    /// One pass scores all bands and has one cost.
+    Shared,
+}
+
+/// What the mean of an estimator's scores is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Bias {
+    /// The integral.
+    Unbiased,
+    /// Something that tends to the integral as passes grow.
+    Consistent,
+    /// Something else, for this reason.
+    Biased(String),
+}

@@ -1,1 +1,37 @@
-//! Stub.
+//! The immutable scene: a body in vacuum, lights, a sensor.
+
+mod latlong;
+mod light;
+mod sensor;
+
+pub use latlong::LatLong;
+pub use light::{Emission, Light, LightSample};
+pub use sensor::{FluxFace, Pinhole, Region, Screen, Sensor, SensorRay};
+
+use std::sync::Arc;
+
+use crate::geometry::Shape;
+use crate::optics::boundary::Boundary;
+use crate::optics::medium::Medium;
+
+/// A body, what shines on it, what looks at it. Optical properties stand per band.
+#[derive(Debug)]
+pub struct Scene {
+    /// Geometry of the body; cells of a sweep share it.
+    pub shape: Arc<Shape>,
+    /// Its surface, per band.
+    pub boundary: Vec<Boundary>,
+    /// The medium inside, per band.
+    pub medium: Vec<Medium>,
+    /// The lights, all shining at once.
+    pub lights: Vec<Light>,
+    /// What is measured.
+    pub sensor: Sensor,
+}
+
+impl Scene {
+    /// Number of bands.
+    pub fn bands(&self) -> usize {
+        self.medium.len()
+    }
+}

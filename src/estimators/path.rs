@@ -1,0 +1,607 @@
+//! Unidirectional path tracing with MIS between BSDF sampling and light sampling at every exit.
+//!
+//! A path starts at the sensor and runs against the light. Flights in the medium have the density
+//! sigma_t exp(-sigma_t t), so a scattering event weighs albedo; directions follow the phase function;
+//! at the boundary the interface draws reflection or refraction. Wherever the path could go straight to
+//! a light, a light is also sampled, and both samples of the same direction are weighed by the balance
+//! heuristic:
+//!   rough boundary    at every surface vertex: interface pdf against light pdf
+//!   matched boundary  at every medium vertex: phase pdf times the transmittance to the outside (the
+//!                     probability of flying there) against light pdf
+//!   smooth boundary   nothing to sample: only the interface can find the refracted direction, so light
+//!                     from a single direction is out of its reach (a note says so)
+//! One light is chosen per vertex, with probability proportional to its strength; that probability is
+//! part of the light pdf, so every pair of (lobe, light) is a MIS class of its own.
+//!
+//! Unbiased: no cut-off in depth. Roulette, at medium vertices only, divides by its own survival
+//! probability, which depends on the albedo and roughness losses alone (never on the eta^2 of radiance,
+//! which cancels on the way out).
+
+use std::sync::Arc;
+
+use super::{Anomaly, Cost, Estimator, History, Scores};
+use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Side};
+use crate::math::{DVec3, Frame};
+use crate::optics::boundary::{Boundary, Density, Event};
+use crate::optics::medium::Medium;
+use crate::sampling::balance;
+use crate::sampling::distance::{sample_exponential, transmittance};
+use crate::sampling::stream::{PassKey, Purpose, Stream};
+use crate::scene::Scene;
+
+/// When a path is ended by chance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Roulette {
+    /// At every scattering event with probability 1 - albedo: the weight never changes.
+    Analog,
+    /// Only where the path's weight has fallen below this: it survives with probability weight over
+    /// threshold and continues with the threshold as weight.
+    Below(f64),
+}
+
+/// The estimator, for one scene.
+#[derive(Debug)]
+pub struct PathTracer {
+    scene: Arc<Scene>,
+    roulette: Roulette,
+    bounds: Option<BoundingSphere>,
+    /// Per band: probability of choosing each light.
+    choice: Vec<Vec<f64>>,
+}
+
+impl PathTracer {
+    /// For a scene.
+    pub fn new(scene: Arc<Scene>, roulette: Roulette) -> PathTracer {
+        let choice = (0..scene.bands())
+            .map(|band| {
+                let strengths: Vec<f64> = scene.lights.iter().map(|l| l.strength(band)).collect();
+                let total: f64 = strengths.iter().sum();
+                let share = |s: &f64| if total > 0.0 { s / total } else { 0.0 };
+                strengths.iter().map(share).collect()
+            })
+            .collect();
+        PathTracer { bounds: scene.shape.bounds(), roulette, choice, scene }
+    }
+}
+
+impl Estimator for PathTracer {
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        for &band in bands {
+            for index in 0..self.scene.sensor.rays_per_pass() {
+                Walk::play(self, band, index, key, scores);
+            }
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let smooth = self.scene.boundary.iter().any(|b| matches!(b, Boundary::Smooth { .. }));
+        let parallel = self.scene.lights.iter().filter(|light| light.is_directional());
+        parallel
+            .filter(|_| smooth)
+            .map(|light| {
+                format!(
+                    "path cannot sample directional light `{}` through a smooth boundary: its share is \
+                     missing (exactly 0), not dark",
+                    light.name
+                )
+            })
+            .collect()
+    }
+}
+
+/// How the path's current direction was drawn, as light sampling sees it.
+#[derive(Clone, Copy)]
+enum Drawn {
+    /// Only this way: by the sensor or a delta lobe.
+    Alone,
+    /// Also by light sampling, in competition with this density per solid angle.
+    Competing(f64),
+}
+
+/// One path.
+struct Walk<'a> {
+    scene: &'a Scene,
+    choice: &'a [f64],
+    roulette: Roulette,
+    bounds: Option<BoundingSphere>,
+    boundary: Boundary,
+    medium: Medium,
+    band: usize,
+    slot: usize,
+    ray: Ray,
+    from: Option<FaceId>,
+    throughput: f64,
+    /// The throughput without radiance's eta^2: what roulette looks at.
+    survival: f64,
+    history: History,
+    drawn: Drawn,
+    stream: Stream,
+    light_stream: Stream,
+    scores: &'a mut Scores,
+}
+
+impl<'a> Walk<'a> {
+    fn play(tracer: &'a PathTracer, band: usize, index: usize, key: &PassKey, scores: &'a mut Scores) {
+        let scene = &*tracer.scene;
+        let mut sensor_stream = key.stream(index as u64, Purpose::Sensor);
+        let [a, b] = sensor_stream.next2();
+        let [c, d] = sensor_stream.next2();
+        let start = scene.sensor.ray(index, [a, b, c, d]);
+        scores.count(Cost::Paths);
+        scores.count(Cost::Rays);
+        let Some(hit) = scene.shape.intersect(&start.ray, Side::Outside, None, f64::INFINITY) else {
+            return; // light that has not met the body is not scored
+        };
+        Walk {
+            scene,
+            choice: &tracer.choice[band],
+            roulette: tracer.roulette,
+            bounds: tracer.bounds,
+            boundary: scene.boundary[band],
+            medium: scene.medium[band],
+            band,
+            slot: start.slot,
+            ray: start.ray,
+            from: None,
+            throughput: start.weight,
+            survival: 1.0,
+            history: History::default(),
+            drawn: Drawn::Alone,
+            stream: key.stream(index as u64, Purpose::Walk),
+            light_stream: key.stream(index as u64, Purpose::Light),
+            scores,
+        }
+        .from_outside(hit);
+    }
+
+    /// Runs from a first hit until the path ends.
+    fn from_outside(mut self, hit: Hit) {
+        let mut side = Side::Outside;
+        let mut hit = hit;
+        loop {
+            let Some(next_side) = self.cross(&hit, side) else { return };
+            side = next_side;
+            let next = match side {
+                Side::Inside => self.walk_inside(),
+                Side::Outside => self.fly_outside(),
+            };
+            match next {
+                Some(next) => hit = next,
+                None => return,
+            }
+        }
+    }
+
+    /// Flies and scatters in the medium until the path meets the boundary or ends.
+    fn walk_inside(&mut self) -> Option<Hit> {
+        loop {
+            let t = sample_exponential(self.medium.sigma_t, self.stream.next());
+            self.scores.count(Cost::Rays);
+            match self.scene.shape.intersect(&self.ray, Side::Inside, self.from, t) {
+                Some(hit) => {
+                    self.drawn = match self.drawn {
+                        Drawn::Competing(pdf) if self.matched() => {
+                            Drawn::Competing(pdf * transmittance(self.medium.sigma_t, hit.t))
+                        }
+                        drawn => drawn,
+                    };
+                    return Some(hit);
+                }
+                None if t == f64::INFINITY => {
+                    // Without extinction a half-space swallows the path; a finite body lets none go.
+                    if self.bounds.is_some() {
+                        self.scores.note(Anomaly::LostRay);
+                    }
+                    return None;
+                }
+                None => self.scatter(t)?,
+            }
+        }
+    }
+
+    /// A scattering event at distance `t`; `None` where the path ends.
+    fn scatter(&mut self, t: f64) -> Option<()> {
+        self.ray.origin = self.ray.at(t);
+        self.from = None;
+        if let Some(bounds) = self.bounds
+            && (self.ray.origin - bounds.center).length_squared() > bounds.radius * bounds.radius
+        {
+            self.scores.note(Anomaly::LostRay);
+            return None;
+        }
+        self.scores.count(Cost::MediumEvents);
+        self.survive(self.medium.albedo)?;
+        self.history.scatter();
+        if self.matched() {
+            self.connect_from_medium();
+        }
+        let dir = self.medium.phase.sample(self.ray.dir, self.stream.next2());
+        if self.matched() {
+            let pdf = self.medium.phase.pdf(self.ray.dir.dot(dir));
+            self.drawn = Drawn::Competing(pdf);
+        }
+        self.ray.dir = dir;
+        Some(())
+    }
+
+    /// Multiplies the path's weight by `factor`, or ends the path by roulette.
+    #[inline]
+    fn survive(&mut self, factor: f64) -> Option<()> {
+        match self.roulette {
+            Roulette::Analog => (self.stream.next() < factor).then_some(()),
+            Roulette::Below(threshold) => {
+                self.throughput *= factor;
+                self.survival *= factor;
+                if self.survival < threshold {
+                    let probability = self.survival / threshold;
+                    if self.stream.next() >= probability {
+                        return None;
+                    }
+                    self.throughput /= probability;
+                    self.survival = threshold;
+                }
+                Some(())
+            }
+        }
+    }
+
+    /// Flies on outside; scores the lights where nothing is in the way.
+    fn fly_outside(&mut self) -> Option<Hit> {
+        self.scores.count(Cost::Rays);
+        let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
+        if hit.is_none() {
+            self.score_escape();
+        }
+        hit
+    }
+
+    /// Meets the boundary from `side`; the side the path goes on to, `None` where it ends.
+    fn cross(&mut self, hit: &Hit, side: Side) -> Option<Side> {
+        self.from = Some(hit.face);
+        let wo = -self.ray.dir;
+        self.ray.origin = hit.point;
+        if self.matched() {
+            return Some(other(side)); // direction and competition stay as they are
+        }
+        self.scores.count(Cost::BoundaryEvents);
+        let frame = Frame::about(hit.shading_normal);
+        let local = frame.to_local(wo);
+        if (local.z > 0.0) != (side == Side::Outside) {
+            self.scores.note(Anomaly::WrongSide);
+            return None;
+        }
+        if !self.boundary.is_delta() {
+            self.connect_from_surface(hit, &frame, local);
+        }
+        let sample = self.boundary.sample(local, self.stream.next3())?;
+        let dir = frame.to_world(sample.wi);
+        let next_side = if sample.event == Event::Refract { other(side) } else { side };
+        if (dir.dot(hit.normal) > 0.0) != (next_side == Side::Outside) {
+            self.scores.note(Anomaly::WrongSide);
+            return None;
+        }
+        if sample.event == Event::Reflect && side == Side::Inside {
+            self.history.reflect_internally();
+        }
+        self.throughput *= sample.weight;
+        self.survival *= sample.weight * radiance_scale(side, next_side, &self.boundary);
+        self.ray.dir = dir;
+        self.drawn = match sample.density {
+            Density::Delta => Drawn::Alone,
+            Density::Finite(pdf) => Drawn::Competing(pdf),
+        };
+        Some(next_side)
+    }
+
+    /// Scores every light in the direction of a path that leaves the scene.
+    fn score_escape(&mut self) {
+        let class = self.history.class();
+        for (index, light) in self.scene.lights.iter().enumerate() {
+            let (radiance, pdf) = light.eval(self.band, self.ray.dir);
+            if radiance > 0.0 {
+                let weight = match self.drawn {
+                    Drawn::Alone => 1.0,
+                    Drawn::Competing(own) => balance(own, self.choice[index] * pdf),
+                };
+                let value = self.throughput * weight * radiance;
+                self.scores.add(self.slot, self.band, class, index, value);
+            }
+        }
+    }
+
+    /// Samples a light from a rough surface vertex.
+    fn connect_from_surface(&mut self, hit: &Hit, frame: &Frame, wo: DVec3) {
+        let u = self.light_stream.next3();
+        let Some((index, choice)) = self.choose_light(u[0]) else { return };
+        let sample = self.scene.lights[index].sample(self.band, [u[1], u[2]]);
+        let wi = frame.to_local(sample.wi);
+        let outside = sample.wi.dot(hit.normal) > 0.0;
+        if outside != (wi.z > 0.0) {
+            self.scores.note(Anomaly::WrongSide);
+            return;
+        }
+        if !outside || sample.radiance == 0.0 {
+            return;
+        }
+        let (value, pdf) = self.boundary.eval(wo, wi);
+        if value == 0.0 {
+            return;
+        }
+        self.scores.count(Cost::ShadowRays);
+        let shadow = Ray { origin: hit.point, dir: sample.wi };
+        if self.scene.shape.occluded(&shadow, Some(hit.face)) {
+            return;
+        }
+        let mut history = self.history;
+        if wo.z < 0.0 && wi.z < 0.0 {
+            history.reflect_internally();
+        }
+        self.score_connection(history, index, choice, sample.pdf, value * sample.radiance, pdf);
+    }
+
+    /// Samples a light from a medium vertex, straight through a matched boundary.
+    fn connect_from_medium(&mut self) {
+        let u = self.light_stream.next3();
+        let Some((index, choice)) = self.choose_light(u[0]) else { return };
+        let sample = self.scene.lights[index].sample(self.band, [u[1], u[2]]);
+        if sample.radiance == 0.0 {
+            return;
+        }
+        let phase = self.medium.phase.pdf(self.ray.dir.dot(sample.wi));
+        let Some(through) = self.transmittance_out(sample.wi) else { return };
+        let own = phase * through;
+        self.score_connection(self.history, index, choice, sample.pdf, own * sample.radiance, own);
+    }
+
+    /// Transmittance from the path's medium vertex to infinity along `dir`, through every part of the
+    /// body on the way.
+    fn transmittance_out(&mut self, dir: DVec3) -> Option<f64> {
+        let mut ray = Ray { origin: self.ray.origin, dir };
+        let mut from = None;
+        let mut inside_length = 0.0;
+        let mut side = Side::Inside;
+        loop {
+            self.scores.count(Cost::ShadowRays);
+            match self.scene.shape.intersect(&ray, side, from, f64::INFINITY) {
+                Some(hit) => {
+                    if side == Side::Inside {
+                        inside_length += hit.t;
+                    }
+                    ray.origin = hit.point;
+                    from = Some(hit.face);
+                    side = other(side);
+                }
+                None if side == Side::Outside => {
+                    return Some(transmittance(self.medium.sigma_t, inside_length));
+                }
+                None => {
+                    if self.bounds.is_some() {
+                        self.scores.note(Anomaly::LostRay);
+                    }
+                    return None;
+                }
+            }
+        }
+    }
+
+    /// Adds a light sample: `value` is f |cos| (or phase times transmittance) times radiance, `own` the
+    /// density with which the path's own sampling draws the direction. Balance heuristic: value over
+    /// the sum of both densities; parallel light has no competitor.
+    fn score_connection(
+        &mut self,
+        history: History,
+        light: usize,
+        choice: f64,
+        pdf: Option<f64>,
+        value: f64,
+        own: f64,
+    ) {
+        let density = match pdf {
+            Some(pdf) => choice * pdf + own,
+            None => choice,
+        };
+        let score = self.throughput * value / density;
+        self.scores.add(self.slot, self.band, history.class(), light, score);
+    }
+
+    /// A light by its strength, and the probability of that choice.
+    fn choose_light(&self, u: f64) -> Option<(usize, f64)> {
+        let mut rest = u;
+        for (index, &choice) in self.choice.iter().enumerate() {
+            if rest < choice {
+                return Some((index, choice));
+            }
+            rest -= choice;
+        }
+        // Rounding of the sum: the last light that shines.
+        self.choice.iter().rposition(|&choice| choice > 0.0).map(|index| (index, self.choice[index]))
+    }
+
+    #[inline]
+    fn matched(&self) -> bool {
+        self.boundary == Boundary::Matched
+    }
+}
+
+#[inline]
+fn other(side: Side) -> Side {
+    match side {
+        Side::Outside => Side::Inside,
+        Side::Inside => Side::Outside,
+    }
+}
+
+/// Undoes radiance's factor (n_o / n_i)^2 of a refraction from `side` (of wo) to `next` (of wi).
+#[inline]
+fn radiance_scale(side: Side, next: Side, boundary: &Boundary) -> f64 {
+    let eta = match boundary {
+        Boundary::Smooth { eta } | Boundary::Rough { eta, .. } => *eta,
+        Boundary::Matched => 1.0,
+    };
+    match (side, next) {
+        (Side::Outside, Side::Inside) => eta * eta,
+        (Side::Inside, Side::Outside) => 1.0 / (eta * eta),
+        _ => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Layout;
+    use super::*;
+    use crate::geometry::Shape;
+    use crate::optics::microfacet::{MicrofacetKind, Microfacets};
+    use crate::optics::phase::HenyeyGreenstein;
+    use crate::sampling::stream::StreamKey;
+    use crate::scene::{Emission, Light, Sensor};
+
+    fn environment(radiance: f64, toward: DVec3, height: f64, name: &str) -> Light {
+        let frame = Frame::about(toward);
+        Light { name: name.into(), emission: Emission::Cap { frame, height, radiance: vec![radiance] } }
+    }
+
+    fn scene(shape: Shape, boundary: Boundary, medium: Medium, lights: Vec<Light>, ray: Ray) -> Scene {
+        let sensor = Sensor::Probe { ray, paths: 1000 };
+        Scene { shape: Arc::new(shape), boundary: vec![boundary], medium: vec![medium], lights, sensor }
+    }
+
+    fn medium(sigma_t: f64, albedo: f64, g: f64) -> Medium {
+        Medium { sigma_t, albedo, phase: HenyeyGreenstein { g } }
+    }
+
+    fn down() -> Ray {
+        Ray { origin: DVec3::new(0.0, 0.0, 3.0), dir: -DVec3::Z }
+    }
+
+    /// Mean and standard error of every observable over passes.
+    fn measure(scene: Scene, roulette: Roulette, passes: u64, seed: u8) -> (Vec<(f64, f64)>, Scores) {
+        let layout = Layout::new(&scene);
+        let tracer = PathTracer::new(Arc::new(scene), roulette);
+        let mut scores = Scores::new(layout);
+        let key = StreamKey::new([seed; 32]);
+        let (mut sum, mut sum2) = (vec![0.0; scores.gates.len()], vec![0.0; scores.gates.len()]);
+        for pass in 0..passes {
+            scores.clear();
+            tracer.pass(&[0], &key.pass(pass), &mut scores);
+            for (i, x) in scores.gates.iter().enumerate() {
+                sum[i] += x;
+                sum2[i] += x * x;
+            }
+        }
+        let n = passes as f64;
+        let estimate = |(s, s2): (&f64, &f64)| {
+            let mean = s / n;
+            (mean, ((s2 / n - mean * mean).max(0.0) / (n - 1.0)).sqrt())
+        };
+        (sum.iter().zip(&sum2).map(estimate).collect(), scores)
+    }
+
+    const SPHERE: Shape = Shape::Sphere { radius: 1.0 };
+    const ROULETTES: [Roulette; 2] = [Roulette::Analog, Roulette::Below(0.25)];
+
+    fn off_axis() -> Ray {
+        Ray { origin: DVec3::new(0.3, -0.5, 3.0), dir: -DVec3::Z }
+    }
+
+    /// Without absorption, inside a constant environment of radiance 1, a smooth or matched body looks
+    /// like radiance 1 from everywhere, path by path.
+    #[test]
+    fn white_furnace_has_no_variance() {
+        for boundary in [Boundary::Smooth { eta: 1.3 }, Boundary::Smooth { eta: 1.5 }] {
+            for roulette in ROULETTES {
+                let sky = environment(1.0, DVec3::Z, 2.0, "sky");
+                let scene = scene(SPHERE, boundary, medium(5.0, 1.0, 0.3), vec![sky], off_axis());
+                let (means, _) = measure(scene, roulette, 20, 1);
+                assert!((means[0].0 - 1.0).abs() < 1e-12 && means[0].1 < 1e-7, "{means:?}");
+            }
+        }
+    }
+
+    /// The matched body adds light samples to every vertex: the same mean, with variance.
+    #[test]
+    fn matched_furnace() {
+        let sky = environment(1.0, DVec3::Z, 2.0, "sky");
+        let scene = scene(SPHERE, Boundary::Matched, medium(5.0, 1.0, 0.3), vec![sky], off_axis());
+        let (means, _) = measure(scene, Roulette::Analog, 200, 2);
+        let (mean, error) = means[0];
+        assert!((mean - 1.0).abs() < 5.0 * error && error < 5e-3, "{mean} {error}");
+    }
+
+    /// Slabs lit on one face, seen along the normal: total reflectance and transmittance.
+    /// Expected: adding-doubling (rows of experiments/verify/slab.csv), five standard errors.
+    #[test]
+    fn slab_reflectance_and_transmittance() {
+        // albedo, b, g, n, UR1, UT1
+        let rows = [
+            (0.8, 2.0, 0.0, 1.0, 0.265938894, 0.285949529),
+            (0.8, 1.0, 0.0, 1.3, 0.163574817, 0.486526072),
+            (0.95, 1.0, 0.0, 1.3, 0.274493619, 0.593504558),
+        ];
+        for (albedo, b, g, eta, reflected, transmitted) in rows {
+            for roulette in ROULETTES {
+                let lights = vec![
+                    environment(1.0, DVec3::Z, 1.0, "above"),
+                    environment(1.0, -DVec3::Z, 1.0, "below"),
+                ];
+                let slab = Shape::Slab { thickness: 1.0 };
+                let scene =
+                    scene(slab, Boundary::Smooth { eta }, medium(b, albedo, g), lights, down());
+                let (means, scores) = measure(scene, roulette, 100, 3);
+                for (expected, (mean, error)) in [reflected, transmitted].iter().zip(&means[6..8]) {
+                    assert!((mean - expected).abs() < 5.0 * error && *error < 3e-3, "{means:?}");
+                }
+                let classes: f64 = means[1..6].iter().map(|m| m.0).sum();
+                assert!((classes - means[0].0).abs() < 1e-12);
+                assert_eq!(scores.anomalies, [0; 3]);
+            }
+        }
+    }
+
+    /// Matched half-space lit by parallel light: Chandrasekhar's exact radiance, w = 0.9, mu = mu0 = 1,
+    /// f_r from the H function (rows of experiments/verify/chandrasekhar_brdf.csv).
+    #[test]
+    fn matched_half_space_under_parallel_light() {
+        let sun = Light {
+            name: "sun".into(),
+            emission: Emission::Directional { toward: DVec3::Z, irradiance: vec![1.0] },
+        };
+        let scene = scene(Shape::HalfSpace, Boundary::Matched, medium(1.0, 0.5, 0.0), vec![sun], down());
+        let (means, _) = measure(scene, Roulette::Below(0.25), 300, 4);
+        let (total, single) = (means[0], means[2]);
+        assert!((total.0 - 0.03114762692835).abs() < 5.0 * total.1 && total.1 < 1e-4, "{total:?}");
+        assert!((single.0 - 0.01989436788649).abs() < 5.0 * single.1, "{single:?}");
+    }
+
+    /// Rough boundary: MIS agrees with light sampling's complement, a cap grown to the whole sphere.
+    #[test]
+    fn rough_furnace_is_the_same_for_one_light_or_two_halves() {
+        let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.2 };
+        let boundary = Boundary::Rough { eta: 1.3, facets };
+        let whole = vec![environment(1.0, DVec3::Z, 2.0, "sky")];
+        let halves = vec![
+            environment(1.0, DVec3::X, 1.0, "right"),
+            environment(1.0, -DVec3::X, 1.0, "left"),
+        ];
+        let mut results = Vec::new();
+        for lights in [whole, halves] {
+            let scene = scene(SPHERE, boundary, medium(2.0, 0.9, 0.5), lights, off_axis());
+            results.push(measure(scene, Roulette::Below(0.25), 200, 5).0[0]);
+        }
+        let [(a, ea), (b, eb)] = results[..] else { unreachable!() };
+        assert!((a - b).abs() < 5.0 * (ea * ea + eb * eb).sqrt() && ea < 2e-3, "{results:?}");
+        assert!(a < 0.9, "absorption is seen: {a}");
+    }
+
+    #[test]
+    #[ignore]
+    fn speed() {
+        for roulette in [Roulette::Analog, Roulette::Below(0.5), Roulette::Below(0.25), Roulette::Below(0.1)] {
+            let sky = environment(1.0, DVec3::Z, 2.0, "sky");
+            let scene = scene(SPHERE, Boundary::Smooth { eta: 1.3 }, medium(10.0, 0.99, 0.0), vec![sky], off_axis());
+            let start = std::time::Instant::now();
+            let (means, scores) = measure(scene, roulette, 2000, 1);
+            let s = start.elapsed().as_secs_f64();
+            println!("{roulette:?}: {:.0} paths/s, eff {:.3}, {:?} {:?}", 2e6 / s, 1e-9/(means[0].1*means[0].1*s), means[0], scores.cost);
+        }
+    }
+}

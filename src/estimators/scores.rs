@@ -1,0 +1,206 @@
+//! Scores of one pass: `[observable][band]`, and counts of work and of what must not go unseen.
+//!
+//! Observables: for each region of the sensor that is split, its total, its transport classes, and
+//! (with more than one light) each light's share; for the other regions the total. Pixels beside them.
+
+use super::TransportClass;
+use crate::scene::{Scene, Sensor};
+
+/// Deterministic counts of work done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cost {
+    /// Paths started at the sensor.
+    Paths,
+    /// Closest-hit queries.
+    Rays,
+    /// Occlusion queries.
+    ShadowRays,
+    /// Scattering events in the medium.
+    MediumEvents,
+    /// Reflections and refractions at the boundary.
+    BoundaryEvents,
+}
+
+impl Cost {
+    /// All counters, in the order of [`Scores::cost`].
+    pub const ALL: [Cost; 5] =
+        [Cost::Paths, Cost::Rays, Cost::ShadowRays, Cost::MediumEvents, Cost::BoundaryEvents];
+
+    /// Its name in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Cost::Paths => "paths",
+            Cost::Rays => "rays",
+            Cost::ShadowRays => "shadow_rays",
+            Cost::MediumEvents => "medium_events",
+            Cost::BoundaryEvents => "boundary_events",
+        }
+    }
+}
+
+/// Counts of what must not go unseen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anomaly {
+    /// A score that is not a finite number; it is not added and voids the claims that rest on it.
+    NonFinite,
+    /// A path that left the body without crossing its boundary; it scores 0 from there on and voids
+    /// the claims that rest on it.
+    LostRay,
+    /// A direction on one side of the geometric and on the other of the shading surface; it scores 0.
+    /// This is what interpolated normals mean here, not an error.
+    WrongSide,
+}
+
+impl Anomaly {
+    /// All anomalies, in the order of [`Scores::anomalies`].
+    pub const ALL: [Anomaly; 3] = [Anomaly::NonFinite, Anomaly::LostRay, Anomaly::WrongSide];
+
+    /// Its name in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Anomaly::NonFinite => "nonfinite",
+            Anomaly::LostRay => "lost_ray",
+            Anomaly::WrongSide => "wrong_side",
+        }
+    }
+}
+
+/// Name of an observable: region (and light), and transport class.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ObservableName {
+    /// `mean`, `mean@sun`, `tile_0_0`, ...
+    pub name: String,
+    /// `all` or a class.
+    pub class: &'static str,
+}
+
+/// Which observables a scene has, in which order.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    sensor: Sensor,
+    bands: usize,
+    lights: usize,
+    split_regions: usize,
+    names: Vec<ObservableName>,
+}
+
+impl Layout {
+    /// The layout of a scene.
+    pub fn new(scene: &Scene) -> Layout {
+        let mut names = Vec::new();
+        let observable = |name: &str, class| ObservableName { name: name.into(), class };
+        let regions = scene.sensor.regions();
+        for region in &regions {
+            names.push(observable(&region.name, "all"));
+            if region.split {
+                names.extend(TransportClass::ALL.map(|class| observable(&region.name, class.name())));
+                if scene.lights.len() > 1 {
+                    names.extend(scene.lights.iter().map(|light| ObservableName {
+                        name: format!("{}@{}", region.name, light.name),
+                        class: "all",
+                    }));
+                }
+            }
+        }
+        Layout {
+            sensor: scene.sensor.clone(),
+            bands: scene.bands(),
+            lights: if scene.lights.len() > 1 { scene.lights.len() } else { 0 },
+            split_regions: regions.iter().filter(|region| region.split).count(),
+            names,
+        }
+    }
+
+    /// The observables' names.
+    pub fn observables(&self) -> &[ObservableName] {
+        &self.names
+    }
+
+    /// Number of bands.
+    pub fn bands(&self) -> usize {
+        self.bands
+    }
+
+    /// Pixels of the image, 0 where the sensor has none.
+    pub fn pixels(&self) -> usize {
+        self.sensor.pixels().map_or(0, |(width, height)| width * height)
+    }
+
+    /// Observables of one split region: total, classes, lights.
+    fn stride(&self) -> usize {
+        1 + TransportClass::ALL.len() + self.lights
+    }
+}
+
+/// The scores of one pass.
+#[derive(Clone, Debug)]
+pub struct Scores {
+    layout: Layout,
+    /// `[observable][band]`.
+    pub gates: Vec<f64>,
+    /// `[pixel][band]`; empty where the sensor has no pixels.
+    pub pixels: Vec<f64>,
+    /// By [`Cost`].
+    pub cost: [u64; Cost::ALL.len()],
+    /// By [`Anomaly`].
+    pub anomalies: [u64; Anomaly::ALL.len()],
+}
+
+impl Scores {
+    /// Zeros.
+    pub fn new(layout: Layout) -> Scores {
+        Scores {
+            gates: vec![0.0; layout.names.len() * layout.bands],
+            pixels: vec![0.0; layout.pixels() * layout.bands],
+            cost: [0; Cost::ALL.len()],
+            anomalies: [0; Anomaly::ALL.len()],
+            layout,
+        }
+    }
+
+    /// Back to zeros for the next pass; counts go on.
+    pub fn clear(&mut self) {
+        self.gates.fill(0.0);
+        self.pixels.fill(0.0);
+    }
+
+    /// Adds a contribution to a slot of the sensor: its pixel, its regions, its class, its light.
+    #[inline]
+    pub fn add(&mut self, slot: usize, band: usize, class: TransportClass, light: usize, value: f64) {
+        if !value.is_finite() {
+            self.anomalies[Anomaly::NonFinite as usize] += 1;
+            return;
+        }
+        let layout = &self.layout;
+        let bands = layout.bands;
+        if !self.pixels.is_empty() {
+            self.pixels[slot * bands + band] += value;
+        }
+        for (region, factor) in layout.sensor.regions_of(slot) {
+            let share = factor * value;
+            if region < layout.split_regions {
+                let first = region * layout.stride();
+                self.gates[first * bands + band] += share;
+                self.gates[(first + 1 + class as usize) * bands + band] += share;
+                if layout.lights > 0 {
+                    self.gates[(first + 1 + TransportClass::ALL.len() + light) * bands + band] += share;
+                }
+            } else {
+                let first = layout.split_regions * layout.stride() + region - layout.split_regions;
+                self.gates[first * bands + band] += share;
+            }
+        }
+    }
+
+    /// Counts work.
+    #[inline]
+    pub fn count(&mut self, cost: Cost) {
+        self.cost[cost as usize] += 1;
+    }
+
+    /// Counts an anomaly.
+    #[inline]
+    pub fn note(&mut self, anomaly: Anomaly) {
+        self.anomalies[anomaly as usize] += 1;
+    }
+}
