@@ -13,6 +13,11 @@ pub fn canonical(value: &impl Serialize) -> String {
     text
 }
 
+/// blake3 of bytes.
+pub fn hash_bytes(bytes: &[u8]) -> [u8; 32] {
+    *blake3::hash(bytes).as_bytes()
+}
+
 /// blake3 of bytes, hex.
 pub fn hash_hex(bytes: &[u8]) -> String {
     blake3::hash(bytes).to_hex().to_string()

@@ -136,13 +136,14 @@ mod tests {
         LatLong::new(width, height, vec![plane])
     }
 
-    /// D5: what is drawn has the radiance and density that evaluation reports.
+    /// D5: what is drawn has the radiance and density that evaluation reports (off the exact edges of
+    /// texels, where a direction belongs to two).
     #[test]
     fn sample_and_eval_agree() {
         let map = map();
         for i in 0..200 {
             for j in 0..50 {
-                let u = [(f64::from(i) + 0.5) / 200.0, (f64::from(j) + 0.5) / 50.0];
+                let u = [(f64::from(i) + 0.5) / 200.3, (f64::from(j) + 0.5) / 50.0];
                 let (wi, radiance, pdf) = map.sample(0, u);
                 assert_eq!(map.eval(0, wi), (radiance, pdf), "{u:?}");
                 assert!(radiance > 0.0);
