@@ -121,6 +121,11 @@ impl Layout {
         self.bands
     }
 
+    /// Pixels per row and rows of the image, where the sensor has one.
+    pub fn image(&self) -> Option<(usize, usize)> {
+        self.sensor.pixels()
+    }
+
     /// Pixels of the image, 0 where the sensor has none.
     pub fn pixels(&self) -> usize {
         self.sensor.pixels().map_or(0, |(width, height)| width * height)

@@ -1,1 +1,99 @@
-//! Stub.
+//! Runs experiments: jobs from cells and estimators, passes on threads, checkpoints, the record.
+//!
+//! experiment -> jobs (scene + estimator + streams) -> blocks of passes, in any order, on any threads
+//! -> moments in the order of passes -> record, timing, provenance.
+
+pub mod checkpoint;
+pub mod clock;
+pub mod comparisons;
+pub mod interrupt;
+pub mod job;
+pub mod keys;
+pub mod memory;
+pub mod pilot;
+pub mod progress;
+pub mod workers;
+
+mod assemble;
+mod jobs;
+
+use std::path::{Path, PathBuf};
+
+use crate::error::Result;
+use crate::experiment::Experiment;
+use crate::experiment::registry::Registry;
+use crate::results::provenance::Provenance;
+use crate::results::store::{RecordFolder, Stored};
+use interrupt::Interrupt;
+use progress::Progress;
+
+pub use jobs::{Plan, plan};
+
+/// How to run; nothing here changes a result.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Folder that holds a folder per experiment.
+    pub out: PathBuf,
+    /// Number of threads.
+    pub threads: usize,
+    /// Passes per block; chosen by time without it.
+    pub block_passes: Option<u64>,
+    /// No progress bar.
+    pub quiet: bool,
+}
+
+impl Options {
+    /// Into `out`, on all cores.
+    pub fn new(out: impl Into<PathBuf>) -> Options {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        Options { out: out.into(), threads, block_passes: None, quiet: false }
+    }
+
+    /// The folder of an experiment's results.
+    pub fn folder(&self, experiment: &str) -> PathBuf {
+        self.out.join(experiment)
+    }
+}
+
+/// Runs an experiment, or what is left of it, and writes its record, timing and provenance.
+///
+/// # Errors
+/// Bad input found while building; a run that does not fit in memory; I/O; an interruption, after which
+/// the same call goes on where this one stopped.
+pub fn run(
+    experiment: &Experiment,
+    registry: &Registry,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<(RecordFolder, Stored)> {
+    let plan = plan(experiment, registry)?;
+    plan.memory(options.threads).check(memory::available())?;
+    let root = options.folder(&experiment.file.name);
+    crate::results::atomic::create_folder(&root.join("state"), "create the results folder")?;
+    let progress = Progress::new(plan.jobs.len(), options.quiet);
+    let settings = workers::Settings {
+        threads: options.threads.max(1),
+        block_passes: options.block_passes,
+        interrupt,
+        root: &root,
+        progress: &progress,
+    };
+    let played = workers::play_all(&plan.jobs, &experiment.file.budget, &settings);
+    progress.finish();
+    let assembled = assemble::assemble(experiment, &plan, played?)?;
+    let folder = RecordFolder::new(&root);
+    let record = folder.write(&assembled.record, &assembled.arrays)?;
+    folder.write_timing(&assembled.timing)?;
+    folder.write_provenance(&Provenance::collect(options.threads))?;
+    Ok((folder, Stored { record, arrays: assembled.arrays }))
+}
+
+/// Whether the folder holds a record of exactly this experiment (claims aside).
+pub fn has_record(experiment: &Experiment, out: &Path) -> bool {
+    let folder = RecordFolder::new(out.join(&experiment.file.name));
+    folder.exists()
+        && folder.read().is_ok_and(|stored| {
+            stored.record.experiment_hash == assemble::experiment_hash(experiment)
+                && stored.record.fingerprint == crate::results::provenance::fingerprint()
+        })
+}

@@ -1,0 +1,70 @@
+//! The estimators that come with the program: their options in a file, and how each is built.
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value as Json;
+
+use super::registry::{Registry, RegistryEntry};
+use crate::error::{Error, Result};
+use crate::estimators::Estimator;
+use crate::estimators::path::{PathTracer, Roulette};
+use crate::scene::Scene;
+
+/// Every estimator of this crate; a program of one's own may push its entries on top.
+pub fn builtin() -> Registry {
+    Registry {
+        entries: vec![RegistryEntry {
+            kind: "path",
+            doc: "unidirectional path tracing with MIS between BSDF and light sampling; unbiased",
+            options_schema: || schemars::schema_for!(PathOptions),
+            build: |options, scene| {
+                let options: PathOptions = read(options)?;
+                Ok(Box::new(PathTracer::new(scene, options.roulette.into())))
+            },
+        }],
+    }
+}
+
+/// Options of `path`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PathOptions {
+    /// When a path is ended by chance; both ways are unbiased.
+    #[serde(default)]
+    pub roulette: RouletteOption,
+}
+
+/// Russian roulette.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum RouletteOption {
+    /// At every scattering event with probability 1 - albedo.
+    Analog {},
+    /// Only where the path's weight has fallen below this.
+    Below(#[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))] f64),
+}
+
+impl Default for RouletteOption {
+    fn default() -> Self {
+        RouletteOption::Below(0.25)
+    }
+}
+
+impl From<RouletteOption> for Roulette {
+    fn from(option: RouletteOption) -> Roulette {
+        match option {
+            RouletteOption::Analog {} => Roulette::Analog,
+            RouletteOption::Below(threshold) => Roulette::Below(threshold),
+        }
+    }
+}
+
+/// Options from their validated JSON.
+pub fn read<T: for<'a> Deserialize<'a>>(options: &Json) -> Result<T> {
+    serde_json::from_value(options.clone()).map_err(|error| Error::input(format!("estimator options: {error}")))
+}
+
+/// How a registered estimator is built from its options and a scene.
+pub type Build = fn(&Json, Arc<Scene>) -> Result<Box<dyn Estimator>>;

@@ -1,0 +1,116 @@
+//! From finished blocks to the record, its arrays, and the timing.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use super::job::{Block, Job};
+use super::jobs::{Plan, named};
+use crate::error::Result;
+use crate::estimators::{self, Anomaly, Cost};
+use crate::experiment::Experiment;
+use crate::experiment::build::inputs;
+use crate::results::json::hash_json;
+use crate::results::npy::Array;
+use crate::results::provenance::fingerprint;
+use crate::results::record::{Bias, Cell, EstimatorRun, Image, Record, SCHEMA_VERSION};
+use crate::results::store::{Arrays, gates_path, pixels_path};
+use crate::results::timing::{self, Timing};
+
+/// A record before it is written.
+pub struct Assembled {
+    /// The record; checksums are filled in when it is written.
+    pub record: Record,
+    /// Its arrays.
+    pub arrays: Arrays,
+    /// What it cost.
+    pub timing: Timing,
+}
+
+/// Hash of the resolved experiment without claims and of the files that it reads, hex.
+pub fn experiment_hash(experiment: &Experiment) -> String {
+    hash_json(&json!({"resolved": experiment.resolved(), "inputs": inputs(experiment)}))
+}
+
+/// Puts the blocks of a plan's jobs into a record.
+pub fn assemble(experiment: &Experiment, plan: &Plan, blocks: Vec<Block>) -> Result<Assembled> {
+    let mut arrays = Arrays::new();
+    let mut timing = Timing::default();
+    let empty = |cell: &crate::experiment::CellSpec| Cell {
+        label: cell.label.clone(),
+        axes: cell.axes.clone(),
+        content_hash: hash_json(&cell.content()),
+        runs: Vec::new(),
+    };
+    let mut cells: Vec<Cell> = experiment.cells.iter().map(empty).collect();
+    for (job, block) in plan.jobs.iter().zip(blocks) {
+        let name = &experiment.file.estimator[job.estimator_index].name;
+        let cost = timing::Cost {
+            cpu_seconds: block.tally.cpu_seconds,
+            wall_seconds: block.tally.wall_seconds,
+            passes: block.tally.passes,
+            paths: block.tally.cost[Cost::Paths as usize],
+        };
+        timing.add(&cells[job.cell].label, name, cost);
+        let kind = &plan.kinds[job.estimator_index];
+        cells[job.cell].runs.push(estimator_run(job, name, kind, block, &mut arrays));
+    }
+    let claims = serde_json::to_value(&experiment.file.claim).unwrap_or(Value::Null);
+    let record = Record {
+        schema_version: SCHEMA_VERSION,
+        experiment: experiment.file.name.clone(),
+        fingerprint: fingerprint(),
+        experiment_hash: experiment_hash(experiment),
+        resolved: experiment.resolved(),
+        claims_hash: hash_json(&claims),
+        claims,
+        comparisons: plan.comparisons.clone(),
+        bands: plan.bands.clone(),
+        cells,
+        checksums: BTreeMap::new(),
+    };
+    Ok(Assembled { record, arrays, timing })
+}
+
+fn estimator_run(job: &Job, name: &str, kind: &str, block: Block, arrays: &mut Arrays) -> EstimatorRun {
+    let passes = block.next_pass();
+    let (observables, bands) = (job.layout.observables().len(), job.layout.bands());
+    let batches = block.gates.batches();
+    let shape = vec![batches.len(), observables, bands, 5];
+    let data = batches.iter().flatten().flat_map(|moments| moments.to_array()).collect();
+    let gates = gates_path(job.cell, name);
+    arrays.insert(gates.clone(), Array::new(shape, data));
+
+    let image = job.layout.image().map(|(width, height)| {
+        let total = block.pixels.finish().unwrap_or_default();
+        let mut data = total.mean.clone();
+        data.extend(total.std_error());
+        let pixels = pixels_path(job.cell, name);
+        arrays.insert(pixels.clone(), Array::new(vec![2, height, width, bands], data));
+        Image { width, height, pixels }
+    });
+    let counts = |names: Vec<&str>, values: &[u64]| {
+        names.into_iter().map(str::to_string).zip(values.iter().copied()).collect()
+    };
+    EstimatorRun {
+        estimator: name.into(),
+        kind: kind.into(),
+        bias: match job.estimator.bias() {
+            estimators::Bias::Unbiased => Bias::Unbiased,
+            estimators::Bias::Consistent => Bias::Consistent,
+            estimators::Bias::Biased(why) => Bias::Biased(why),
+        },
+        notes: job.estimator.notes(),
+        passes,
+        observables: named(&job.layout),
+        gates,
+        image,
+        cost: counts(Cost::ALL.map(Cost::name).into(), &block.tally.cost),
+        anomalies: counts(Anomaly::ALL.map(Anomaly::name).into(), &block.tally.anomalies),
+    }
+}
+
+/// The claims of an experiment as the record would state them.
+pub fn claims_hash(experiment: &Experiment) -> String {
+    hash_json(&json!(experiment.file.claim))
+}

@@ -1,0 +1,139 @@
+//! States of jobs on disk, so that a run goes on where it was stopped and nothing is played twice.
+//!
+//! One file a job, named by its identity: a header in JSON, the numbers as little-endian f64, and a
+//! blake3 of both. A file that does not fit (another job, truncated, damaged) is as good as none.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::job::{Block, Tally};
+use crate::error::Result;
+use crate::results::atomic;
+use crate::results::json::{canonical, hash_bytes};
+use crate::stats::moments::{ImageMoments, Moments};
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    identity: String,
+    tally: Tally,
+    /// Level and number of values of every gate node.
+    gates: Vec<(u32, usize)>,
+    /// Level, passes and number of values of every image node.
+    pixels: Vec<(u32, u64, usize)>,
+}
+
+/// Path of a job's state in an experiment's results folder.
+pub fn path(root: &Path, identity: &str) -> PathBuf {
+    root.join("state").join(format!("{}.state", &identity[..32]))
+}
+
+/// Writes the state of a job whose passes start at 0.
+pub fn save(path: &Path, identity: &str, block: &Block) -> Result<()> {
+    let gates = block.gates.nodes();
+    let pixels = block.pixels.nodes();
+    let header = Header {
+        identity: identity.into(),
+        tally: block.tally,
+        gates: gates.iter().map(|n| (n.level, n.value.len())).collect(),
+        pixels: pixels.iter().map(|n| (n.level, n.value.n, n.value.mean.len())).collect(),
+    };
+    let header = canonical(&header);
+    let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
+    bytes.extend(header.as_bytes());
+    let mut put = |x: f64| bytes.extend(x.to_le_bytes());
+    gates.iter().flat_map(|n| &n.value).flat_map(|m| m.to_array()).for_each(&mut put);
+    pixels.iter().flat_map(|n| n.value.mean.iter().chain(&n.value.m2)).for_each(|&x| put(x));
+    let checksum = hash_bytes(&bytes);
+    bytes.extend(checksum);
+    atomic::write(path, &bytes, "save the state of the run")
+}
+
+/// Reads the state of a job, with gates kept at `keep_level`; `None` where there is none that fits.
+pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
+    let bytes = std::fs::read(path).ok()?;
+    let (body, checksum) = bytes.split_last_chunk::<32>()?;
+    if hash_bytes(body) != *checksum {
+        return None;
+    }
+    let (length, rest) = body.split_first_chunk::<8>()?;
+    let (header, numbers) = rest.split_at_checked(u64::from_le_bytes(*length) as usize)?;
+    let header: Header = serde_json::from_slice(header).ok()?;
+    if header.identity != identity {
+        return None;
+    }
+    let mut numbers = numbers.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b));
+    let mut take = |n: usize| -> Option<Vec<f64>> {
+        let taken: Vec<f64> = numbers.by_ref().take(n).collect();
+        (taken.len() == n).then_some(taken)
+    };
+    let mut block = Block::empty(0, keep_level);
+    for (level, length) in header.gates {
+        if level > keep_level {
+            return None; // kept coarser than this run's batches: they cannot be cut
+        }
+        let values = take(5 * length)?;
+        let moments = values.as_chunks::<5>().0.iter().map(|m| Moments::from_array(*m)).collect();
+        block.gates.push_node(level, moments);
+    }
+    for (level, n, length) in header.pixels {
+        let (mean, m2) = (take(length)?, take(length)?);
+        block.pixels.push_node(level, ImageMoments { n, mean, m2 });
+    }
+    block.tally = header.tally;
+    (block.gates.next_pass() == block.pixels.next_pass()).then_some(block)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block(passes: u64, keep_level: u32) -> Block {
+        let mut block = Block::empty(0, keep_level);
+        for pass in 0..passes {
+            let x = 1.0 / (pass as f64 + 3.0);
+            block.gates.push(vec![Moments::of(x), Moments::of(-x)]);
+            block.pixels.push(ImageMoments::of(vec![x, 2.0 * x, x * x]));
+        }
+        block.tally.cost[0] = 7;
+        block
+    }
+
+    #[test]
+    fn states_survive_the_disk() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.state");
+        let block = block(13, 2);
+        save(&path, "me", &block).expect("saved");
+        assert_eq!(load(&path, "me", 2), Some(block.clone()));
+        assert!(load(&path, "you", 2).is_none(), "another job");
+        assert!(load(&path, "me", 1).is_none(), "coarser than asked");
+        // A longer run keeps wider batches: the nodes merge on.
+        assert_eq!(load(&path, "me", 3).expect("a state").gates.nodes().len(), 3);
+
+        let mut bytes = std::fs::read(&path).expect("bytes");
+        bytes[200] ^= 1;
+        std::fs::write(&path, &bytes).expect("written");
+        assert!(load(&path, "me", 2).is_none(), "damaged");
+        std::fs::write(&path, &bytes[..100]).expect("written");
+        assert!(load(&path, "me", 2).is_none(), "truncated");
+    }
+
+    #[test]
+    fn going_on_gives_the_same_bits() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.state");
+        let whole = block(29, 3);
+        let mut later = Block::empty(11, 3);
+        for pass in 11..29 {
+            let x = 1.0 / (pass as f64 + 3.0);
+            later.gates.push(vec![Moments::of(x), Moments::of(-x)]);
+            later.pixels.push(ImageMoments::of(vec![x, 2.0 * x, x * x]));
+        }
+        save(&path, "me", &block(11, 0)).expect("saved");
+        let mut resumed = load(&path, "me", 3).expect("a state");
+        resumed.append(later);
+        assert_eq!((resumed.gates, resumed.pixels), (whole.gates, whole.pixels));
+    }
+}

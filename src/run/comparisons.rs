@@ -1,0 +1,161 @@
+//! Claims expanded: every elementary statement, with the value that it is held against. Expected values
+//! come into the record here, so that verification needs nothing but the record.
+
+use std::collections::BTreeMap;
+
+use crate::error::{Error, Result};
+use crate::experiment::schema::{Agree, ClaimEntry, Equals};
+use crate::experiment::{CellSpec, Experiment};
+use crate::results::record::{Against, Band, Comparison, Observable, Quantity};
+
+/// All comparisons of an experiment, in the order of its claims, cells, estimators and bands.
+/// `observables` are those of each cell.
+///
+/// # Errors
+/// A claim that names an observable the sensor does not have; a table's cell that is not a number.
+pub fn expand(
+    experiment: &Experiment,
+    bands: &[Band],
+    observables: &[Vec<Observable>],
+) -> Result<Vec<Comparison>> {
+    let claims = experiment.file.claim.iter().enumerate();
+    let scope = Scope { experiment, bands, observables };
+    let lists = claims.map(|(index, claim)| scope.claim(index, claim)).collect::<Result<Vec<_>>>()?;
+    Ok(lists.into_iter().flatten().collect())
+}
+
+struct Scope<'a> {
+    experiment: &'a Experiment,
+    bands: &'a [Band],
+    observables: &'a [Vec<Observable>],
+}
+
+impl Scope<'_> {
+    fn claim(&self, index: usize, claim: &ClaimEntry) -> Result<Vec<Comparison>> {
+        match (&claim.equals, &claim.agree) {
+            (Some(equals), _) => self.equals(index, equals),
+            (_, Some(agree)) => self.agree(index, agree),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    fn equals(&self, claim: usize, words: &Equals) -> Result<Vec<Comparison>> {
+        let names: Vec<&str> = match &words.estimator {
+            Some(name) => vec![name],
+            None => self.experiment.file.estimator.iter().map(|e| e.name.as_str()).collect(),
+        };
+        let mut comparisons = Vec::new();
+        for cell in self.cells(&words.only) {
+            let spec = &self.experiment.cells[cell];
+            let read = |column: &String| number(spec, column);
+            let value = words.value.map_or_else(|| words.column.as_ref().map_or(Ok(f64::NAN), read), Ok)?;
+            let error = match (words.error, &words.error_column) {
+                (Some(error), _) => error,
+                (None, Some(column)) => read(column)?,
+                (None, None) => 0.0,
+            };
+            let observable = self.observable(claim, cell, &words.observable, &words.class)?;
+            for name in &names {
+                for band in 0..self.bands.len() {
+                    comparisons.push(Comparison {
+                        claim,
+                        quantity: quantity(cell, name, &observable, band),
+                        against: Against::Value { value, error, source: words.source.clone() },
+                        detect: words.detect,
+                    });
+                }
+            }
+        }
+        Ok(comparisons)
+    }
+
+    fn agree(&self, claim: usize, words: &Agree) -> Result<Vec<Comparison>> {
+        let mut comparisons = Vec::new();
+        let mut push = |a: (usize, &str), b: (usize, &str), paired: bool| -> Result<()> {
+            let observable = self.observable(claim, a.0, &words.observable, &words.class)?;
+            for band in 0..self.bands.len() {
+                comparisons.push(Comparison {
+                    claim,
+                    quantity: quantity(a.0, a.1, &observable, band),
+                    against: Against::Quantity { other: quantity(b.0, b.1, &observable, band), paired },
+                    detect: Some(words.detect),
+                });
+            }
+            Ok(())
+        };
+        let cells = self.cells(&words.only);
+        match &words.across {
+            None => {
+                for &cell in &cells {
+                    for (i, first) in words.estimators.iter().enumerate() {
+                        for second in &words.estimators[i + 1..] {
+                            push((cell, first), (cell, second), false)?;
+                        }
+                    }
+                }
+            }
+            Some(axis) => {
+                let mut groups: BTreeMap<Vec<(&String, &String)>, Vec<usize>> = BTreeMap::new();
+                for &cell in &cells {
+                    let axes = self.experiment.cells[cell].axes.iter();
+                    groups.entry(axes.filter(|(name, _)| *name != axis).collect()).or_default().push(cell);
+                }
+                for group in groups.values() {
+                    for name in &words.estimators {
+                        for &other in &group[1..] {
+                            push((group[0], name), (other, name), self.is_paired(group[0], other))?;
+                        }
+                    }
+                }
+            }
+        }
+        Ok(comparisons)
+    }
+
+    /// Two cells share their streams where all that tells them apart is paired over.
+    fn is_paired(&self, a: usize, b: usize) -> bool {
+        let Some(pair) = &self.experiment.file.pair else { return false };
+        let cells = &self.experiment.cells;
+        cells[a].content_without(&pair.over) == cells[b].content_without(&pair.over)
+    }
+
+    fn cells(&self, only: &BTreeMap<String, String>) -> Vec<usize> {
+        let chosen = |spec: &CellSpec| only.iter().all(|(axis, label)| spec.axes.get(axis) == Some(label));
+        (0..self.experiment.cells.len()).filter(|&i| chosen(&self.experiment.cells[i])).collect()
+    }
+
+    fn observable(
+        &self,
+        claim: usize,
+        cell: usize,
+        name: &Option<String>,
+        class: &Option<String>,
+    ) -> Result<Observable> {
+        let known = &self.observables[cell];
+        let name = name.as_deref().unwrap_or(&known[0].name);
+        let class = class.as_deref().unwrap_or("all");
+        let found = known.iter().find(|o| o.name == name && o.class == class);
+        found.cloned().ok_or_else(|| {
+            let list: Vec<String> = known.iter().map(|o| format!("{} ({})", o.name, o.class)).collect();
+            Error::input_help(
+                format!("claim {} names observable `{name}` of class `{class}`", claim + 1),
+                format!("the sensor of cell `{}` has {}", self.experiment.cells[cell].label, list.join(", ")),
+            )
+        })
+    }
+}
+
+fn quantity(cell: usize, estimator: &str, observable: &Observable, band: usize) -> Quantity {
+    Quantity { cell, estimator: estimator.into(), observable: observable.clone(), band }
+}
+
+fn number(cell: &CellSpec, column: &str) -> Result<f64> {
+    let text = cell.csv_row.get(column).map_or("", String::as_str);
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(Error::input(format!(
+            "column `{column}` holds `{text}` in cell `{}`, where a claim needs a number",
+            cell.label
+        ))),
+    }
+}

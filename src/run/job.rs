@@ -1,0 +1,152 @@
+//! One estimator in one cell: what a worker needs to play any run of passes, and what comes back.
+
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use super::clock::thread_cpu_time;
+use super::keys::Stage;
+use crate::estimators::{Anomaly, BandUse, Cost, Estimator, Layout, Scores};
+use crate::sampling::stream::StreamKey;
+use crate::stats::moments::{ImageMoments, Moments};
+use crate::stats::tree::Counter;
+
+/// A built estimator with its streams.
+pub struct Job {
+    /// Cell index.
+    pub cell: usize,
+    /// Estimator index in the experiment file.
+    pub estimator_index: usize,
+    /// What people call it: cell and estimator.
+    pub label: String,
+    /// Hash of all that its result depends on but the number of passes, hex.
+    pub identity: String,
+    /// Plays passes.
+    pub estimator: Box<dyn Estimator>,
+    /// Its observables.
+    pub layout: Layout,
+    /// Bands that one call plays together, with their streams.
+    pub groups: Vec<Group>,
+    /// Observables whose relative error a budget may bound.
+    pub targets: Vec<usize>,
+}
+
+/// Bands that one call plays together.
+pub struct Group {
+    /// Their indices.
+    pub bands: Vec<usize>,
+    /// Key of the run.
+    pub main: StreamKey,
+    /// Key of the pilot.
+    pub pilot: StreamKey,
+}
+
+/// What a run of passes left behind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Block {
+    /// Moments of `[observable][band]`, kept by batch.
+    pub gates: Counter<Vec<Moments>>,
+    /// Moments of `[pixel][band]`.
+    pub pixels: Counter<ImageMoments>,
+    /// Work and time.
+    pub tally: Tally,
+}
+
+/// Counts and time, which add up in any order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tally {
+    /// By [`Cost`].
+    pub cost: [u64; Cost::ALL.len()],
+    /// By [`Anomaly`].
+    pub anomalies: [u64; Anomaly::ALL.len()],
+    /// Passes.
+    pub passes: u64,
+    /// CPU time of the passes alone, seconds.
+    pub cpu_seconds: f64,
+    /// Wall time, seconds.
+    pub wall_seconds: f64,
+}
+
+impl Tally {
+    /// Adds another run of passes.
+    pub fn add(&mut self, other: &Tally) {
+        self.cost.iter_mut().zip(other.cost).for_each(|(a, b)| *a += b);
+        self.anomalies.iter_mut().zip(other.anomalies).for_each(|(a, b)| *a += b);
+        self.passes += other.passes;
+        self.cpu_seconds += other.cpu_seconds;
+        self.wall_seconds += other.wall_seconds;
+    }
+}
+
+/// The groups of bands that an estimator plays together.
+pub fn band_groups(band_use: BandUse, bands: usize) -> Vec<Vec<usize>> {
+    match band_use {
+        BandUse::EachAlone => (0..bands).map(|band| vec![band]).collect(),
+        BandUse::Shared => vec![(0..bands).collect()],
+    }
+}
+
+impl Block {
+    /// No passes yet, from pass `start` on.
+    pub fn empty(start: u64, keep_level: u32) -> Block {
+        Block {
+            gates: Counter::new(start, keep_level),
+            pixels: Counter::new(start, Counter::<ImageMoments>::MERGE_ALL),
+            tally: Tally::default(),
+        }
+    }
+
+    /// The pass that comes next.
+    pub fn next_pass(&self) -> u64 {
+        self.gates.next_pass()
+    }
+
+    /// Appends the passes that follow.
+    pub fn append(&mut self, later: Block) {
+        self.gates.append(later.gates);
+        self.pixels.append(later.pixels);
+        self.tally.add(&later.tally);
+    }
+}
+
+impl Job {
+    /// Plays passes `start..end`. `stop` is asked between passes; a stopped block is dropped whole.
+    pub fn play(
+        &self,
+        stage: Stage,
+        start: u64,
+        end: u64,
+        keep_level: u32,
+        stop: &dyn Fn() -> bool,
+    ) -> Option<Block> {
+        let mut block = Block::empty(start, keep_level);
+        let mut scores = Scores::new(self.layout.clone());
+        let mut cpu = Duration::ZERO;
+        let wall = Instant::now();
+        for pass in start..end {
+            if stop() {
+                return None;
+            }
+            scores.clear();
+            let before = thread_cpu_time();
+            for group in &self.groups {
+                let key = match stage {
+                    Stage::Pilot => group.pilot,
+                    Stage::Main => group.main,
+                };
+                self.estimator.pass(&group.bands, &key.pass(pass), &mut scores);
+            }
+            cpu += thread_cpu_time().saturating_sub(before);
+            block.gates.push(scores.gates.iter().map(|&x| Moments::of(x)).collect());
+            block.pixels.push(ImageMoments::of(scores.pixels.clone()));
+        }
+        block.tally = Tally {
+            cost: scores.cost,
+            anomalies: scores.anomalies,
+            passes: end - start,
+            cpu_seconds: cpu.as_secs_f64(),
+            wall_seconds: wall.elapsed().as_secs_f64(),
+        };
+        Some(block)
+    }
+}

@@ -1,0 +1,154 @@
+//! From an experiment to jobs: every cell's scene, every estimator on it, the streams of both.
+
+use std::sync::Arc;
+
+use serde_json::json;
+
+use super::comparisons;
+use super::job::{Group, Job, band_groups};
+use super::keys::{Stage, StreamName};
+use super::memory::Estimate;
+use crate::error::{Error, Result};
+use crate::estimators::Layout;
+use crate::experiment::build::{self, Builder};
+use crate::experiment::registry::Registry;
+use crate::experiment::{CellSpec, Experiment};
+use crate::results::json::hash_json;
+use crate::results::provenance::fingerprint;
+use crate::results::record::{Band, Comparison, Observable};
+
+/// What a run will do.
+pub struct Plan {
+    /// The bands.
+    pub bands: Vec<Band>,
+    /// One job per cell and estimator, cells outermost.
+    pub jobs: Vec<Job>,
+    /// The claims, expanded.
+    pub comparisons: Vec<Comparison>,
+    /// Kind of each estimator.
+    pub kinds: Vec<String>,
+    shape_bytes: usize,
+}
+
+impl Plan {
+    /// Estimate of the memory it takes.
+    pub fn memory(&self, threads: usize) -> Estimate {
+        Estimate::new(&self.jobs, self.shape_bytes, threads)
+    }
+}
+
+/// Gate observables per cell that a record holds at most.
+const MOST_OBSERVABLES: usize = 4096;
+
+/// Builds everything an experiment needs; what cannot be built is found here, before any work.
+///
+/// # Errors
+/// Everything that only shows when it is built: meshes, maps, sensors inside bodies, claims on
+/// observables that do not exist.
+pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
+    let mut builder = Builder::new(experiment);
+    let bands = builder.bands().to_vec();
+    let inputs = build::inputs(experiment);
+    let mut jobs = Vec::new();
+    let mut observables = Vec::new();
+    let mut kinds = Vec::new();
+    for (index, cell) in experiment.cells.iter().enumerate() {
+        let scene = Arc::new(builder.scene(cell)?);
+        let layout = Layout::new(&scene);
+        observables.push(named(&layout));
+        if layout.observables().len() > MOST_OBSERVABLES {
+            return Err(Error::input_help(
+                format!("cell `{}` has {} observables", cell.label, layout.observables().len()),
+                format!("a record holds at most {MOST_OBSERVABLES}; lower the number of bins"),
+            ));
+        }
+        for (estimator_index, entry) in experiment.file.estimator.iter().enumerate() {
+            let (kind, options) = entry.kind.iter().next().ok_or_else(|| {
+                Error::input(format!("estimator `{}` has no kind", entry.name))
+            })?;
+            let registered = registry.get(kind).ok_or_else(|| {
+                Error::input(format!("estimator `{}`: unknown kind `{kind}`", entry.name))
+            })?;
+            if index == 0 {
+                kinds.push(kind.clone());
+            }
+            let estimator = (registered.build)(options, Arc::clone(&scene))?;
+            let groups = band_groups(estimator.band_use(), bands.len());
+            let groups = groups.into_iter().map(|group| streams(experiment, cell, &bands, &entry.name, group));
+            let label = match cell.label.as_str() {
+                "" => entry.name.clone(),
+                cell => format!("{cell} / {}", entry.name),
+            };
+            let identity = json!({
+                "fingerprint": fingerprint(),
+                "experiment": experiment.file.name,
+                "seed": experiment.file.seed,
+                "bands": bands,
+                "content": cell.content(),
+                "pair": experiment.file.pair,
+                "inputs": inputs,
+                "estimator": entry,
+            });
+            jobs.push(Job {
+                cell: index,
+                estimator_index,
+                label,
+                identity: hash_json(&identity),
+                groups: groups.collect(),
+                estimator,
+                layout: layout.clone(),
+                targets: vec![0],
+            });
+        }
+    }
+    let comparisons = comparisons::expand(experiment, &bands, &observables)?;
+    for job in &mut jobs {
+        job.targets = targets(experiment, job, &comparisons, &observables[job.cell]);
+    }
+    Ok(Plan { bands, jobs, comparisons, kinds, shape_bytes: builder.shape_bytes() })
+}
+
+fn streams(
+    experiment: &Experiment,
+    cell: &CellSpec,
+    bands: &[Band],
+    estimator: &str,
+    group: Vec<usize>,
+) -> Group {
+    let content = match &experiment.file.pair {
+        Some(pair) => cell.content_without(&pair.over),
+        None => cell.content(),
+    };
+    let names: Vec<&str> = group.iter().map(|&band| bands[band].name.as_str()).collect();
+    let key = |stage| {
+        let (experiment, seed) = (experiment.file.name.as_str(), experiment.file.seed);
+        StreamName { experiment, seed, content: &content, bands: &names, estimator, stage }.key()
+    };
+    Group { main: key(Stage::Main), pilot: key(Stage::Pilot), bands: group }
+}
+
+/// A layout's observables as the record names them.
+pub fn named(layout: &Layout) -> Vec<Observable> {
+    let name = |o: &crate::estimators::ObservableName| Observable {
+        name: o.name.clone(),
+        class: o.class.to_string(),
+    };
+    layout.observables().iter().map(name).collect()
+}
+
+/// The observables that claims name of a job; the sensor's first where none does.
+fn targets(
+    experiment: &Experiment,
+    job: &Job,
+    comparisons: &[Comparison],
+    observables: &[Observable],
+) -> Vec<usize> {
+    let estimator = &experiment.file.estimator[job.estimator_index].name;
+    let claimed = comparisons.iter().map(|comparison| &comparison.quantity);
+    let mine = claimed.filter(|q| q.cell == job.cell && q.estimator == *estimator);
+    let mut indices: Vec<usize> =
+        mine.filter_map(|q| observables.iter().position(|o| *o == q.observable)).collect();
+    indices.sort_unstable();
+    indices.dedup();
+    if indices.is_empty() { vec![0] } else { indices }
+}

@@ -1,0 +1,98 @@
+//! Names of random streams: what is hashed into their keys, and what is not.
+
+use serde_json::{Value, json};
+
+use crate::results::json::{canonical, hash_bytes};
+use crate::sampling::stream::StreamKey;
+
+/// Version of what enters a key; raising it re-rolls every experiment's dice.
+const KEY_VERSION: u32 = 1;
+
+/// What a sequence of passes is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// The short run that turns a budget into passes.
+    Pilot,
+    /// The run itself.
+    Main,
+}
+
+impl Stage {
+    fn name(self) -> &'static str {
+        match self {
+            Stage::Pilot => "pilot",
+            Stage::Main => "main",
+        }
+    }
+}
+
+/// Everything that names a sequence of passes. Absent on purpose: claims, budget, threads, block size,
+/// the order of a sweep, an estimator's options (so that options can be compared on one stream).
+#[derive(Clone, Debug)]
+pub struct StreamName<'a> {
+    /// Name of the experiment.
+    pub experiment: &'a str,
+    /// Its seed.
+    pub seed: u64,
+    /// The cell's physics in canonical form, without the keys that the experiment pairs over.
+    pub content: &'a Value,
+    /// Names of the bands that the passes score.
+    pub bands: &'a [&'a str],
+    /// Name of the estimator.
+    pub estimator: &'a str,
+    /// Stage.
+    pub stage: Stage,
+}
+
+impl StreamName<'_> {
+    /// The key of this sequence.
+    pub fn key(&self) -> StreamKey {
+        let name = json!({
+            "version": KEY_VERSION,
+            "experiment": self.experiment,
+            "seed": self.seed,
+            "content": self.content,
+            "bands": self.bands,
+            "estimator": self.estimator,
+            "stage": self.stage.name(),
+        });
+        StreamKey::new(hash_bytes(canonical(&name).as_bytes()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::stream::Purpose;
+
+    fn first(name: &StreamName) -> f64 {
+        name.key().pass(0).stream(0, Purpose::Walk).next()
+    }
+
+    /// Every part of the name changes the stream; equal names give equal streams.
+    #[test]
+    fn each_part_of_the_name_enters() {
+        let (a, b) = (json!({"radius_mm": 1.0}), json!({"radius_mm": 2.0}));
+        let base = StreamName {
+            experiment: "x",
+            seed: 1,
+            content: &a,
+            bands: &["R"],
+            estimator: "mis",
+            stage: Stage::Main,
+        };
+        let variants = [
+            StreamName { experiment: "y", ..base.clone() },
+            StreamName { seed: 2, ..base.clone() },
+            StreamName { content: &b, ..base.clone() },
+            StreamName { bands: &["G"], ..base.clone() },
+            StreamName { bands: &["R", "G"], ..base.clone() },
+            StreamName { estimator: "snee", ..base.clone() },
+            StreamName { stage: Stage::Pilot, ..base.clone() },
+        ];
+        assert_eq!(first(&base), first(&base.clone()));
+        for variant in variants {
+            assert_ne!(first(&base), first(&variant), "{variant:?}");
+        }
+    }
+}

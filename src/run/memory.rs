@@ -1,0 +1,97 @@
+//! What a run holds in memory, and whether it fits.
+
+use super::job::Job;
+use crate::error::{Error, Result};
+
+/// Estimate of a run's largest memory, bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Meshes.
+    pub shapes: usize,
+    /// Moments of gate observables and images of everything measured, kept until the record is written.
+    pub results: usize,
+    /// What the threads and the collector hold on top while playing.
+    pub working: usize,
+}
+
+impl Estimate {
+    /// For jobs on a number of threads.
+    ///
+    /// An image keeps mean and M2, 16 bytes a pixel and band. A finished job holds at most two of its
+    /// images (the tree's nodes sum to less than twice the widest, by count of passes up to 2^40) and
+    /// 128 batches of 5 moments per gate observable. A worker holds a binary counter's worth of images,
+    /// log2 of the passes in its block, and so does the collector per job under way.
+    pub fn new(jobs: &[Job], shapes: usize, threads: usize) -> Estimate {
+        let image = |job: &Job| 16 * job.layout.pixels() * job.layout.bands();
+        let gates = |job: &Job| 128 * 40 * job.layout.observables().len() * job.layout.bands();
+        let largest = jobs.iter().map(image).max().unwrap_or(0);
+        Estimate {
+            shapes,
+            results: jobs.iter().map(|job| 8 * image(job) + gates(job)).sum(),
+            working: threads * 12 * largest,
+        }
+    }
+
+    /// All of it.
+    pub fn total(&self) -> usize {
+        self.shapes + self.results + self.working
+    }
+
+    /// Refuses what does not fit into the memory that the system has to give.
+    ///
+    /// # Errors
+    /// More than nine tenths of the memory available.
+    pub fn check(&self, available: Option<usize>) -> Result<()> {
+        match available {
+            Some(available) if self.total() > available / 10 * 9 => Err(Error::input_help(
+                format!(
+                    "the run would need {} of memory and {} are available",
+                    readable(self.total()),
+                    readable(available)
+                ),
+                "lower the sensor's resolution, the number of bands or cells, or split the experiment; \
+                 `scatterproof plan` shows what needs how much",
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Memory that the system can give without swapping, bytes; `None` where it does not say.
+pub fn available() -> Option<usize> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let kib: usize = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// A number of bytes for people.
+pub fn readable(bytes: usize) -> String {
+    let units = ["B", "KiB", "MiB", "GiB", "TiB", "PiB"];
+    let mut value = bytes as f64;
+    let mut unit = 0;
+    while value >= 1024.0 && unit + 1 < units.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    if unit == 0 { format!("{bytes} B") } else { format!("{value:.1} {}", units[unit]) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let estimate = Estimate { shapes: 0, results: 950, working: 0 };
+        assert!(estimate.check(Some(1000)).is_err());
+        assert!(estimate.check(Some(2000)).is_ok());
+        assert!(estimate.check(None).is_ok());
+    }
+
+    #[test]
+    fn bytes_for_people() {
+        assert_eq!(readable(999), "999 B");
+        assert_eq!(readable(3 << 20), "3.0 MiB");
+    }
+}

@@ -1,0 +1,99 @@
+//! Budgets into passes. Stopping by the clock or by the error reached would bias a mean, so a pilot on
+//! streams of its own fixes an integer number of passes before the run starts.
+
+use super::job::Job;
+use super::keys::Stage;
+use crate::experiment::schema::{Budget, RelativeError};
+use crate::stats::moments::Moments;
+use crate::stats::tree::Counter;
+
+/// Fewest passes of a run: every batch of its record then holds at least one.
+pub const LEAST_PASSES: u64 = 128;
+
+/// The passes that a budget pays for; `None` where `stop` was raised.
+pub fn passes(job: &Job, budget: &Budget, stop: &dyn Fn() -> bool) -> Option<u64> {
+    match budget {
+        Budget::Passes(passes) => Some(*passes),
+        Budget::CpuSeconds(seconds) => for_seconds(job, *seconds, stop),
+        Budget::RelativeError(target) => for_error(job, target, stop),
+    }
+}
+
+/// Doubles the pilot until it has used a twentieth of the budget, then divides.
+fn for_seconds(job: &Job, seconds: f64, stop: &dyn Fn() -> bool) -> Option<u64> {
+    let mut passes = 1;
+    loop {
+        let cpu = job.play(Stage::Pilot, 0, passes, 0, stop)?.tally.cpu_seconds;
+        if cpu > seconds / 20.0 || passes >= 1 << 20 {
+            return Some(((seconds * passes as f64 / cpu) as u64).max(2));
+        }
+        passes *= 2;
+    }
+}
+
+/// Largest share of the run that a pilot may fall short of: it has at least 1/64 of the passes that it
+/// asks for, so that its variance rests on a part of the run and not on luck.
+const PILOT_SHARE: u64 = 64;
+/// A pilot longer than this would be the run.
+const LONGEST_PILOT: u64 = 1 << 17;
+
+/// Doubles the pilot until the passes that it predicts are at most [`PILOT_SHARE`] times its own. The
+/// prediction gets a tenth on top, because the pilot's variance is itself an estimate.
+fn for_error(job: &Job, target: &RelativeError, stop: &dyn Fn() -> bool) -> Option<u64> {
+    let mut pilot = Counter::new(0, Counter::<Vec<Moments>>::MERGE_ALL);
+    let mut length = LEAST_PASSES;
+    loop {
+        let more = job.play(Stage::Pilot, pilot.next_pass(), length, 0, stop)?;
+        for node in more.gates.nodes() {
+            pilot.push_node(node.level, node.value.clone());
+        }
+        let moments = pilot.clone().finish().unwrap_or_default();
+        let bands = job.layout.bands();
+        let wanted = job.targets.iter().flat_map(|t| &moments[t * bands..(t + 1) * bands]);
+        let needed = wanted.map(|m| needed_passes(m, target)).max().unwrap_or(0);
+        if needed <= PILOT_SHARE * length || length >= LONGEST_PILOT {
+            return Some((needed + needed / 10).clamp(LEAST_PASSES, PILOT_SHARE * LONGEST_PILOT));
+        }
+        length *= 2;
+    }
+}
+
+/// Passes until standard error over |mean| is at most the target; as many as can be where nothing has
+/// been seen yet.
+fn needed_passes(moments: &Moments, target: &RelativeError) -> u64 {
+    let (mean, variance) = (moments.mean.abs(), moments.variance());
+    if variance == 0.0 && mean == 0.0 {
+        return u64::MAX / 2;
+    }
+    let bound = match &target.small_values {
+        Some(small) if mean < small.below => small.at_most,
+        _ => target.at_most,
+    };
+    let needed = variance / (mean * mean * bound * bound);
+    needed.min(9e18).ceil() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::schema::SmallValues;
+
+    fn moments(mean: f64, sd: f64) -> Moments {
+        let mut moments = Moments::default();
+        for i in 0..1000 {
+            moments.push(mean + if i % 2 == 0 { sd } else { -sd });
+        }
+        moments
+    }
+
+    #[test]
+    fn error_targets_become_passes() {
+        let small_values = Some(SmallValues { below: 0.05, at_most: 0.02 });
+        let target = RelativeError { at_most: 0.01, small_values };
+        // (sd / (mean * target))^2
+        assert_eq!(needed_passes(&moments(1.0, 0.5), &target), 2503);
+        assert_eq!(needed_passes(&moments(0.04, 0.04), &target), 2503);
+        assert_eq!(needed_passes(&moments(2.0, 0.0), &target), 0);
+        assert!(needed_passes(&moments(0.0, 0.0), &target) > 1 << 60);
+    }
+}

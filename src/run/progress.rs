@@ -1,0 +1,40 @@
+//! Progress with an estimate of the time left, on terminals only. Door for `indicatif`.
+
+use std::io::IsTerminal;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// Steps of the bar per job: jobs count alike, passes are fractions of them.
+const STEPS: u64 = 1000;
+
+/// A bar on standard error, or nothing where that is no terminal.
+pub struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    /// For a number of jobs.
+    pub fn new(jobs: usize, quiet: bool) -> Progress {
+        let shown = !quiet && std::io::stderr().is_terminal();
+        let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(jobs as u64 * STEPS), target);
+        let style = "{wide_msg} [{bar:32}] {percent:>3}%  {elapsed} elapsed, {eta} left";
+        if let Ok(style) = ProgressStyle::with_template(style) {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        bar.enable_steady_tick(Duration::from_millis(250));
+        Progress { bar }
+    }
+
+    /// Jobs finished, the fraction of those under way, and what is being done.
+    pub fn update(&self, jobs_done: f64, message: String) {
+        self.bar.set_message(message);
+        self.bar.set_position((jobs_done * STEPS as f64) as u64);
+    }
+
+    /// Removes the bar.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
