@@ -52,7 +52,11 @@ impl Mesh {
     /// # Errors
     /// Everything that keeps it from bounding a body: no triangles, indices out of range, vertices
     /// that are not finite, triangles without area, edges and vertices where it is not a closed,
-    /// consistently oriented 2-manifold, components that are inside out.
+    /// consistently oriented 2-manifold, components that are inside out. Parts that run through each
+    /// other are not noticed.
+    ///
+    /// # Panics
+    /// If `normals` has not as many triangles as the mesh.
     pub fn new(
         vertices: Vec<DVec3>,
         triangles: Vec<[u32; 3]>,
@@ -60,12 +64,16 @@ impl Mesh {
         interpolated: bool,
     ) -> Result<Mesh> {
         topology::check(&vertices, &triangles)?;
+        if let Some(normals) = &normals {
+            assert_eq!(normals.corners.len(), triangles.len(), "normals for every triangle");
+        }
         let normals = interpolated
             .then(|| normals.unwrap_or_else(|| Normals::angle_weighted(&vertices, &triangles)));
         let corners = |t: &[u32; 3]| t.map(|i| vertices[i as usize]);
         let extent = extent(vertices.iter().copied());
         let frame = Frame::new(extent.0, extent.1);
-        let tree = Tree::new(frame, triangles.iter().map(|t| self::extent(corners(t).into_iter())));
+        let boxes = triangles.iter().map(|t| self::extent(corners(t).into_iter()));
+        let tree = Tree::new(frame, boxes)?;
         let leaves: Vec<Leaf> = tree
             .order()
             .iter()
@@ -195,7 +203,6 @@ mod tests {
     use super::super::testing::{Uniform, bodies, creature, direction, inward};
     use super::super::{Shape, procedural};
     use super::*;
-    use crate::math::ln;
 
     /// Rays against every triangle, over all bodies.
     const BRUTE_FORCE_RAYS: usize = 100_000;
@@ -281,6 +288,9 @@ mod tests {
                     let all = mesh.brute_force(&on, Side::Inside, Some(hit.face), f64::INFINITY);
                     assert_eq!(next, all, "{name} {on:?}");
                 }
+                // The face that a ray starts on is not there for it.
+                let beyond = mesh.intersect(&ray, side, Some(hit.face), f64::INFINITY);
+                assert!(beyond.is_none_or(|b| b.face != hit.face && b.t >= hit.t), "{name} {ray:?}");
             }
         }
         assert!(hits > BRUTE_FORCE_RAYS / 3, "{hits}");
@@ -363,49 +373,6 @@ mod tests {
                 // Interpolated ones follow the sphere far closer than the facets (0.07 rad) do.
                 let smooth = hit.shading_normal.distance(hit.point.normalize()) < 0.005;
                 assert!(if interpolated { smooth } else { hit.shading_normal == hit.normal });
-            }
-        }
-    }
-
-    /// `cargo test --release --lib throughput -- --ignored --nocapture`
-    #[test]
-    #[ignore = "prints figures, checks nothing"]
-    fn throughput() {
-        const RAYS: usize = 1_000_000;
-        for subdivisions in [6, 8] {
-            let start = std::time::Instant::now();
-            let mesh = procedural::bumpy_sphere(1.0, subdivisions, 0.1, 6.0, true).expect("closed");
-            let (built, count) = (start.elapsed().as_secs_f64(), mesh.triangles().len());
-            println!("{count} triangles: {built:.2} s, {} MB", mesh.heap_bytes() / 1_000_000);
-            let mut u = Uniform::new(6);
-            let rays: Vec<Ray> = (0..RAYS)
-                .map(|_| {
-                    let radius = 0.9 * crate::math::cbrt(u.next());
-                    Ray { origin: direction(&mut u) * radius, dir: direction(&mut u) }
-                })
-                .collect();
-            let measure = |what: &str, cast: &mut dyn FnMut(&Ray) -> bool| {
-                let start = std::time::Instant::now();
-                let hits = rays.iter().filter(|ray| cast(ray)).count();
-                let speed = RAYS as f64 / start.elapsed().as_secs_f64() / 1e6;
-                println!("  {what:32} {speed:7.2} Mrays/s, {hits} hits");
-            };
-            let inside = |t_max| {
-                let mesh = &mesh;
-                move |ray: &Ray| mesh.search(ray, Side::Inside, None, t_max).is_some()
-            };
-            measure("closest, from inside", &mut inside(f64::INFINITY));
-            measure("shadow, from outside", &mut |ray| {
-                mesh.occluded(&Ray { origin: ray.origin * 2.5, dir: ray.dir }, None)
-            });
-            for mean in [0.3, 0.1, 0.03, 0.01] {
-                let mut u = Uniform::new(7);
-                let mut t_max = move || -mean * ln(1.0 - u.next());
-                let mut again = t_max.clone();
-                measure(&format!("flights of {mean} R, tree"), &mut |ray| inside(t_max())(ray));
-                measure(&format!("flights of {mean} R, grid"), &mut |ray| {
-                    mesh.intersect(ray, Side::Inside, None, again()).is_some()
-                });
             }
         }
     }
