@@ -263,6 +263,22 @@ mod tests {
     }
 
     #[test]
+    fn planar_faces_are_never_met_from_themselves() {
+        let mut u = Uniform::new(4);
+        for shape in &shapes()[..3] {
+            for _ in 0..RAYS / 10 {
+                let origin = direction(&mut u) * 4.0;
+                let ray = Ray { origin, dir: direction(&mut u) };
+                let side = if shape.contains(origin) { Side::Inside } else { Side::Outside };
+                if let Some(hit) = shape.intersect(&ray, side, None, f64::INFINITY) {
+                    let again = shape.intersect(&ray, side, Some(hit.face), f64::INFINITY);
+                    assert!(again.is_none_or(|a| a.face != hit.face), "{shape:?} {ray:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_ray_from_the_very_edge_leaves_at_once() {
         let half = DVec3::ONE;
         let dir = DVec3::new(-0.6, 0.8, 0.0);

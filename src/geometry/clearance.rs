@@ -57,8 +57,7 @@ impl Clearance {
     /// A lower bound of the distance to the surface, units of the frame; 0 outside the grid.
     pub fn at(&self, point: DVec3) -> f64 {
         let cell = (point - self.corner) * (1.0 / CELL);
-        // A negative number, or NaN, fails the test here and not as a cast to 0.
-        if !(cell.min_element() >= 0.0) {
+        if cell.min_element() < 0.0 {
             return 0.0;
         }
         let [i, j, k] = cell.to_array().map(|c| c as usize);
@@ -98,7 +97,7 @@ impl Clearance {
         let n = self.cells[axis];
         let stride: usize = self.cells[..axis].iter().product();
         let mut line = vec![0; n];
-        for start in (0..field.len()).filter(|i| (i / stride) % n == 0) {
+        for start in (0..field.len()).filter(|i| (i / stride).is_multiple_of(n)) {
             for (i, value) in line.iter_mut().enumerate() {
                 *value = field[start + i * stride];
             }

@@ -52,7 +52,11 @@ impl Mesh {
     /// # Errors
     /// Everything that keeps it from bounding a body: no triangles, indices out of range, vertices
     /// that are not finite, triangles without area, edges and vertices where it is not a closed,
-    /// consistently oriented 2-manifold, components that are inside out.
+    /// consistently oriented 2-manifold, components that are inside out. Parts that run through each
+    /// other are not noticed.
+    ///
+    /// # Panics
+    /// If `normals` has not as many triangles as the mesh.
     pub fn new(
         vertices: Vec<DVec3>,
         triangles: Vec<[u32; 3]>,
@@ -60,12 +64,16 @@ impl Mesh {
         interpolated: bool,
     ) -> Result<Mesh> {
         topology::check(&vertices, &triangles)?;
+        if let Some(normals) = &normals {
+            assert_eq!(normals.corners.len(), triangles.len(), "normals for every triangle");
+        }
         let normals = interpolated
             .then(|| normals.unwrap_or_else(|| Normals::angle_weighted(&vertices, &triangles)));
         let corners = |t: &[u32; 3]| t.map(|i| vertices[i as usize]);
         let extent = extent(vertices.iter().copied());
         let frame = Frame::new(extent.0, extent.1);
-        let tree = Tree::new(frame, triangles.iter().map(|t| self::extent(corners(t).into_iter())));
+        let boxes = triangles.iter().map(|t| self::extent(corners(t).into_iter()));
+        let tree = Tree::new(frame, boxes)?;
         let leaves: Vec<Leaf> = tree
             .order()
             .iter()
@@ -188,4 +196,184 @@ fn bounding_sphere((min, max): (DVec3, DVec3), vertices: &[DVec3]) -> BoundingSp
     let center = (min + max) * 0.5;
     let reach = vertices.iter().map(|v| v.distance(center)).fold(0.0, f64::max);
     BoundingSphere { center, radius: reach * (1.0 + 4.0 * f64::EPSILON) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Uniform, bodies, creature, direction, inward};
+    use super::super::{Shape, procedural};
+    use super::*;
+
+    /// Rays against every triangle, over all bodies.
+    const BRUTE_FORCE_RAYS: usize = 100_000;
+
+    impl Mesh {
+        /// [`Mesh::search`] without the tree.
+        fn brute_force(&self, ray: &Ray, side: Side, from: Option<FaceId>, t_max: f64) -> Option<Hit> {
+            let sheared = Sheared::new(ray, side);
+            let mut nearest = Nearest { t: t_max, triangle: u32::MAX, found: None };
+            for slot in 0..self.leaves.len() {
+                if let Some((crossing, triangle)) = self.meet(&sheared, slot, from) {
+                    nearest.offer(crossing, triangle, slot);
+                }
+            }
+            nearest.found.map(|(crossing, slot)| self.hit(crossing, slot))
+        }
+
+        fn some_corners(&self, u: &mut Uniform) -> [DVec3; 3] {
+            self.leaves[(u.next() * self.leaves.len() as f64) as usize].corners
+        }
+    }
+
+    /// Origins in and around the body, from afar, and 1e-9 off the surface.
+    fn some_origin(mesh: &Mesh, u: &mut Uniform) -> DVec3 {
+        let BoundingSphere { center, radius } = mesh.bounds();
+        match (u.next() * 4.0) as u32 {
+            0 => center + direction(u) * (1e6 * radius),
+            1 => {
+                let [a, b, c] = mesh.some_corners(u);
+                let sign = if u.next() < 0.5 { 1e-9 } else { -1e-9 };
+                a * 0.5 + b * 0.3 + c * 0.2 + triangle::normal(&[a, b, c]) * (sign * radius)
+            }
+            _ => center + direction(u) * (u.next() * 1.5 * radius),
+        }
+    }
+
+    /// Random directions, signed axes with signed zeros, and aims at points of triangles, edges and
+    /// vertices.
+    fn some_dir(mesh: &Mesh, origin: DVec3, u: &mut Uniform) -> DVec3 {
+        let [a, b, c] = mesh.some_corners(u);
+        let s = u.next();
+        match (u.next() * 5.0) as u32 {
+            0 => direction(u),
+            1 => {
+                let mut dir = DVec3::ZERO.copysign(direction(u));
+                let axis = (s * 3.0) as usize;
+                dir[axis] = 1.0f64.copysign(dir[axis]);
+                dir
+            }
+            2 => (a * 0.2 + b * s * 0.8 + c * (0.8 - s * 0.8) - origin).normalize(),
+            3 => (a + (b - a) * s - origin).normalize(),
+            _ => (a - origin).normalize(),
+        }
+    }
+
+    #[test]
+    fn the_tree_finds_what_all_triangles_tell() {
+        let mut u = Uniform::new(1);
+        let bodies: Vec<_> = bodies().into_iter().filter(|b| b.1.triangle_count() < 6000).collect();
+        assert!(bodies.len() >= 5);
+        let mut hits = 0;
+        for (name, shape) in &bodies {
+            let Shape::Mesh(mesh) = shape else { unreachable!("bodies are meshes") };
+            for _ in 0..BRUTE_FORCE_RAYS / bodies.len() {
+                let origin = some_origin(mesh, &mut u);
+                let ray = Ray { origin, dir: some_dir(mesh, origin, &mut u) };
+                let side = if u.next() < 0.5 { Side::Inside } else { Side::Outside };
+                let all = mesh.brute_force(&ray, side, None, f64::INFINITY);
+                assert_eq!(mesh.intersect(&ray, side, None, f64::INFINITY), all, "{name} {ray:?}");
+                if side == Side::Outside {
+                    assert_eq!(shape.occluded(&ray, None), all.is_some(), "{name} {ray:?}");
+                }
+                let Some(hit) = all else { continue };
+                hits += 1;
+                // A flight that ends at the hit sees it, one that ends before does not.
+                assert_eq!(mesh.intersect(&ray, side, None, hit.t), all, "{name} {ray:?}");
+                let before = hit.t.next_down();
+                assert_eq!(mesh.intersect(&ray, side, None, before), None, "{name} {ray:?}");
+                // And on from there.
+                let on = Ray { origin: hit.point, dir: inward(hit.normal, &mut u) };
+                let next = mesh.intersect(&on, Side::Inside, Some(hit.face), f64::INFINITY);
+                if hits % 8 == 0 {
+                    let all = mesh.brute_force(&on, Side::Inside, Some(hit.face), f64::INFINITY);
+                    assert_eq!(next, all, "{name} {on:?}");
+                }
+                // The face that a ray starts on is not there for it.
+                let beyond = mesh.intersect(&ray, side, Some(hit.face), f64::INFINITY);
+                assert!(beyond.is_none_or(|b| b.face != hit.face && b.t >= hit.t), "{name} {ray:?}");
+            }
+        }
+        assert!(hits > BRUTE_FORCE_RAYS / 3, "{hits}");
+    }
+
+    /// In a thin wall of triangles that fit the padding's last bit a false cull would show most: a
+    /// ray through a plane of axis-parallel triangles, its components near and below 2^-23.
+    #[test]
+    fn nearly_axis_parallel_rays_are_not_culled() {
+        let plate = procedural::drilled_box(DVec3::new(1.0, 1.0, 1e-7), [8, 8], 0.5).expect("closed");
+        let mut u = Uniform::new(2);
+        for i in 0..100_000 {
+            let tilt = 2.0f64.powi(-20 - (i % 8)) * (u.next() - 0.5);
+            let dir = DVec3::new(1.0, tilt, -tilt * 1e-3).normalize();
+            let corner = plate.some_corners(&mut u)[0];
+            for origin in [corner - dir * u.next(), DVec3::new(-0.6, corner.y, 4e-8)] {
+                let ray = Ray { origin, dir };
+                for side in [Side::Inside, Side::Outside] {
+                    let found = plate.search(&ray, side, None, f64::INFINITY);
+                    if i % 50 == 0 {
+                        let all = plate.brute_force(&ray, side, None, f64::INFINITY);
+                        assert_eq!(found, all, "{ray:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn scaling_by_powers_of_two_scales_every_bit() {
+        let original = creature();
+        let radius = original.bounds().radius;
+        for k in -20..20 {
+            let scale = 2.0f64.powi(k);
+            let vertices = original.vertices().iter().map(|&v| v * scale).collect();
+            let mesh = Mesh::new(vertices, original.triangles().to_vec(), None, true);
+            let mesh = mesh.expect("closed");
+            let mut u = Uniform::new(3);
+            for _ in 0..1000 {
+                let origin = some_origin(&original, &mut u);
+                let ray = Ray { origin, dir: some_dir(&original, origin, &mut u) };
+                let scaled = Ray { origin: origin * scale, dir: ray.dir };
+                let t_max = if u.next() < 0.5 { f64::INFINITY } else { radius * u.next() };
+                for side in [Side::Inside, Side::Outside] {
+                    let expected = original.intersect(&ray, side, None, t_max).map(|hit| Hit {
+                        t: hit.t * scale,
+                        point: hit.point * scale,
+                        ..hit
+                    });
+                    let found = mesh.intersect(&scaled, side, None, t_max * scale);
+                    assert_eq!(found, expected, "2^{k} {ray:?}");
+                }
+                assert_eq!(mesh.contains(scaled.origin), original.contains(origin));
+            }
+        }
+    }
+
+    #[test]
+    fn inside_is_between_the_spheres() {
+        let mesh = procedural::cavity_sphere(5.0, 2.0, 4, false).expect("closed");
+        let mut u = Uniform::new(4);
+        for _ in 0..20_000 {
+            let r = 6.0 * u.next();
+            // The polyhedra lie a little below their spheres.
+            if (1.97..2.0).contains(&r) || (4.9..5.0).contains(&r) {
+                continue;
+            }
+            assert_eq!(mesh.contains(direction(&mut u) * r), (2.0..4.95).contains(&r), "{r}");
+        }
+    }
+
+    #[test]
+    fn shading_normals_are_interpolated_only_if_asked() {
+        let mut u = Uniform::new(5);
+        for interpolated in [false, true] {
+            let mesh = procedural::icosphere(1.0, 3, interpolated).expect("closed");
+            for _ in 0..10_000 {
+                let ray = Ray { origin: DVec3::ZERO, dir: direction(&mut u) };
+                let hit = mesh.intersect(&ray, Side::Inside, None, f64::INFINITY).expect("inside");
+                // Interpolated ones follow the sphere far closer than the facets (0.07 rad) do.
+                let smooth = hit.shading_normal.distance(hit.point.normalize()) < 0.005;
+                assert!(if interpolated { smooth } else { hit.shading_normal == hit.normal });
+            }
+        }
+    }
 }

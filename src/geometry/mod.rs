@@ -11,6 +11,8 @@ mod obj;
 pub mod procedural;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+mod throughput;
 mod topology;
 mod tree;
 mod triangle;
@@ -111,7 +113,9 @@ pub enum Shape {
 impl Shape {
     /// The closest crossing with `t` in (0, `t_max`] at which a ray that travels on `side` leaves
     /// it: `dir . normal > 0` for a ray inside, `< 0` outside. Crossings of the other orientation
-    /// are not seen, so a ray that starts on the surface meets no rounding ghost of a neighbour.
+    /// are not seen, so a ray that starts on the surface meets no rounding ghost of a neighbour. On
+    /// a mesh the orientation is exact; where a ray grazes, the dot product with the rounded normal
+    /// may come out as zero or with the other sign.
     ///
     /// `from` is the face that the ray starts on. A planar face is never met again; the sphere
     /// reports its other root. The ray must start on `side`, or on the surface and go to `side`;

@@ -4,6 +4,7 @@ use super::{Mesh, Shape, procedural};
 use crate::math::DVec3;
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the tests' own source of uniform numbers in [0, 1).
+#[derive(Clone)]
 pub struct Uniform(u64);
 
 impl Uniform {

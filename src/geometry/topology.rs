@@ -269,3 +269,33 @@ impl Sets {
         self.0[a.max(b) as usize] = a.min(b);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(vertices: &[DVec3], triangles: &[[u32; 3]]) -> String {
+        check(vertices, triangles).expect_err("refused").to_string()
+    }
+
+    #[test]
+    fn indices_out_of_range_are_refused() {
+        let error = message(&[DVec3::ZERO, DVec3::X, DVec3::Y], &[[0, 1, 3]]);
+        assert!(error.contains("[0, 1, 3] points beyond the mesh's 3 vertices"), "{error}");
+    }
+
+    #[test]
+    fn slivers_of_rounding_are_without_area() {
+        let tip = DVec3::new(1.0, 3.0, 7.0) / 10.0;
+        assert!(has_no_area([DVec3::ZERO, tip, tip * 3.0]));
+        assert!(!has_no_area([DVec3::ZERO, tip, tip * 3.0 + DVec3::X * 1e-12]));
+    }
+
+    #[test]
+    fn only_the_first_places_are_named() {
+        let vertices: Vec<DVec3> = (0..6).map(|i| DVec3::new(f64::NAN, i as f64, 0.0)).collect();
+        let error = message(&vertices, &[[0, 1, 2]]);
+        assert!(error.contains("6 vertices are not finite"), "{error}");
+        assert!(error.contains("vertex 2") && !error.contains("vertex 3"), "{error}");
+    }
+}

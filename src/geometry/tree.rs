@@ -38,6 +38,7 @@ use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::ray::{Ray as CullRay, RayHit};
 
 use super::Ray;
+use crate::error::{Error, Result};
 use crate::math::{DVec3, Vec3};
 
 /// Start of the f32 ray before the true origin, units of the frame.
@@ -45,6 +46,10 @@ const BEHIND: f64 = 0.015625;
 
 /// Growth of every box on every side, units of the frame.
 pub const PAD: f64 = 0.0078125;
+
+/// Levels that a traversal can hold: obvhs keeps a stack of 32 and overwrites its last entry, and
+/// so forgets a part of the mesh, when there are more.
+const MAX_DEPTH: usize = 32;
 
 /// The normalised units.
 #[derive(Clone, Copy, Debug)]
@@ -101,6 +106,19 @@ impl Frame {
     }
 }
 
+/// Number of levels of nodes.
+fn depth(bvh: &CwBvh) -> usize {
+    let mut deepest = 0;
+    let mut open = vec![(0, 1)];
+    while let Some((index, level)) = open.pop() {
+        let node = &bvh.nodes[index as usize];
+        deepest = deepest.max(level);
+        let children = node.child_base_idx..node.child_base_idx + node.imask.count_ones();
+        open.extend(children.map(|child| (child, level + 1)));
+    }
+    deepest
+}
+
 /// An f32 above the number.
 fn round_up(x: f64) -> f32 {
     (x as f32).next_up()
@@ -116,12 +134,20 @@ pub struct Tree {
 
 impl Tree {
     /// Builds the tree over boxes (least and greatest corner, mm).
-    pub fn new(frame: Frame, boxes: impl Iterator<Item = (DVec3, DVec3)>) -> Tree {
+    ///
+    /// # Errors
+    /// If it gets too deep to be traversed.
+    pub fn new(frame: Frame, boxes: impl Iterator<Item = (DVec3, DVec3)>) -> Result<Tree> {
         let corner = |point: DVec3, pad: f64| (frame.place(point) + pad).as_vec3().into();
         let boxes: Vec<Aabb> =
             boxes.map(|(min, max)| Aabb::new(corner(min, -PAD), corner(max, PAD))).collect();
         let bvh = build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Default::default());
-        Tree { frame, bvh }
+        let depth = depth(&bvh);
+        if depth > MAX_DEPTH {
+            let rule = format!("the mesh needs a search tree of {depth} levels, of {MAX_DEPTH} at most");
+            return Err(Error::input_help(rule, "remesh it: its triangles differ too much in size"));
+        }
+        Ok(Tree { frame, bvh })
     }
 
     /// Slot -> box: the order in which a visit finds neighbours close in memory.
@@ -148,5 +174,32 @@ impl Tree {
     /// Memory behind the tree, bytes.
     pub fn heap_bytes(&self) -> usize {
         size_of_val(&*self.bvh.nodes) + size_of_val(&*self.bvh.primitive_indices)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_counts_levels() {
+        let row = |count: usize| {
+            let boxes = (0..count).map(|i| (DVec3::splat(i as f64), DVec3::splat(i as f64 + 1.0)));
+            let frame = Frame::new(DVec3::ZERO, DVec3::splat(count as f64));
+            depth(&Tree::new(frame, boxes).expect("shallow").bvh)
+        };
+        assert_eq!(row(1), 1);
+        // Eight children of three boxes at most.
+        assert!((4..=12).contains(&row(4096)), "{}", row(4096));
+    }
+
+    #[test]
+    fn the_longest_side_is_1024_to_2048_units() {
+        for side in [1e-60, 0.3, 1.0, 1.0f64.next_down(), 7.0, 1e60] {
+            let frame = Frame::new(DVec3::ZERO, DVec3::new(0.5 * side, side, 0.0));
+            let length = side * frame.scale;
+            assert!((1024.0..2048.0).contains(&length), "{side} {length}");
+            assert_eq!(frame.scale.to_bits() << 12, 0, "a power of two");
+        }
     }
 }

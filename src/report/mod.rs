@@ -1,1 +1,192 @@
-//! Stub.
+//! Tables and images for people, made from a record and its timing alone, again at will.
+
+use serde_json::{Value, json};
+
+use crate::error::Result;
+use crate::results::exr_file::write_exr;
+use crate::results::image::{Picture, write_png};
+use crate::results::measurements::{self, Measurement, measurements};
+use crate::results::provenance::Provenance;
+use crate::results::record::{Cell, EstimatorRun};
+use crate::results::store::{RecordFolder, Stored};
+use crate::results::timing::Timing;
+use crate::results::{atomic, json::canonical};
+use crate::verify::judge::judge;
+use crate::verify::verdict::{self, Verdict};
+
+/// Bytes as text, for data URIs.
+mod base64;
+/// A page as blocks, in Markdown.
+pub mod document;
+/// The same page as HTML.
+pub mod html;
+/// Numbers with their uncertainty.
+pub mod number;
+/// What the page says.
+mod page;
+/// Aligned text, Markdown and CSV.
+pub mod table;
+
+/// Everything that a report is made from.
+pub struct Material {
+    /// The record.
+    pub stored: Stored,
+    /// What it cost, where it was measured.
+    pub timing: Option<Timing>,
+    /// What made it, where it was noted.
+    pub provenance: Option<Provenance>,
+    /// What verification says of it.
+    pub verdicts: Vec<Verdict>,
+    /// Everything that was measured.
+    pub rows: Vec<Measurement>,
+    /// The pictures, in the order of cells and estimators.
+    pub figures: Vec<Figure>,
+}
+
+/// A picture of one run.
+pub struct Figure {
+    /// Cell label.
+    pub cell: String,
+    /// Estimator name.
+    pub estimator: String,
+    /// Path relative to the results folder, without extension.
+    pub stem: String,
+    /// The PNG file.
+    pub png: Vec<u8>,
+    /// What it shows and what it cannot.
+    pub caption: String,
+}
+
+/// Makes every derived view of a results folder: `measurements.csv`, `verdicts.csv`, `summary.json`,
+/// `images/`, `report.md` and `report.html`. The record is judged as a family of its own at `level`.
+pub fn write(folder: &RecordFolder, level: f64) -> Result<Material> {
+    let stored = folder.read()?;
+    let (timing, provenance) = (folder.read_timing()?, folder.read_provenance()?);
+    let verdicts = judge(&[&stored], level);
+    let rows = measurements(&stored, timing.as_ref());
+    let figures = write_figures(folder, &stored)?;
+    let material = Material { stored, timing, provenance, verdicts, rows, figures };
+    let page = page::page(&material, level);
+    let views = [
+        ("measurements.csv", measurements::to_csv(&material.rows)),
+        ("verdicts.csv", verdict::to_csv(&material.verdicts)),
+        ("summary.json", canonical(&summary(&material))),
+        ("report.md", page.to_markdown()),
+        ("report.html", html::to_html(&page)),
+    ];
+    for (name, text) in views {
+        folder.write_view(name, text.as_bytes())?;
+    }
+    Ok(material)
+}
+
+/// The numbers of a record for programs: what was measured and how many claims hold.
+fn summary(material: &Material) -> Value {
+    let count = |name: &str| material.verdicts.iter().filter(|v| v.outcome.to_string() == name).count();
+    let record = &material.stored.record;
+    json!({
+        "experiment": record.experiment,
+        "experiment_hash": record.experiment_hash,
+        "claims_hash": record.claims_hash,
+        "fingerprint": record.fingerprint,
+        "exit_code": verdict::exit_code(&material.verdicts),
+        "verdicts": {
+            "pass": count("pass"),
+            "fail": count("fail"),
+            "underpowered": count("underpowered"),
+            "invalid": count("invalid"),
+        },
+        "measurements": material.rows,
+    })
+}
+
+fn write_figures(folder: &RecordFolder, stored: &Stored) -> Result<Vec<Figure>> {
+    let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
+    let mut figures = Vec::new();
+    for (index, cell) in stored.record.cells.iter().enumerate() {
+        for run in &cell.runs {
+            if let Some(picture) = Picture::of(stored, run) {
+                figures.push(write_figure(folder, stored, (index, cell), run, &picture, stops)?);
+            }
+        }
+    }
+    Ok(figures)
+}
+
+fn write_figure(
+    folder: &RecordFolder,
+    stored: &Stored,
+    (index, cell): (usize, &Cell),
+    run: &EstimatorRun,
+    picture: &Picture,
+    stops: f64,
+) -> Result<Figure> {
+    let stem = format!("images/{index:03}-{}", run.estimator);
+    let path = |extension: &str| folder.root().join(format!("{stem}.{extension}"));
+    atomic::create_folder(&folder.root().join("images"), "create the image folder")?;
+    let attributes = [
+        ("experiment", stored.record.experiment.as_str()),
+        ("cell", &cell.label),
+        ("estimator", &run.estimator),
+        ("passes", &run.passes.to_string()),
+        ("fingerprint", &stored.record.fingerprint),
+    ];
+    write_exr(&path("exr"), picture, &attributes)?;
+    let png = write_png(&path("png"), picture, stops)?;
+    let mut caption = format!("{} passes, exposure {stops:+} stops, clipped to sRGB", run.passes);
+    if png.clipped > 0 {
+        caption += &format!("; {} pixels too bright", png.clipped);
+    }
+    if png.out_of_gamut > 0 {
+        caption += &format!("; {} pixels outside the gamut or not finite", png.out_of_gamut);
+    }
+    let (cell, estimator) = (cell.label.clone(), run.estimator.clone());
+    Ok(Figure { cell, estimator, stem, png: png.bytes, caption })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::sample;
+    use crate::results::timing::Cost;
+    use crate::verify::judge::FAMILY_LEVEL;
+
+    #[test]
+    fn views_are_made_from_the_folder_alone_and_again() {
+        let temp = tempfile::tempdir().expect("a folder");
+        let folder = RecordFolder::new(temp.path().join("sample"));
+        let mut stored = sample::judged(&[("holds", 1.0), ("does <not>", 2.0)]);
+        stored.record.cells[0].runs[0].anomalies.insert("wrong_side".into(), 3);
+        stored.record.cells[0].runs[1].notes.push("cannot sample x".into());
+        folder.write(stored.record, stored.arrays).expect("a record");
+        let mut timing = Timing::default();
+        timing.add(
+            "smooth",
+            "mis",
+            Cost { cpu_seconds: 2.0, wall_seconds: 1.0, passes: 256, paths: 1000 },
+        );
+        folder.write_timing(&timing).expect("a timing");
+        folder.write_provenance(&Provenance::collect(2)).expect("a provenance");
+        write(&folder, FAMILY_LEVEL).expect("a report");
+
+        let read = |name: &str| std::fs::read_to_string(folder.root().join(name)).expect(name);
+        let (markdown, html) = (read("report.md"), read("report.html"));
+        let wanted = [
+            "does &lt;not&gt;",
+            "wrong_side",
+            "cannot sample x",
+            "data:image/png;base64,iVBOR",
+            "class=\"fail\"",
+        ];
+        wanted.iter().for_each(|w| assert!(html.contains(w), "{w}"));
+        assert!(!html.contains("http"), "nothing is fetched");
+        assert!(markdown.contains("](images/000-mis.png)"), "{markdown}");
+        assert!(markdown.contains("500 / s"), "{markdown}");
+        let summary: Value = serde_json::from_str(&read("summary.json")).expect("JSON");
+        assert_eq!((&summary["verdicts"]["pass"], &summary["exit_code"]), (&json!(1), &json!(1)));
+        assert_eq!(read("verdicts.csv").lines().count(), 3);
+
+        write(&folder, FAMILY_LEVEL).expect("a report");
+        assert_eq!((read("report.md"), read("report.html")), (markdown, html));
+    }
+}

@@ -112,8 +112,10 @@ impl RecordFolder {
 
     /// Writes a record, with the checksums of its arrays filled in, and returns it as written. An
     /// earlier record stays as it was until this one is complete.
-    pub fn write(&self, record: &Record, arrays: &Arrays) -> Result<Record> {
-        let stored = Stored { record: sealed(record, arrays), arrays: arrays.clone() };
+    pub fn write(&self, mut record: Record, arrays: Arrays) -> Result<Stored> {
+        let checksums = arrays.iter().map(|(name, array)| (name.clone(), hash_hex(&array.to_npy())));
+        record.checksums = checksums.collect();
+        let stored = Stored { record, arrays };
         if let Some(defect) = stored.defect() {
             return Err(Error::record(&self.root, format!("will not write a record whose {defect}")));
         }
@@ -125,7 +127,7 @@ impl RecordFolder {
         if written.is_err() {
             let _ = fs::remove_dir_all(&stage);
         }
-        written.map(|()| stored.record)
+        written.map(|()| stored)
     }
 
     /// Reads a record and checks version, checksums and shapes.
@@ -168,7 +170,7 @@ impl RecordFolder {
         self.read_json("provenance.json")
     }
 
-    /// Writes a file beside the record, creating folders on its way; returns its path.
+    /// Writes a file beside the record, creating folders on its way.
     pub fn write_view(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let path = self.root.join(name);
         atomic::create_folder(path.parent().unwrap_or(&self.root), "create the results folder")?;
@@ -193,12 +195,6 @@ impl RecordFolder {
     fn aside(&self) -> PathBuf {
         self.root.join(".record.old")
     }
-}
-
-/// The record with the checksums of its arrays.
-fn sealed(record: &Record, arrays: &Arrays) -> Record {
-    let checksums = arrays.iter().map(|(name, array)| (name.clone(), hash_hex(&array.to_npy())));
-    Record { checksums: checksums.collect(), ..record.clone() }
 }
 
 /// Writes all files of a record into a fresh folder.

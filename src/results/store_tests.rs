@@ -9,8 +9,8 @@ use super::*;
 fn written() -> (TempDir, RecordFolder, Stored) {
     let temp = tempfile::tempdir().expect("a folder");
     let folder = RecordFolder::new(temp.path().join("sample"));
-    let mut stored = sample::stored(0.5);
-    stored.record = folder.write(&stored.record, &stored.arrays).expect("a written record");
+    let Stored { record, arrays } = sample::stored(0.5);
+    let stored = folder.write(record, arrays).expect("a written record");
     (temp, folder, stored)
 }
 
@@ -36,7 +36,7 @@ fn reads_back_what_was_written_and_writes_the_same_bytes() {
     assert_eq!(folder.read().expect("a record"), stored);
     let path = folder.record_dir().join("record.json");
     let before = fs::read(&path).expect("bytes");
-    folder.write(&stored.record, &stored.arrays).expect("a written record");
+    folder.write(stored.record, stored.arrays).expect("a written record");
     assert_eq!(fs::read(&path).expect("bytes"), before);
     let mut names: Vec<_> =
         fs::read_dir(folder.root()).expect("a folder").map(|e| e.expect("e").file_name()).collect();
@@ -118,7 +118,7 @@ fn a_path_that_leaves_the_folder() {
 fn will_not_write_what_does_not_fit_or_read_back() {
     let (_temp, folder, stored) = written();
     let refused = |record: &Record, arrays: &Arrays, what: &str| {
-        let error = folder.write(record, arrays).expect_err("a refusal").to_string();
+        let error = folder.write(record.clone(), arrays.clone()).expect_err("a refusal").to_string();
         assert!(error.contains(what), "{error}");
         assert_eq!(folder.read().expect("the old record"), stored);
         assert!(!folder.root().join(".record.new").exists());
@@ -137,7 +137,7 @@ fn a_folder_that_cannot_be_written() {
     fs::write(temp.path().join("file"), b"").expect("a file");
     let stored = sample::stored(0.5);
     let folder = RecordFolder::new(temp.path().join("file/sample"));
-    let error = folder.write(&stored.record, &stored.arrays).expect_err("a refusal").to_string();
+    let error = folder.write(stored.record, stored.arrays).expect_err("a refusal").to_string();
     assert!(
         error.contains("could not create the results folder") && error.contains("file/sample"),
         "{error}"

@@ -88,7 +88,11 @@ impl<T: Merge> Counter<T> {
             "a node of level {level} cannot be cut to {}",
             self.keep_level
         );
-        assert!(level < 64 && self.next % (1 << level) == 0, "level {level} at pass {}", self.next);
+        assert!(
+            level < 64 && self.next.is_multiple_of(1 << level),
+            "level {level} at pass {}",
+            self.next
+        );
         self.next += 1 << level;
         let mut node = Node { level, value };
         while node.level < self.keep_level
@@ -125,7 +129,7 @@ impl<T: Merge> Counter<T> {
     /// Does the node of `level` that ends at the next pass begin at a multiple of its own size, so
     /// that the two nodes before that pass are its halves?
     fn starts_at_even_index(&self, level: u32) -> bool {
-        level < 64 && self.next % (1 << level) == 0
+        level < 64 && self.next.is_multiple_of(1 << level)
     }
 }
 

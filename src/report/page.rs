@@ -1,0 +1,143 @@
+//! What the page says: claims and verdicts first, then what was measured, then what it cost and how
+//! to make it again.
+
+use super::Material;
+use super::document::{Block, Document, FigureBlock};
+use super::number::significant;
+use super::table::{Table, measurement_table, verdict_table};
+use crate::results::measurements::Measurement;
+use crate::verify::verdict::Outcome;
+
+/// The page of one record.
+pub(super) fn page(material: &Material, level: f64) -> Document {
+    let mut blocks = claims(material, level);
+    blocks.extend(measured(material));
+    blocks.extend(cost(material));
+    blocks.extend(notes(material));
+    blocks.extend(origin(material));
+    Document { title: material.stored.record.experiment.clone(), blocks }
+}
+
+fn heading(text: &str) -> Block {
+    Block::Heading(2, text.into())
+}
+
+fn claims(material: &Material, level: f64) -> Vec<Block> {
+    let verdicts = &material.verdicts;
+    if verdicts.is_empty() {
+        return vec![heading("Claims"), Block::Text("This experiment claims nothing.".into())];
+    }
+    let green = verdicts.iter().filter(|v| v.is_green()).count();
+    let failed = verdicts.iter().filter(|v| v.outcome == Outcome::Fail).count();
+    let text = format!(
+        "{green} of {} comparisons hold, {failed} fail, {} could not be judged. The probability of any false \
+         failure among them is below {level:.0e} (Holm). \"detectable\" is the smallest true difference, relative \
+         to the expected value (absolute where that is 0), that its test would have found with 99 % probability.",
+        verdicts.len(),
+        verdicts.len() - green - failed,
+    );
+    // What is not green comes first.
+    let mut ordered = verdicts.clone();
+    ordered.sort_by_key(|v| v.is_green());
+    vec![heading("Claims"), Block::Text(text), Block::Table(verdict_table(&ordered))]
+}
+
+fn measured(material: &Material) -> Vec<Block> {
+    let record = &material.stored.record;
+    let bands: Vec<String> = record.bands.iter().map(|band| band.name.clone()).collect();
+    let text = "Means over passes; in brackets one standard error in units of the last digit.";
+    let mut blocks = vec![heading("Measurements"), Block::Text(text.into())];
+    for cell in &record.cells {
+        if !cell.label.is_empty() {
+            blocks.push(Block::Heading(3, cell.label.clone()));
+        }
+        let rows: Vec<&Measurement> =
+            material.rows.iter().filter(|row| row.cell == cell.label).collect();
+        blocks.push(Block::Table(measurement_table(&rows, &bands)));
+        let figures = material.figures.iter().filter(|figure| figure.cell == cell.label);
+        let figures: Vec<FigureBlock> = figures.map(figure_block).collect();
+        if !figures.is_empty() {
+            blocks.push(Block::Figures(figures));
+        }
+    }
+    blocks
+}
+
+fn figure_block(figure: &super::Figure) -> FigureBlock {
+    FigureBlock {
+        path: format!("{}.png", figure.stem),
+        png: figure.png.clone(),
+        title: figure.estimator.clone(),
+        caption: figure.caption.clone(),
+    }
+}
+
+fn cost(material: &Material) -> Vec<Block> {
+    let runs = material
+        .stored
+        .record
+        .cells
+        .iter()
+        .flat_map(|cell| cell.runs.iter().map(move |run| (cell, run)));
+    let mut table =
+        Table::new(&["cell", "estimator", "passes", "CPU seconds", "wall seconds", "paths", "work"]);
+    for (cell, run) in runs {
+        let cost = material.timing.as_ref().and_then(|timing| timing.of(&cell.label, &run.estimator));
+        let seconds = |pick: fn(f64, f64) -> f64| {
+            cost.map_or(String::new(), |c| significant(pick(c.cpu_seconds, c.wall_seconds), 3))
+        };
+        let rate = cost.and_then(|c| c.paths_per_second());
+        let work: Vec<String> = run.cost.iter().map(|(name, count)| format!("{name} {count}")).collect();
+        table.push(vec![
+            cell.label.clone(),
+            run.estimator.clone(),
+            run.passes.to_string(),
+            seconds(|cpu, _| cpu),
+            seconds(|_, wall| wall),
+            rate.map_or(String::new(), |rate| format!("{} / s", significant(rate, 3))),
+            work.join(", "),
+        ]);
+    }
+    let text = "Seconds are of this machine and this run, without an interval; counts of work are exactly \
+                reproducible. Paths per CPU second.";
+    vec![heading("Cost"), Block::Text(text.into()), Block::Table(table.without_empty_columns())]
+}
+
+fn notes(material: &Material) -> Vec<Block> {
+    let mut items = Vec::new();
+    for cell in &material.stored.record.cells {
+        for run in &cell.runs {
+            let place = format!("{} {}", cell.label, run.estimator);
+            let counted = run.anomalies.iter().filter(|(_, count)| **count > 0);
+            items.extend(counted.map(|(name, count)| format!("{}: {count} of `{name}`", place.trim())));
+            items.extend(run.notes.iter().map(|note| format!("{}: {note}", place.trim())));
+        }
+    }
+    if items.is_empty() {
+        items.push("No anomalies were counted, and no estimator has a reservation.".into());
+    }
+    vec![heading("Anomalies and notes"), Block::List(items)]
+}
+
+fn origin(material: &Material) -> Vec<Block> {
+    let record = &material.stored.record;
+    let mut table = Table::new(&["", "value"]);
+    let mut row = |key: &str, value: String| table.push(vec![key.into(), value]);
+    row("experiment, blake3", record.experiment_hash.clone());
+    row("claims, blake3", record.claims_hash.clone());
+    row("fingerprint", record.fingerprint.clone());
+    let mut command = "scatterproof run FILE".to_string();
+    if let Some(p) = &material.provenance {
+        let dirty = if p.dirty == Some(true) { ", with uncommitted changes" } else { "" };
+        row("commit", format!("{}{dirty}", p.commit.as_deref().unwrap_or("unknown")));
+        row("version", p.version.clone());
+        row("rustc", p.rustc.clone());
+        row("target", format!("{} {}", p.target, p.target_features.join(" ")).trim_end().into());
+        row("CPU", p.cpu.clone());
+        row("threads", p.threads.to_string());
+        row("date", p.date.clone());
+        command = p.command.join(" ");
+    }
+    let again = Block::Text("The command that made it:".into());
+    vec![heading("Provenance"), Block::Table(table), again, Block::Code(command)]
+}

@@ -1,0 +1,199 @@
+//! Tables as aligned text for a terminal, as Markdown and as CSV; and the two that everybody wants.
+
+use super::number::{per_cent, significant, with_error};
+use crate::results::csv_text;
+use crate::results::measurements::Measurement;
+use crate::verify::verdict::Verdict;
+
+/// A header and rows of text.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// Column names.
+    pub header: Vec<String>,
+    /// Rows, one field a column.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// An empty table.
+    pub fn new(header: &[&str]) -> Table {
+        Table { header: header.iter().map(|name| name.to_string()).collect(), rows: Vec::new() }
+    }
+
+    /// Appends a row.
+    pub fn push(&mut self, row: Vec<String>) {
+        assert_eq!(row.len(), self.header.len(), "one field a column");
+        self.rows.push(row);
+    }
+
+    /// Without the columns that say nothing: empty in every row.
+    pub fn without_empty_columns(mut self) -> Table {
+        for column in (0..self.header.len()).rev() {
+            if self.rows.iter().all(|row| row[column].is_empty()) {
+                self.header.remove(column);
+                self.rows.iter_mut().for_each(|row| drop(row.remove(column)));
+            }
+        }
+        self
+    }
+
+    /// Aligned plain text: columns two spaces apart, numbers to the right.
+    pub fn to_text(&self) -> String {
+        let columns = self.columns();
+        let rule: Vec<String> = columns.iter().map(|c| "-".repeat(c.width)).collect();
+        let lines = [&self.header, &rule].into_iter().chain(&self.rows);
+        lines.map(|row| format!("{}\n", aligned(row, &columns).join("  ").trim_end())).collect()
+    }
+
+    /// A Markdown table, aligned so that it reads as text too.
+    pub fn to_markdown(&self) -> String {
+        let escaped =
+            |row: &Vec<String>| row.iter().map(|f| f.replace('|', "\\|").replace('\n', " ")).collect();
+        let table =
+            Table { header: escaped(&self.header), rows: self.rows.iter().map(escaped).collect() };
+        let columns = table.columns();
+        let rule = columns.iter().map(|c| match c.numeric {
+            true => format!("{}:", "-".repeat(c.width.max(2) - 1)),
+            false => "-".repeat(c.width),
+        });
+        let rule: Vec<String> = rule.collect();
+        let lines = [&table.header, &rule].into_iter().chain(&table.rows);
+        lines.map(|row| format!("| {} |\n", aligned(row, &columns).join(" | "))).collect()
+    }
+
+    /// Comma-separated text.
+    pub fn to_csv(&self) -> String {
+        let header: Vec<&str> = self.header.iter().map(String::as_str).collect();
+        csv_text::to_text(&header, self.rows.iter().cloned())
+    }
+
+    /// Do the fields of a column begin like numbers?
+    pub fn is_numeric(&self, column: usize) -> bool {
+        let numeric =
+            |field: &str| field.trim_start_matches('-').starts_with(|c: char| c.is_ascii_digit());
+        let mut fields =
+            self.rows.iter().map(|row| row[column].as_str()).filter(|f| !f.is_empty()).peekable();
+        fields.peek().is_some() && fields.all(numeric)
+    }
+
+    fn columns(&self) -> Vec<Column> {
+        let width = |c: usize| {
+            let fields = self.rows.iter().map(|row| row[c].chars().count());
+            fields.chain([self.header[c].chars().count()]).max().unwrap_or(0)
+        };
+        (0..self.header.len()).map(|c| Column { width: width(c), numeric: self.is_numeric(c) }).collect()
+    }
+}
+
+/// How a column is set.
+struct Column {
+    width: usize,
+    numeric: bool,
+}
+
+fn aligned(row: &[String], columns: &[Column]) -> Vec<String> {
+    let pad = |(field, &Column { width, numeric }): (&String, &Column)| match numeric {
+        true => format!("{field:>width$}"),
+        false => format!("{field:<width$}"),
+    };
+    row.iter().zip(columns).map(pad).collect()
+}
+
+/// Verdicts, with what each test could have seen.
+pub fn verdict_table(verdicts: &[Verdict]) -> Table {
+    let mut table = Table::new(&[
+        "outcome",
+        "claim",
+        "cell",
+        "band",
+        "estimators",
+        "observable",
+        "class",
+        "measured",
+        "expected",
+        "test",
+        "statistic",
+        "adjusted p",
+        "detectable",
+        "note",
+    ]);
+    for v in verdicts {
+        let number = |value: f64, error: f64| {
+            if value.is_nan() { String::new() } else { with_error(value, error) }
+        };
+        // Relative to the expected value; absolute where that is 0.
+        let detectable =
+            if v.expected == 0.0 { significant(v.detectable, 2) } else { per_cent(v.detectable) };
+        table.push(vec![
+            v.outcome.to_string(),
+            v.claim.clone(),
+            v.cell.clone(),
+            v.band.clone(),
+            v.estimators.clone(),
+            v.observable.clone(),
+            v.class.clone(),
+            number(v.value, v.std_error),
+            number(v.expected, v.expected_error),
+            v.test.clone(),
+            significant(v.statistic, 3),
+            significant(v.adjusted_p, 2),
+            detectable,
+            v.note.clone(),
+        ]);
+    }
+    table.without_empty_columns()
+}
+
+/// Measurements: a row for each estimator, observable and class, a column for each band.
+pub fn measurement_table(rows: &[&Measurement], bands: &[String]) -> Table {
+    let mut header = vec!["estimator", "observable", "class"];
+    header.extend(bands.iter().map(String::as_str));
+    let mut table = Table::new(&header);
+    // Rows come with the bands of one observable together.
+    for group in rows.chunks(bands.len().max(1)) {
+        let first = group[0];
+        let mut row = vec![first.estimator.clone(), first.observable.clone(), first.class.clone()];
+        row.extend(group.iter().map(|m| with_error(m.mean, m.std_error)));
+        table.push(row);
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::measurements::measurements;
+    use crate::results::sample;
+    use crate::verify::judge::{FAMILY_LEVEL, judge};
+
+    fn small() -> Table {
+        let mut table = Table::new(&["name", "value", "nothing"]);
+        table.push(vec!["a|b".into(), "1.0(2)".into(), String::new()]);
+        table.push(vec!["c".into(), "-12".into(), String::new()]);
+        table.without_empty_columns()
+    }
+
+    #[test]
+    fn three_forms() {
+        assert_eq!(small().to_text(), "name   value\n----  ------\na|b   1.0(2)\nc        -12\n");
+        let markdown = "| name |  value |\n| ---- | -----: |\n| a\\|b | 1.0(2) |\n| c    |    -12 |\n";
+        assert_eq!(small().to_markdown(), markdown);
+        assert_eq!(small().to_csv(), "name,value\na|b,1.0(2)\nc,-12\n");
+    }
+
+    #[test]
+    fn measurements_have_a_column_a_band() {
+        let rows = measurements(&sample::stored(0.5), None);
+        let rows: Vec<&Measurement> = rows.iter().collect();
+        let table = measurement_table(&rows, &["R".into(), "G".into()]);
+        assert_eq!((table.rows.len(), table.header.len()), (4, 5));
+        assert!(table.rows[3][4].contains('('), "{:?}", table.rows);
+    }
+
+    #[test]
+    fn verdicts_show_what_they_could_see() {
+        let text = verdict_table(&judge(&[&sample::judged(&[("holds", 1.0)])], FAMILY_LEVEL)).to_text();
+        assert!(text.contains("pass     holds  smooth  R     mis"), "{text}");
+        assert!(text.contains(" %"), "{text}");
+    }
+}

@@ -1,0 +1,264 @@
+//! Every rule seen to pass, and to catch a planted defect.
+
+use serde_json::json;
+
+use super::super::verdict::{exit_code, to_csv};
+use super::*;
+use crate::results::record::{Against, Bias, Comparison, Quantity};
+use crate::results::sample::{PASSES, judged, quantity, set_gates, stored, uniform};
+
+/// A record with one claim, of this kind and expectation, and one comparison.
+fn with_claim(
+    mut s: Stored,
+    kind: &str,
+    expect: Option<&str>,
+    against: Against,
+    detect: Option<f64>,
+) -> Stored {
+    s.record.claims = json!([{"name": "c", "expect": expect, kind: {}}]);
+    s.record.comparisons = vec![Comparison { claim: 0, quantity: quantity("mis", 0), against, detect }];
+    s
+}
+
+fn value(value: f64, error: f64) -> Against {
+    Against::Value { value, error, source: "by hand".into() }
+}
+
+fn other(paired: bool) -> Against {
+    Against::Quantity { other: quantity("snee", 0), paired }
+}
+
+fn one(s: &Stored) -> Verdict {
+    let mut verdicts = judge(&[s], FAMILY_LEVEL);
+    assert_eq!(verdicts.len(), 1);
+    verdicts.remove(0)
+}
+
+fn equals(s: Stored, v: f64, error: f64, detect: Option<f64>) -> Verdict {
+    one(&with_claim(s, "equals", None, value(v, error), detect))
+}
+
+fn assert_invalid(v: &Verdict, what: &str) {
+    assert!(matches!(&v.outcome, Outcome::Invalid(why) if why.contains(what)), "{v:?}");
+    assert_eq!(exit_code(std::slice::from_ref(v)), 3);
+}
+
+#[test]
+fn a_mean_equals_its_value_and_not_another() {
+    let good = equals(stored(0.1), 1.0, 0.0, None);
+    assert_eq!((&good.outcome, good.test.as_str(), good.dof), (&Outcome::Pass, "t", 63.0));
+    // Standard error 0.1 / 16; one test at level 1e-6 sees 8.0 of them.
+    assert!((good.detectable - 8.0 * 0.1 / 16.0).abs() < 0.01, "{}", good.detectable);
+    let bad = equals(stored(0.1), 1.06, 0.0, None);
+    assert_eq!(bad.outcome, Outcome::Fail);
+    assert!(bad.adjusted_p < FAMILY_LEVEL && bad.statistic < -8.0, "{bad:?}");
+    assert!(bad.note.starts_with("off by -5."), "{}", bad.note);
+}
+
+#[test]
+fn a_stated_error_widens_the_test() {
+    let wide = equals(stored(0.1), 1.06, 0.05, None);
+    assert_eq!(wide.outcome, Outcome::Pass);
+    assert!(wide.dof > 1e4, "nearly all the error is known: {}", wide.dof);
+}
+
+#[test]
+fn power_is_part_of_a_pass() {
+    assert_eq!(equals(stored(0.1), 1.0, 0.0, Some(0.1)).outcome, Outcome::Pass);
+    let weak = equals(stored(0.1), 1.0, 0.0, Some(0.01));
+    assert_eq!(weak.outcome, Outcome::Underpowered);
+    assert_eq!(equals(stored(0.1), 1.06, 0.0, Some(0.01)).outcome, Outcome::Fail);
+}
+
+#[test]
+fn an_expected_zero_has_an_absolute_detectable() {
+    let mut s = stored(0.1);
+    set_gates(&mut s, "mis", |i, _, _| 0.1 * uniform(i));
+    let v = equals(s, 0.0, 0.0, Some(0.1));
+    assert_eq!(v.outcome, Outcome::Pass);
+    assert!((v.detectable - 0.05).abs() < 0.01, "{}", v.detectable);
+}
+
+#[test]
+fn no_variance_passes_only_at_the_value() {
+    let exact = |x: f64| {
+        let mut s = stored(0.1);
+        set_gates(&mut s, "mis", |_, _, _| x);
+        s
+    };
+    let good = equals(exact(0.3), 0.3, 0.0, None);
+    assert_eq!((good.outcome, good.test.as_str()), (Outcome::Pass, "identity"));
+    assert_eq!(equals(exact(0.3), 0.3 * (1.0 + 1e-13), 0.0, None).outcome, Outcome::Pass);
+    assert_eq!(equals(exact(0.3), 0.3 * (1.0 + 1e-11), 0.0, None).outcome, Outcome::Fail);
+    assert_eq!(equals(exact(0.0), 0.0, 0.0, None).outcome, Outcome::Pass);
+    // A published value's own error may explain a deviation, but not that nothing was scored.
+    assert_eq!(equals(exact(0.3), 0.3001, 1e-4, None).test, "stated error");
+    assert_eq!(equals(exact(0.3), 0.3001, 1e-4, None).outcome, Outcome::Pass);
+    assert_eq!(equals(exact(0.3), 0.31, 1e-4, None).outcome, Outcome::Fail);
+    assert_eq!(equals(exact(0.0), 1e-4, 1e-4, None).outcome, Outcome::Fail);
+}
+
+#[test]
+fn rounding_noise_is_no_variance() {
+    let mut s = stored(0.1);
+    set_gates(&mut s, "mis", |i, _, _| 1.0 + 1e-15 * uniform(i));
+    assert_eq!(equals(s, 1.0, 0.0, None).test, "identity");
+}
+
+#[test]
+fn estimators_agree_and_differ() {
+    let agree = |s: Stored, paired| one(&with_claim(s, "agree", None, other(paired), Some(0.1)));
+    let good = agree(stored(0.1), false);
+    assert_eq!((good.outcome, good.test.as_str()), (Outcome::Pass, "welch t"));
+    assert_eq!(good.estimators, "mis vs snee");
+    // A defect of 2 % that only pairing can see: both play the same noise.
+    let mut s = stored(0.1);
+    set_gates(&mut s, "mis", |i, _, _| 1.0 + 0.1 * uniform(i));
+    set_gates(&mut s, "snee", |i, _, _| 1.02 + 0.1 * uniform(i) + 0.01 * uniform(i + 9999));
+    assert_eq!(agree(s.clone(), false).outcome, Outcome::Pass);
+    assert_eq!(agree(s, true).outcome, Outcome::Fail);
+}
+
+#[test]
+fn identical_paired_runs_are_an_identity() {
+    let mut s = stored(0.1);
+    ["mis", "snee"].iter().for_each(|e| set_gates(&mut s, e, |i, _, _| 1.0 + uniform(i)));
+    let v = one(&with_claim(s, "agree", None, other(true), Some(0.1)));
+    assert_eq!((v.outcome, v.test.as_str()), (Outcome::Pass, "identity"));
+}
+
+#[test]
+fn anomalies_invalidate_and_conventions_do_not() {
+    let with = |name: &str, count| {
+        let mut s = stored(0.1);
+        s.record.cells[0].runs[0].anomalies.insert(name.into(), count);
+        equals(s, 1.0, 0.0, None)
+    };
+    assert_invalid(&with("nonfinite", 1), "`nonfinite`");
+    assert_invalid(&with("lost_ray", 3), "`lost_ray`");
+    assert_eq!(with("lost_ray", 0).outcome, Outcome::Pass);
+    assert_eq!(with("wrong_side", 7).outcome, Outcome::Pass);
+}
+
+#[test]
+fn what_a_test_cannot_rest_on_is_invalid() {
+    let mut nan = stored(0.1);
+    set_gates(&mut nan, "mis", |i, _, _| if i == 7 { f64::NAN } else { 1.0 });
+    assert_invalid(&equals(nan, 1.0, 0.0, None), "not finite");
+
+    let mut dropped = stored(0.1);
+    dropped.record.cells[0].runs[0].passes = PASSES + 4;
+    assert_invalid(&equals(dropped, 1.0, 0.0, None), "256 passes of 260");
+
+    let mut few = stored(0.1);
+    let path = few.record.cells[0].runs[0].gates.clone();
+    let array = few.arrays.get_mut(&path).expect("gates");
+    array.shape[0] = 63;
+    array.data.truncate(63 * 20);
+    few.record.cells[0].runs[0].passes = 252;
+    assert_invalid(&equals(few, 1.0, 0.0, None), "too few passes");
+
+    let mut absent = with_claim(stored(0.1), "equals", None, value(1.0, 0.0), None);
+    absent.record.comparisons[0].quantity.estimator = "nobody".into();
+    assert_invalid(&one(&absent), "does not hold");
+}
+
+#[test]
+fn heavy_tails_are_invalid() {
+    // One pass in 256 scores 256: mean 1, skewness 16, far below its true mean in most runs.
+    let mut rare = stored(0.1);
+    set_gates(&mut rare, "mis", |i, _, _| if i == 100 { 256.0 } else { 0.0 });
+    assert_invalid(&equals(rare, 1.0, 0.0, None), "|skewness|");
+    // +10 four times in one batch, -10 once in each of four others: no skewness, but one batch holds
+    // 400 of the 500 between batches.
+    let mut share = stored(0.1);
+    set_gates(&mut share, "mis", |i, _, _| match i {
+        100..=103 => 10.0,
+        8 | 60 | 140 | 200 => -10.0,
+        _ => 0.0,
+    });
+    assert_invalid(&equals(share, 0.0, 0.0, None), "one batch of mis holds");
+}
+
+#[test]
+fn a_biased_estimator_agrees_with_nothing() {
+    let mut s = stored(0.1);
+    s.record.cells[0].runs[1].bias = Bias::Biased("diffusion".into());
+    let agree =
+        |s: &Stored, expect| one(&with_claim(s.clone(), "agree", expect, other(false), Some(0.1)));
+    assert_invalid(&agree(&s, None), "diffusion");
+    assert_eq!(agree(&s, Some("invalid")).outcome, Outcome::Pass);
+    set_gates(&mut s, "snee", |i, _, _| 2.0 + 0.1 * uniform(i));
+    assert_eq!(agree(&s, Some("differs")).outcome, Outcome::Pass);
+}
+
+#[test]
+fn controls_are_green_when_they_find_what_they_expect() {
+    let control = |expect, v| one(&with_claim(stored(0.1), "equals", Some(expect), value(v, 0.0), None));
+    assert_eq!(control("differs", 1.2).outcome, Outcome::Pass);
+    assert_eq!(control("differs", 1.0).outcome, Outcome::Fail);
+    assert!(control("differs", 1.0).note.contains("no difference found"));
+    assert_eq!(control("invalid", 1.0).outcome, Outcome::Fail);
+}
+
+#[test]
+fn many_tests_share_one_level() {
+    let alone = judge(&[&judged(&[("a", 1.04)])], FAMILY_LEVEL);
+    let many: Vec<(&str, f64)> = std::iter::repeat_n(("a", 1.04), 1000).collect();
+    let many = judge(&[&judged(&many)], FAMILY_LEVEL);
+    assert_eq!(alone[0].adjusted_p, alone[0].p_value);
+    assert!((many[0].adjusted_p / many[0].p_value - 1000.0).abs() < 1e-6);
+    assert!(many[0].detectable > alone[0].detectable);
+    assert_eq!((exit_code(&alone), exit_code(&many)), (1, 0));
+}
+
+/// A table: 30 cells, each with its own noise and `off` standard errors away from its value.
+fn table(off: f64) -> Stored {
+    let mut s = with_claim(stored(0.1), "equals", None, value(1.0, 0.0), None);
+    let (cell, path) = (s.record.cells[0].clone(), s.record.cells[0].runs[0].gates.clone());
+    s.record.comparisons.clear();
+    for c in 0..30 {
+        let mut cell = cell.clone();
+        let sign = if c % 2 == 0 { 1.0 } else { -1.0 };
+        set_gates(&mut s, "mis", |i, _, _| 1.0 + sign * off * 0.1 / 16.0 + 0.1 * uniform(i + 1000 * c));
+        let array = s.arrays[&path].clone();
+        cell.runs[0].gates = format!("cell{c}");
+        s.arrays.insert(format!("cell{c}"), array);
+        s.record.cells.push(cell);
+        let quantity = Quantity { cell: c as usize + 1, ..quantity("mis", 0) };
+        s.record.comparisons.push(Comparison {
+            claim: 0,
+            quantity,
+            against: value(1.0, 0.0),
+            detect: None,
+        });
+    }
+    s
+}
+
+#[test]
+fn a_table_is_also_judged_as_a_whole() {
+    let good = judge(&[&table(0.0)], FAMILY_LEVEL);
+    assert_eq!(good.len(), 31);
+    assert!(good.iter().all(Verdict::is_green));
+    assert_eq!((good[30].test.as_str(), good[30].dof), ("sum of z^2", 30.0));
+    assert_eq!(good[30].cell, "all 30 cells");
+    // Three standard errors in every cell, of alternating sign: no cell alone can tell.
+    let bad = judge(&[&table(3.0)], FAMILY_LEVEL);
+    assert!(bad[..30].iter().all(Verdict::is_green));
+    assert_eq!(bad[30].outcome, Outcome::Fail);
+}
+
+#[test]
+fn csv_has_the_columns_that_others_rely_on() {
+    let csv = to_csv(&judge(&[&judged(&[("a,b", 1.0)])], FAMILY_LEVEL));
+    let head = "experiment,cell,band,class,estimators,claim,test,statistic,p_value,adjusted_p,detectable,outcome,";
+    assert!(csv.starts_with(head), "{csv}");
+    assert!(csv.contains("\nsample,smooth,R,all,mis,\"a,b\",t,"), "{csv}");
+}
+
+#[test]
+fn exit_codes() {
+    assert_eq!(exit_code(&[]), 0);
+    assert_eq!(exit_code(&judge(&[&judged(&[("a", 1.0), ("b", 2.0)])], FAMILY_LEVEL)), 1);
+}
