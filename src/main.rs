@@ -1,1 +1,7 @@
-fn main() {}
+//! The command line over the library, with the library's own estimators.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    scatterproof::cli::main(&scatterproof::experiment::estimators::builtin())
+}

@@ -1,1 +1,126 @@
-//! Stub.
+//! The command line: one file a subcommand, no logic of their own. Door for `clap`.
+
+pub mod check;
+pub mod completions;
+pub mod init;
+pub mod list;
+pub mod plan;
+pub mod report;
+pub mod run;
+pub mod schema;
+pub mod verify;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, CommandFactory, Parser, Subcommand};
+
+use crate::error::Error;
+use crate::experiment::LoadOptions;
+use crate::experiment::registry::Registry;
+
+/// A research testbed for subsurface scattering: estimators with statistical proof.
+///
+/// One TOML file is one experiment. `run` plays it and writes a record under results/; `verify` judges
+/// the claims that the file makes; `report` makes tables and images from the record alone.
+///
+/// Exit codes: 0 all well, 1 a claim failed, 2 bad input or usage, 3 underpowered or invalid claim or
+/// I/O failure, 130 interrupted (what is done is kept; the same command goes on).
+#[derive(Parser)]
+#[command(name = "scatterproof", version, about, long_about)]
+struct Command {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    Run(run::Args),
+    Verify(verify::Args),
+    Report(report::Args),
+    Plan(plan::Args),
+    Check(check::Args),
+    Init(init::Args),
+    List(list::Args),
+    Schema(schema::Args),
+    Completions(completions::Args),
+}
+
+/// How an experiment file is read.
+#[derive(Args, Clone, Debug)]
+pub struct Reading {
+    /// Override a value: a dotted key and a TOML value, as `object.boundary.rough.alpha=0.1`.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Use the overrides of `[setting.NAME]` in the file.
+    #[arg(long, value_name = "NAME")]
+    setting: Option<String>,
+}
+
+impl Reading {
+    fn options(&self) -> LoadOptions {
+        LoadOptions { sets: self.set.clone(), setting: self.setting.clone() }
+    }
+}
+
+/// How work is carried out; nothing here changes a result.
+#[derive(Args, Clone, Debug)]
+pub struct Working {
+    /// Folder that receives a folder per experiment.
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    out: PathBuf,
+    /// Number of threads; all cores without it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// No progress bar.
+    #[arg(long, short)]
+    quiet: bool,
+    /// Passes per block; chosen by time without it. For tests: results do not depend on it.
+    #[arg(long, value_name = "N", hide = true, value_parser = clap::value_parser!(u64).range(1..))]
+    block_passes: Option<u64>,
+}
+
+impl Working {
+    fn options(&self) -> crate::run::Options {
+        let mut options = crate::run::Options::new(&self.out);
+        if let Some(threads) = self.threads {
+            options.threads = usize::from(threads);
+        }
+        options.quiet = self.quiet;
+        options.block_passes = self.block_passes;
+        options
+    }
+}
+
+/// Reads the process's arguments, does what they say with the estimators of `registry`, prints errors,
+/// and returns the exit code: all that a program of one's own needs.
+pub fn main(registry: &Registry) -> ExitCode {
+    let command = Command::parse(); // usage errors exit with 2
+    let outcome = match &command.action {
+        Action::Run(args) => run::run(args, registry),
+        Action::Verify(args) => verify::run(args, registry),
+        Action::Report(args) => report::run(args),
+        Action::Plan(args) => plan::run(args, registry),
+        Action::Check(args) => check::run(args, registry),
+        Action::Init(args) => init::run(args),
+        Action::List(args) => list::run(args, registry),
+        Action::Schema(args) => schema::run(args, registry),
+        Action::Completions(args) => completions::run(args, Command::command()),
+    };
+    match outcome {
+        Ok(code) => ExitCode::from(code),
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Signals, as the error that a user sees.
+fn listen() -> crate::error::Result<crate::run::interrupt::Interrupt> {
+    crate::run::interrupt::Interrupt::listen().map_err(|source| Error::Io {
+        path: PathBuf::from("signals"),
+        doing: "listen for signals".into(),
+        source,
+    })
+}

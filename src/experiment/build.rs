@@ -5,17 +5,14 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::schema::{
-    self, Bands, Direction, Eta, EtaFormula, LightEntry, Medium as MediumWords, Normals, Spectrum,
-};
-use super::{CellSpec, Experiment};
+use super::schema::{self, LightEntry, Normals, Spectrum};
+use super::{CellSpec, Experiment, resolve, resolve_path};
 use crate::error::{Error, Result};
 use crate::geometry::{Ray, Shape, load_obj, procedural};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 use crate::optics::medium::Medium;
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
-use crate::optics::{colour, dispersion, materials};
 use crate::results::exr_file::{ExrImage, read_exr};
 use crate::results::json::hash_hex;
 use crate::results::record::Band;
@@ -52,22 +49,10 @@ impl<'a> Builder<'a> {
     /// A mesh or map that cannot be used, a sensor inside the body.
     pub fn scene(&mut self, cell: &CellSpec) -> Result<Scene> {
         let shape = self.shape(&cell.object.shape)?;
-        let eta = |eta: &Eta| self.per_band(|i, band| eta_of(eta, i, band));
-        let boundary = match &cell.object.boundary {
-            schema::Boundary::Matched {} => vec![Boundary::Matched; self.bands.len()],
-            schema::Boundary::Smooth { eta: words } => {
-                eta(words).into_iter().map(|eta| Boundary::Smooth { eta }).collect()
-            }
-            schema::Boundary::Rough { distribution, alpha, eta: words } => {
-                let kind = match distribution {
-                    schema::Distribution::Ggx => MicrofacetKind::Ggx,
-                    schema::Distribution::Beckmann => MicrofacetKind::Beckmann,
-                };
-                let facets = Microfacets { kind, alpha: *alpha };
-                eta(words).into_iter().map(|eta| Boundary::Rough { eta, facets }).collect()
-            }
-        };
-        let medium = self.per_band(|i, _| medium(&cell.object.medium, i));
+        let boundary = self.boundary(&cell.object.boundary)?;
+        let medium = cell.object.medium.per_band(self.bands.len());
+        let medium = medium.ok_or_else(|| Error::input("the medium has no coefficients"))?;
+        let medium = medium.iter().map(|m| Medium::new(m.sigma_a, m.sigma_s, m.g)).collect();
         let lights = cell.light.iter().enumerate();
         let lights = lights.map(|(i, entry)| self.light(i, entry)).collect::<Result<Vec<Light>>>()?;
         let sensor = sensor(&cell.sensor, &shape);
@@ -82,8 +67,23 @@ impl<'a> Builder<'a> {
         Ok(Scene { shape, boundary, medium, lights, sensor })
     }
 
-    fn per_band<T>(&self, f: impl Fn(usize, &Band) -> T) -> Vec<T> {
-        self.bands.iter().enumerate().map(|(i, band)| f(i, band)).collect()
+    fn boundary(&self, words: &schema::Boundary) -> Result<Vec<Boundary>> {
+        let bands = self.experiment.file.bands.list();
+        let eta = |eta: &schema::Eta| eta.per_band(&bands).map_err(Error::input);
+        Ok(match words {
+            schema::Boundary::Matched {} => vec![Boundary::Matched; bands.len()],
+            schema::Boundary::Smooth { eta: words } => {
+                eta(words)?.into_iter().map(|eta| Boundary::Smooth { eta }).collect()
+            }
+            schema::Boundary::Rough { distribution, alpha, eta: words } => {
+                let kind = match distribution {
+                    schema::Distribution::Ggx => MicrofacetKind::Ggx,
+                    schema::Distribution::Beckmann => MicrofacetKind::Beckmann,
+                };
+                let facets = Microfacets { kind, alpha: *alpha };
+                eta(words)?.into_iter().map(|eta| Boundary::Rough { eta, facets }).collect()
+            }
+        })
     }
 
     fn shape(&mut self, words: &schema::Shape) -> Result<Arc<Shape>> {
@@ -98,10 +98,13 @@ impl<'a> Builder<'a> {
 
     fn light(&mut self, index: usize, entry: &LightEntry) -> Result<Light> {
         let name = entry.name.clone().unwrap_or_else(|| format!("light_{}", index + 1));
-        let spectrum = |words: &Spectrum, scale: f64| self.per_band(|i, _| scale * spectrum(words, i));
+        let count = self.bands.len();
+        let spectrum = |words: &Spectrum, scale: f64| -> Vec<f64> {
+            words.values(count).iter().map(|x| scale * x).collect()
+        };
         let emission = if let Some(words) = &entry.directional {
             let irradiance = spectrum(&words.irradiance, 1.0);
-            Emission::Directional { toward: direction(&words.toward), irradiance }
+            Emission::Directional { toward: words.toward.unit(), irradiance }
         } else if let Some(words) = &entry.solid_angle {
             let height = words.solid_angle_sr / (2.0 * PI);
             // A cap's irradiance on a plane that faces its middle: L pi sin^2, sin^2 = h (2 - h).
@@ -110,19 +113,19 @@ impl<'a> Builder<'a> {
                 (None, Some(irradiance)) => spectrum(irradiance, 1.0 / (PI * height * (2.0 - height))),
                 (None, None) => Vec::new(),
             };
-            Emission::Cap { frame: Frame::about(direction(&words.toward)), height, radiance }
+            Emission::Cap { frame: Frame::about(words.toward.unit()), height, radiance }
         } else if let Some(words) = &entry.environment {
             match (&words.radiance, &words.map) {
                 (Some(radiance), _) => {
                     let (axis, height) = match words.hemisphere {
-                        Some(axis) => (DVec3::from(axis).normalize(), 1.0),
+                        Some(axis) => (resolve::unit(axis), 1.0),
                         None => (DVec3::Z, 2.0),
                     };
                     let radiance = spectrum(radiance, 1.0);
                     Emission::Cap { frame: Frame::about(axis), height, radiance }
                 }
                 (None, map) => {
-                    let path = self.experiment.resolve(map.as_deref().unwrap_or_default());
+                    let path = resolve_path(&self.experiment.path, map.as_deref().unwrap_or_default());
                     Emission::Map(self.map(&path, words.scale.unwrap_or(1.0))?)
                 }
             }
@@ -180,103 +183,20 @@ pub fn inputs(experiment: &Experiment) -> BTreeMap<String, String> {
     let paths: BTreeSet<String> =
         experiment.cells.iter().flat_map(|cell| maps(cell).into_iter().chain(mesh(cell))).collect();
     let hash = |path: String| {
-        let bytes = std::fs::read(experiment.resolve(&path)).ok()?;
+        let bytes = std::fs::read(resolve_path(&experiment.path, &path)).ok()?;
         Some((path, hash_hex(&bytes)))
     };
     paths.into_iter().filter_map(hash).collect()
 }
 
 /// The bands of an experiment and the colours they show as.
-pub fn bands(words: &Bands) -> Vec<Band> {
-    let named: Vec<(String, Option<[f64; 2]>)> = match words {
-        Bands::Rgb {} => ["R", "G", "B"].map(|name| (name.to_string(), None)).into(),
-        Bands::Spectral { from_nm, to_nm, count } => {
-            let edge = |i: usize| from_nm + (to_nm - from_nm) * i as f64 / *count as f64;
-            let band = |i: usize| {
-                (format!("{:.6}-{:.6}nm", edge(i), edge(i + 1)), Some([edge(i), edge(i + 1)]))
-            };
-            (0..*count).map(band).map(|(name, range)| (tidy(&name), range)).collect()
-        }
-        Bands::Explicit(list) => {
-            let range = |b: &schema::ExplicitBand| Some([b.from_nm?, b.to_nm?]);
-            list.iter().map(|band| (band.name.clone(), range(band))).collect()
-        }
+pub fn bands(words: &schema::Bands) -> Vec<Band> {
+    let band = |(band, display_rgb): (resolve::Band, [f64; 3])| Band {
+        name: band.name,
+        range_nm: band.range_nm,
+        display_rgb,
     };
-    let colours = colour::display_rgb(matches!(words, Bands::Rgb {}), &named);
-    let band = |((name, range_nm), display_rgb)| Band { name, range_nm, display_rgb };
-    named.iter().cloned().zip(colours).map(band).collect()
-}
-
-/// Without the zeros that a fixed number of digits leaves: `400.000000-420.500000nm` -> `400-420.5nm`.
-fn tidy(name: &str) -> String {
-    let part = |part: &str| part.trim_end_matches('0').trim_end_matches('.').to_string();
-    let ends: Vec<String> = name.trim_end_matches("nm").split('-').map(part).collect();
-    format!("{}nm", ends.join("-"))
-}
-
-fn spectrum(words: &Spectrum, band: usize) -> f64 {
-    match words {
-        Spectrum::Grey(x) => *x,
-        Spectrum::PerBand(list) => list[band],
-    }
-}
-
-fn eta_of(words: &Eta, index: usize, band: &Band) -> f64 {
-    match words {
-        Eta::Grey(eta) => *eta,
-        Eta::PerBand(list) => list[index],
-        Eta::Formula(EtaFormula::Material(name)) => materials::find(name).map_or(f64::NAN, |m| m.eta),
-        Eta::Formula(formula) => {
-            let middle = band.range_nm.map_or(f64::NAN, |[from, to]| 0.5 * (from + to));
-            dispersion_of(formula).map_or(f64::NAN, |d| d.eta(middle))
-        }
-    }
-}
-
-fn dispersion_of(formula: &EtaFormula) -> Option<dispersion::Dispersion> {
-    match formula {
-        EtaFormula::Cauchy { a, b_um2, c_um4 } => {
-            Some(dispersion::Dispersion::Cauchy { a: *a, b_um2: *b_um2, c_um4: *c_um4 })
-        }
-        EtaFormula::Sellmeier { b, c_um2 } => {
-            Some(dispersion::Dispersion::Sellmeier { b: b.clone(), c_um2: c_um2.clone() })
-        }
-        EtaFormula::Material(_) => None,
-    }
-}
-
-fn medium(words: &MediumWords, band: usize) -> Medium {
-    match words {
-        MediumWords::Coefficients(c) => {
-            let g = spectrum(&c.g, band);
-            let at = |words: &Option<Spectrum>| words.as_ref().map(|words| spectrum(words, band));
-            if let (Some(sigma_t), Some(albedo)) = (at(&c.sigma_t_per_mm), at(&c.albedo)) {
-                let phase = crate::optics::phase::HenyeyGreenstein { g };
-                return Medium { sigma_t, albedo, phase };
-            }
-            let sigma_s = at(&c.sigma_s_per_mm)
-                .or_else(|| at(&c.reduced_sigma_s_per_mm).map(|reduced| reduced / (1.0 - g)));
-            Medium::new(at(&c.sigma_a_per_mm).unwrap_or(0.0), sigma_s.unwrap_or(0.0), g)
-        }
-        MediumWords::Preset { name, scale, g } => {
-            let material = materials::find(name);
-            let [sigma_a, reduced] =
-                material.map_or([f64::NAN; 2], |m| [m.sigma_a[band], m.sigma_s_prime[band]]);
-            let g = g.unwrap_or(0.0);
-            Medium::new(scale * sigma_a, scale * reduced / (1.0 - g), g)
-        }
-    }
-}
-
-fn direction(words: &Direction) -> DVec3 {
-    match words {
-        Direction::Vector(v) => DVec3::from(*v).normalize(),
-        Direction::Polar(polar) => {
-            let (sin_phi, cos_phi) = crate::math::sin_cos_turns(polar.azimuth_deg / 360.0);
-            let r = (1.0 - polar.cos_z * polar.cos_z).max(0.0).sqrt();
-            DVec3::new(r * cos_phi, r * sin_phi, polar.cos_z)
-        }
-    }
+    words.list().into_iter().zip(words.display_rgb()).map(band).collect()
 }
 
 fn build_shape(words: &schema::Shape, experiment: &Experiment) -> Result<Shape> {
@@ -287,7 +207,7 @@ fn build_shape(words: &schema::Shape, experiment: &Experiment) -> Result<Shape> 
         schema::Shape::Box { size_mm } => return Ok(Shape::Box { half: 0.5 * DVec3::from(*size_mm) }),
         schema::Shape::Sphere { radius_mm } => return Ok(Shape::Sphere { radius: *radius_mm }),
         schema::Shape::Mesh { path, longest_side_mm, normals } => {
-            load_obj(&experiment.resolve(path), *longest_side_mm, smooth(normals))
+            load_obj(&resolve_path(&experiment.path, path), *longest_side_mm, smooth(normals))
         }
         schema::Shape::Icosphere { radius_mm, subdivisions, normals } => {
             procedural::icosphere(*radius_mm, *subdivisions, smooth(normals))
@@ -318,7 +238,7 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Sensor {
     match words {
         schema::Sensor::Orthographic { resolution, center_mm, toward, up, width_mm } => {
             let pixel = width_mm / resolution[0] as f64;
-            Sensor::Orthographic(screen(resolution, *center_mm, direction(toward), *up, pixel))
+            Sensor::Orthographic(screen(resolution, *center_mm, toward.unit(), *up, pixel))
         }
         schema::Sensor::Perspective { resolution, position_mm, look_at_mm, up, fov_deg } => {
             let view = (DVec3::from(*look_at_mm) - DVec3::from(*position_mm)).normalize();
@@ -327,13 +247,13 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Sensor {
             Sensor::Perspective(screen(resolution, *position_mm, view, *up, pixel))
         }
         schema::Sensor::Probe { point_mm, toward, paths_per_pass } => Sensor::Probe {
-            ray: Ray { origin: DVec3::from(*point_mm), dir: direction(toward) },
+            ray: Ray { origin: DVec3::from(*point_mm), dir: toward.unit() },
             paths: *paths_per_pass,
         },
         schema::Sensor::Flux { bins, axis, paths_per_pass } => match shape.bounds() {
             Some(bounds) => Sensor::BodyFlux {
                 bounds,
-                frame: Frame::about(DVec3::from(*axis).normalize()),
+                frame: Frame::about(resolve::unit(*axis)),
                 bins: *bins,
                 paths: *paths_per_pass,
             },

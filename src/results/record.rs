@@ -26,6 +26,9 @@ pub struct Record {
     pub claims_hash: String,
     /// The claims as the file states them.
     pub claims: serde_json::Value,
+    /// Indices of claims that were changed or added when passes had already been played: they are not
+    /// evidence.
+    pub post_hoc: Vec<usize>,
     /// The claims expanded over cells, bands and tables, with the values they are held against.
     pub comparisons: Vec<Comparison>,
     /// The bands, in the order of every array's band axis.

@@ -1,6 +1,6 @@
 //! From finished blocks to the record, its arrays, and the timing.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
@@ -43,7 +43,10 @@ pub fn assemble(experiment: &Experiment, plan: &Plan, blocks: Vec<Block>) -> Res
         runs: Vec::new(),
     };
     let mut cells: Vec<Cell> = experiment.cells.iter().map(empty).collect();
+    let mut post_hoc = BTreeSet::new();
     for (job, block) in plan.jobs.iter().zip(blocks) {
+        let late = (0..job.claims.len()).filter(|&i| !block.claims.contains(&job.claims[i]));
+        post_hoc.extend(late);
         let name = &experiment.file.estimator[job.estimator_index].name;
         let cost = timing::Cost {
             cpu_seconds: block.tally.cpu_seconds,
@@ -64,6 +67,7 @@ pub fn assemble(experiment: &Experiment, plan: &Plan, blocks: Vec<Block>) -> Res
         resolved: experiment.resolved(),
         claims_hash: hash_json(&claims),
         claims,
+        post_hoc: post_hoc.into_iter().collect(),
         comparisons: plan.comparisons.clone(),
         bands: plan.bands.clone(),
         cells,
@@ -108,9 +112,4 @@ fn estimator_run(job: &Job, name: &str, kind: &str, block: Block, arrays: &mut A
         cost: counts(Cost::ALL.map(Cost::name).into(), &block.tally.cost),
         anomalies: counts(Anomaly::ALL.map(Anomaly::name).into(), &block.tally.anomalies),
     }
-}
-
-/// The claims of an experiment as the record would state them.
-pub fn claims_hash(experiment: &Experiment) -> String {
-    hash_json(&json!(experiment.file.claim))
 }

@@ -17,6 +17,7 @@ use crate::stats::moments::{ImageMoments, Moments};
 #[serde(deny_unknown_fields)]
 struct Header {
     identity: String,
+    claims: Vec<String>,
     tally: Tally,
     /// Level and number of values of every gate node.
     gates: Vec<(u32, usize)>,
@@ -35,6 +36,7 @@ pub fn save(path: &Path, identity: &str, block: &Block) -> Result<()> {
     let pixels = block.pixels.nodes();
     let header = Header {
         identity: identity.into(),
+        claims: block.claims.clone(),
         tally: block.tally,
         gates: gates.iter().map(|n| (n.level, n.value.len())).collect(),
         pixels: pixels.iter().map(|n| (n.level, n.value.n, n.value.mean.len())).collect(),
@@ -82,6 +84,7 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
         block.pixels.push_node(level, ImageMoments { n, mean, m2 });
     }
     block.tally = header.tally;
+    block.claims = header.claims;
     (block.gates.next_pass() == block.pixels.next_pass()).then_some(block)
 }
 

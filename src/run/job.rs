@@ -29,6 +29,8 @@ pub struct Job {
     pub groups: Vec<Group>,
     /// Observables whose relative error a budget may bound.
     pub targets: Vec<usize>,
+    /// Hashes of the experiment's claims, hex.
+    pub claims: Vec<String>,
 }
 
 /// Bands that one call plays together.
@@ -50,6 +52,9 @@ pub struct Block {
     pub pixels: Counter<ImageMoments>,
     /// Work and time.
     pub tally: Tally,
+    /// Hashes of the claims as they stood before the first of these passes: what is claimed later is
+    /// claimed with the result in sight.
+    pub claims: Vec<String>,
 }
 
 /// Counts and time, which add up in any order.
@@ -93,6 +98,7 @@ impl Block {
             gates: Counter::new(start, keep_level),
             pixels: Counter::new(start, Counter::<ImageMoments>::MERGE_ALL),
             tally: Tally::default(),
+            claims: Vec::new(),
         }
     }
 

@@ -88,12 +88,13 @@ pub fn run(
     Ok((folder, Stored { record, arrays: assembled.arrays }))
 }
 
-/// Whether the folder holds a record of exactly this experiment (claims aside).
+/// Whether the folder holds a record of exactly this experiment, its claims included.
 pub fn has_record(experiment: &Experiment, out: &Path) -> bool {
     let folder = RecordFolder::new(out.join(&experiment.file.name));
     folder.exists()
         && folder.read().is_ok_and(|stored| {
             stored.record.experiment_hash == assemble::experiment_hash(experiment)
+                && stored.record.claims == serde_json::json!(experiment.file.claim)
                 && stored.record.fingerprint == crate::results::provenance::fingerprint()
         })
 }

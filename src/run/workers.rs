@@ -154,7 +154,7 @@ impl Pool<'_> {
         let path = checkpoint::path(self.settings.root, &job.identity);
         let done = checkpoint::load(&path, &job.identity, keep_level)
             .filter(|block| block.next_pass() <= passes)
-            .unwrap_or_else(|| Block::empty(0, keep_level));
+            .unwrap_or_else(|| Block { claims: job.claims.clone(), ..Block::empty(0, keep_level) });
         let next = done.next_pass();
         sender.send(Message::Begin { job: index, passes, done: Box::new(done) }).ok()?;
         Some(Active { job: index, passes, next, seconds_per_pass: None })

@@ -1,0 +1,86 @@
+//! `scatterproof plan`.
+
+use std::path::PathBuf;
+
+use super::Reading;
+use crate::error::Result;
+use crate::experiment::load;
+use crate::experiment::registry::Registry;
+use crate::experiment::schema::Budget;
+use crate::report::table::Table;
+use crate::run::memory::{available, readable};
+use crate::run::{self, estimate_seconds};
+
+/// Show what would run: cells, estimated cost and memory, and where each value comes from.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// An experiment file.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
+    /// Number of threads that the estimate assumes; all cores without it.
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Do not play the few passes that the estimate of time rests on.
+    #[arg(long)]
+    dry: bool,
+}
+
+/// Prints the plan.
+///
+/// # Errors
+/// Bad input.
+pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
+    let experiment = load(&args.file, &args.reading.options(), registry)?;
+    let plan = run::plan(&experiment, registry)?;
+    let threads = args.threads.unwrap_or_else(|| run::Options::new("").threads);
+
+    println!("values and where they come from");
+    let mut values = Table::new(&["key", "value", "from"]);
+    for (key, value, origin) in &experiment.origins {
+        values.push(vec![key.clone(), value.clone(), origin.clone()]);
+    }
+    println!("{}", values.to_text());
+
+    let budget = match &experiment.file.budget {
+        Budget::Passes(n) => format!("{n} passes"),
+        Budget::CpuSeconds(s) => format!("{s} CPU seconds each"),
+        Budget::RelativeError(e) => format!("relative error {}", e.at_most),
+    };
+    println!("{} cells, {} measurements, budget: {budget}", experiment.cells.len(), plan.jobs.len());
+    let mut table = Table::new(&["cell", "estimator", "observables", "passes", "CPU time"]);
+    let mut total = 0.0;
+    for job in &plan.jobs {
+        let (passes, time) = match if args.dry { None } else { estimate_seconds(job, &experiment.file.budget) } {
+            Some((passes, seconds)) => {
+                total += seconds;
+                (passes.to_string(), format!("{seconds:.1} s"))
+            }
+            None => ("-".into(), "-".into()),
+        };
+        table.push(vec![
+            experiment.cells[job.cell].label.clone(),
+            experiment.file.estimator[job.estimator_index].name.clone(),
+            job.layout.observables().len().to_string(),
+            passes,
+            time,
+        ]);
+    }
+    print!("{}", table.to_text());
+    if !args.dry {
+        println!("about {:.0} s on {threads} threads", total / threads as f64);
+    }
+
+    let memory = plan.memory(threads);
+    let free = available().map_or("unknown".into(), readable);
+    println!(
+        "memory: {} (shapes {}, results {}, working {}); available: {free}",
+        readable(memory.total()),
+        readable(memory.shapes),
+        readable(memory.results),
+        readable(memory.working)
+    );
+    memory.check(available())?;
+    Ok(0)
+}

@@ -1,0 +1,45 @@
+//! `scatterproof run`.
+
+use std::path::PathBuf;
+
+use super::{Reading, Working, listen};
+use crate::error::Result;
+use crate::experiment::load;
+use crate::experiment::registry::Registry;
+use crate::report::{self, table};
+use crate::verify::FAMILY_LEVEL;
+
+/// Run experiments: progress on a terminal, then a table and the place of the report.
+///
+/// A run that was stopped goes on where it was; a run that is complete is not repeated.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// Experiment files.
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
+    #[command(flatten)]
+    working: Working,
+}
+
+/// Runs the files one after the other.
+///
+/// # Errors
+/// Bad input in any file (found before the first runs), I/O, interruption.
+pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
+    let interrupt = listen()?;
+    let options = args.working.options();
+    let read = |file| load(file, &args.reading.options(), registry);
+    let experiments = args.files.iter().map(read).collect::<Result<Vec<_>>>()?;
+    for experiment in &experiments {
+        let (folder, _) = crate::run::run(experiment, registry, &options, &interrupt)?;
+        let material = report::write(&folder, FAMILY_LEVEL)?;
+        print!("{}", table::run_summary(&material).to_text());
+        for note in report::notes(&material) {
+            println!("note: {note}");
+        }
+        println!("\nreport: {}", folder.root().join("report.html").display());
+    }
+    Ok(0)
+}
