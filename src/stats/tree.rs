@@ -160,7 +160,7 @@ mod tests {
     /// Values whose sums depend on the order of addition.
     fn pass(i: u64) -> Moments {
         let x = (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64;
-        Moments::of(x.sqrt() * if i % 5 == 0 { 1e6 } else { 0.1 })
+        Moments::of(x.sqrt() * if i.is_multiple_of(5) { 1e6 } else { 0.1 })
     }
 
     fn range(start: u64, end: u64, keep: u32) -> Tree {
