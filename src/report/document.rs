@@ -1,4 +1,4 @@
-//! A page as blocks: one content, written as Markdown here and as HTML in [`super::html`].
+//! A page as blocks: one content, written as Markdown here and as HTML in `html`.
 
 use super::table::Table;
 

@@ -61,8 +61,18 @@ pub struct Figure {
 /// `images/`, `report.md` and `report.html`. The record is judged as a family of its own at `level`.
 pub fn write(folder: &RecordFolder, level: f64) -> Result<Material> {
     let stored = folder.read()?;
-    let (timing, provenance) = (folder.read_timing()?, folder.read_provenance()?);
     let verdicts = judge(&[&stored], level);
+    write_judged(folder, stored, verdicts, level)
+}
+
+/// The same with verdicts at hand: those of this record, from a family of several judged at `level`.
+pub fn write_judged(
+    folder: &RecordFolder,
+    stored: Stored,
+    verdicts: Vec<Verdict>,
+    level: f64,
+) -> Result<Material> {
+    let (timing, provenance) = (folder.read_timing()?, folder.read_provenance()?);
     let rows = measurements(&stored, timing.as_ref());
     let figures = write_figures(folder, &stored)?;
     let material = Material { stored, timing, provenance, verdicts, rows, figures };
@@ -135,10 +145,10 @@ fn write_figure(
     let png = write_png(&path("png"), picture, stops)?;
     let mut caption = format!("{} passes, exposure {stops:+} stops, clipped to sRGB", run.passes);
     if png.clipped > 0 {
-        caption += &format!("; {} pixels too bright", png.clipped);
+        caption += &format!("; pixels too bright: {}", png.clipped);
     }
     if png.out_of_gamut > 0 {
-        caption += &format!("; {} pixels outside the gamut or not finite", png.out_of_gamut);
+        caption += &format!("; pixels outside the gamut or not finite: {}", png.out_of_gamut);
     }
     let (cell, estimator) = (cell.label.clone(), run.estimator.clone());
     Ok(Figure { cell, estimator, stem, png: png.bytes, caption })
@@ -181,7 +191,7 @@ mod tests {
         wanted.iter().for_each(|w| assert!(html.contains(w), "{w}"));
         assert!(!html.contains("http"), "nothing is fetched");
         assert!(markdown.contains("](images/000-mis.png)"), "{markdown}");
-        assert!(markdown.contains("500 / s"), "{markdown}");
+        assert!(markdown.contains(" 500 |"), "{markdown}");
         let summary: Value = serde_json::from_str(&read("summary.json")).expect("JSON");
         assert_eq!((&summary["verdicts"]["pass"], &summary["exit_code"]), (&json!(1), &json!(1)));
         assert_eq!(read("verdicts.csv").lines().count(), 3);

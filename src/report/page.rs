@@ -4,7 +4,7 @@
 use super::Material;
 use super::document::{Block, Document, FigureBlock};
 use super::number::significant;
-use super::table::{Table, measurement_table, verdict_table};
+use super::table::{Table, claim_table, measurement_table, verdict_table};
 use crate::results::measurements::Measurement;
 use crate::verify::verdict::Outcome;
 
@@ -39,7 +39,9 @@ fn claims(material: &Material, level: f64) -> Vec<Block> {
     // What is not green comes first.
     let mut ordered = verdicts.clone();
     ordered.sort_by_key(|v| v.is_green());
-    vec![heading("Claims"), Block::Text(text), Block::Table(verdict_table(&ordered))]
+    let (summary, verdicts) =
+        (Block::Table(claim_table(verdicts)), Block::Table(verdict_table(&ordered)));
+    vec![heading("Claims"), Block::Text(text), summary, heading("Verdicts"), verdicts]
 }
 
 fn measured(material: &Material) -> Vec<Block> {
@@ -80,7 +82,7 @@ fn cost(material: &Material) -> Vec<Block> {
         .iter()
         .flat_map(|cell| cell.runs.iter().map(move |run| (cell, run)));
     let mut table =
-        Table::new(&["cell", "estimator", "passes", "CPU seconds", "wall seconds", "paths", "work"]);
+        Table::new(&["cell", "estimator", "passes", "CPU seconds", "wall seconds", "paths / s", "work"]);
     for (cell, run) in runs {
         let cost = material.timing.as_ref().and_then(|timing| timing.of(&cell.label, &run.estimator));
         let seconds = |pick: fn(f64, f64) -> f64| {
@@ -94,12 +96,12 @@ fn cost(material: &Material) -> Vec<Block> {
             run.passes.to_string(),
             seconds(|cpu, _| cpu),
             seconds(|_, wall| wall),
-            rate.map_or(String::new(), |rate| format!("{} / s", significant(rate, 3))),
+            rate.map_or(String::new(), |rate| significant(rate, 3)),
             work.join(", "),
         ]);
     }
     let text = "Seconds are of this machine and this run, without an interval; counts of work are exactly \
-                reproducible. Paths per CPU second.";
+                reproducible. Paths are per CPU second.";
     vec![heading("Cost"), Block::Text(text.into()), Block::Table(table.without_empty_columns())]
 }
 

@@ -144,6 +144,26 @@ pub fn verdict_table(verdicts: &[Verdict]) -> Table {
     table.without_empty_columns()
 }
 
+/// Claims: how many of each one's comparisons came out how.
+pub fn claim_table(verdicts: &[Verdict]) -> Table {
+    let mut table = Table::new(&["claim", "comparisons", "pass", "fail", "underpowered", "invalid"]);
+    let mut labels: Vec<&str> = Vec::new();
+    for v in verdicts {
+        if !labels.contains(&v.claim.as_str()) {
+            labels.push(&v.claim);
+        }
+    }
+    for label in labels {
+        let own: Vec<String> =
+            verdicts.iter().filter(|v| v.claim == label).map(|v| v.outcome.to_string()).collect();
+        let count = |outcome: &str| own.iter().filter(|o| *o == outcome).count().to_string();
+        let counts = table.header[2..].iter().map(|outcome| count(outcome));
+        let row = [label.to_string(), own.len().to_string()].into_iter().chain(counts).collect();
+        table.push(row);
+    }
+    table
+}
+
 /// Measurements: a row for each estimator, observable and class, a column for each band.
 pub fn measurement_table(rows: &[&Measurement], bands: &[String]) -> Table {
     let mut header = vec!["estimator", "observable", "class"];
@@ -188,6 +208,15 @@ mod tests {
         let table = measurement_table(&rows, &["R".into(), "G".into()]);
         assert_eq!((table.rows.len(), table.header.len()), (4, 5));
         assert!(table.rows[3][4].contains('('), "{:?}", table.rows);
+    }
+
+    #[test]
+    fn claims_are_counted() {
+        let verdicts = judge(&[&sample::judged(&[("a", 1.0), ("b", 2.0), ("a", 2.0)])], FAMILY_LEVEL);
+        assert_eq!(
+            claim_table(&verdicts).rows,
+            [["a", "2", "1", "1", "0", "0"], ["b", "1", "0", "1", "0", "0"]]
+        );
     }
 
     #[test]

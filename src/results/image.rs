@@ -68,7 +68,7 @@ pub struct Png {
     pub bytes: Vec<u8>,
     /// Pixels with a channel above 1 after exposure, shown as 1: brighter than the picture can say.
     pub clipped: usize,
-    /// Pixels with a channel below 0 (outside the sRGB gamut) or not finite, shown as 0.
+    /// Pixels with a channel below 0 (outside the sRGB gamut) or not finite; negatives and NaN show as 0.
     pub out_of_gamut: usize,
 }
 

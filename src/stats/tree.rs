@@ -2,7 +2,7 @@
 //!
 //! Floating-point sums depend on their order, so the order is fixed by the passes' absolute numbers
 //! and by nothing else. A node of level l covers the passes [j 2^l, (j + 1) 2^l); its value is the
-//! merge of its two halves, left before right. A [`Counter`] holds the nodes of a contiguous range as
+//! merge of its two halves, left before right. A `Counter` holds the nodes of a contiguous range as
 //! a binary counter holds its digits: at most one node a level on each side of the widest one, so
 //! log2(passes) partial images suffice. Two counters of adjacent ranges join by pushing the nodes of
 //! the later one into the earlier, and since every node is a function of its passes alone, the result
@@ -160,7 +160,7 @@ mod tests {
     /// Values whose sums depend on the order of addition.
     fn pass(i: u64) -> Moments {
         let x = (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64;
-        Moments::of(x.sqrt() * if i % 5 == 0 { 1e6 } else { 0.1 })
+        Moments::of(x.sqrt() * if i.is_multiple_of(5) { 1e6 } else { 0.1 })
     }
 
     fn range(start: u64, end: u64, keep: u32) -> Tree {

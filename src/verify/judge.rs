@@ -1,4 +1,4 @@
-//! From comparisons to verdicts: every comparison by itself ([`super::trial`]), then all of them under
+//! From comparisons to verdicts: every comparison by itself (`trial`), then all of them under
 //! one family-wise error rate, then what controls expect.
 
 use std::collections::BTreeMap;
@@ -23,7 +23,9 @@ pub fn judge(records: &[&Stored], level: f64) -> Vec<Verdict> {
     let mut trials = Vec::new();
     for stored in records {
         let own: Vec<Trial> = stored.record.comparisons.iter().map(|c| trial(stored, c)).collect();
-        let tables = table_trials(&own);
+        // Cells that an experiment pairs share their streams: their deviations are not independent.
+        let paired = !stored.record.resolved["pair"].is_null();
+        let tables = if paired { vec![] } else { table_trials(&own) };
         trials.extend(own);
         trials.extend(tables);
     }

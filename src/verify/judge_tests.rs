@@ -247,6 +247,9 @@ fn a_table_is_also_judged_as_a_whole() {
     let bad = judge(&[&table(3.0)], FAMILY_LEVEL);
     assert!(bad[..30].iter().all(Verdict::is_green));
     assert_eq!(bad[30].outcome, Outcome::Fail);
+    let mut paired = table(3.0);
+    paired.record.resolved["pair"] = json!({"over": ["boundary"]});
+    assert_eq!(judge(&[&paired], FAMILY_LEVEL).len(), 30);
 }
 
 #[test]
