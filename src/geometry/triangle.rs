@@ -76,7 +76,7 @@ impl Sheared {
     #[inline]
     fn project(&self, vertex: DVec3) -> [f64; 3] {
         let [x, y, z] = self.axes;
-        let v = vertex - self.origin;
+        let v = (vertex - self.origin).to_array();
         [v[x] - self.shear[0] * v[z], v[y] - self.shear[1] * v[z], v[z]]
     }
 }
