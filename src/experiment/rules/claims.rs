@@ -65,7 +65,7 @@ fn agreement(at: At, claim: &Agree, known: &Known) {
         axis(at.to("across"), name, axes);
         if claim.only.contains_key(name) {
             let rule = format!("`{name}` is compared across, `where` cannot fix it");
-            at.to("where").to(name).report(rule);
+            at.to("where").to(name).key().report(rule);
         }
     }
     filter(at, &claim.only, axes);
@@ -90,7 +90,7 @@ fn axis<'a>(at: At, name: &str, axes: &'a [SweepAxis]) -> Option<&'a SweepAxis> 
 fn filter(at: At, only: &BTreeMap<String, String>, axes: &[SweepAxis]) {
     for (name, label) in only {
         let at = at.to("where").to(name);
-        let Some(axis) = axis(at, name, axes) else { continue };
+        let Some(axis) = axis(at.key(), name, axes) else { continue };
         let labels: Vec<&str> = axis.points.iter().map(|point| point.label.as_str()).collect();
         if !labels.contains(&label.as_str()) {
             let help = suggest::help(label, &labels, "labels");

@@ -53,17 +53,28 @@ impl Findings {
 pub struct At<'a> {
     node: &'a Node,
     findings: &'a Findings,
+    /// Whether findings are about the key rather than the value.
+    is_key: bool,
 }
 
 impl<'a> At<'a> {
     /// Looks at `node` and reports to `findings`.
     pub fn new(node: &'a Node, findings: &'a Findings) -> At<'a> {
-        At { node, findings }
+        At { node, findings, is_key: false }
     }
 
     /// The entry or element `word`; the node itself where there is none.
     pub fn to(self, word: &str) -> At<'a> {
         At { node: self.node.at(&[word]).unwrap_or(self.node), ..self }
+    }
+
+    /// The key under which it stands.
+    pub fn key(self) -> At<'a> {
+        At { is_key: true, ..self }
+    }
+
+    fn place(self) -> &'a Place {
+        self.node.key.as_ref().filter(|_| self.is_key).unwrap_or(self.node.place())
     }
 
     /// The element `index`.
@@ -83,12 +94,12 @@ impl<'a> At<'a> {
 
     /// What is wrong here.
     pub fn report(self, rule: impl Into<String>) {
-        self.findings.at(self.node.place(), rule, None);
+        self.findings.at(self.place(), rule, None);
     }
 
     /// What is wrong here, and what to do.
     pub fn report_help(self, rule: impl Into<String>, help: impl Into<String>) {
-        self.findings.at(self.node.place(), rule, Some(help.into()));
+        self.findings.at(self.place(), rule, Some(help.into()));
     }
 }
 

@@ -51,11 +51,11 @@ fn claims_name_known_axes_and_labels() {
     let message = claim("agree = { estimators = [\"mis\"], across = \"dpth\", detect = 0.1 }");
     holds(&message, "unknown axis `dpth`", "19:42", "did you mean `depth`?");
     let message = claim("equals = { value = 1, source = \"\", where = { width = \"a\" } }");
-    holds(&message, "unknown axis `width`", "19:53", "known axes: `depth`");
+    holds(&message, "unknown axis `width`", "19:46", "known axes: `depth`");
     let message = claim("equals = { value = 1, source = \"\", where = { depth = \"thn\" } }");
-    holds(&message, "unknown label `thn` of axis `depth`", "19:53", "did you mean `thin`?");
+    holds(&message, "unknown label `thn` of axis `depth`", "19:54", "did you mean `thin`?");
     let across = "agree = { estimators = [\"mis\"], across = \"depth\", detect = 0.1, where = { depth = \"thin\" } }";
-    holds(&claim(across), "`depth` is compared across, `where` cannot fix it", "19:82", "");
+    holds(&claim(across), "`depth` is compared across, `where` cannot fix it", "19:75", "");
     accepted("agree = { estimators = [\"mis\"], across = \"depth\", detect = 0.1 }");
     accepted("equals = { value = 1, source = \"\", where = { depth = \"thin\" } }");
 }

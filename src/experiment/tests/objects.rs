@@ -17,9 +17,9 @@ fn bands_run_upwards_and_have_unique_names() {
     holds(&message, "`from_nm` must be less than `to_nm`, is 700 and 400", "3:34", "");
     let message =
         refused("rgb = {}", "explicit = [{ name = \"a\" }, { name = \"b\" }, { name = \"a\" }]");
-    holds(&message, "two bands are named `a`", "3:63", "");
+    holds(&message, "two bands are named `a`", "3:64", "");
     let bands = "explicit = [{ name = \"a\", from_nm = 400 }, { name = \"b\" }, { name = \"c\" }]";
-    holds(&refused("rgb = {}", bands), "`from_nm` needs `to_nm` beside it", "3:46", "");
+    holds(&refused("rgb = {}", bands), "`from_nm` needs `to_nm` beside it", "3:47", "");
     let message = refused("rgb = {}", "spectral = { from_nm = 400, to_nm = 700, count = 2000 }");
     assert!(message.contains("must be at most 1024, is 2000"), "{message}");
     let message = refused("rgb = {}", "explicit = []");
@@ -29,7 +29,7 @@ fn bands_run_upwards_and_have_unique_names() {
 #[test]
 fn lists_have_one_entry_per_band() {
     let rule = "there are 3 bands, the list has 2 entries";
-    holds(&refused("[0.9, 0.8, 0.7]", "[0.9, 0.8]"), rule, "6:61", "one number for all bands");
+    holds(&refused("[0.9, 0.8, 0.7]", "[0.9, 0.8]"), rule, "6:62", "one number for all bands");
     holds(&refused("eta = 1.3", "eta = [1.3, 1.3]"), rule, "5:34", "");
     holds(&refused("irradiance = 1.0", "irradiance = [1, 2]"), rule, "10:50", "");
 }
@@ -40,7 +40,7 @@ fn coefficients_are_one_pair() {
     holds(
         &refused(COEFFICIENTS, "{ sigma_t_per_mm = 10, g = 0 }"),
         rule,
-        "6:15",
+        "6:30",
         "(`sigma_t_per_mm`, `albedo`)",
     );
     let rule =
@@ -58,17 +58,17 @@ fn coefficients_are_one_pair() {
 
 #[test]
 fn coefficients_are_in_range() {
-    holds(&refused("0.8, 0.7]", "1.2, 0.7]"), "must be between 0 and 1, is 1.2", "6:67", "");
+    holds(&refused("0.8, 0.7]", "1.2, 0.7]"), "must be between 0 and 1, is 1.2", "6:68", "");
     let message = refused("sigma_t_per_mm = 10", "sigma_t_per_mm = -10");
     holds(&message, "must be at least 0, is -10", "6:49", "");
-    holds(&refused("g = 0 }", "g = 1 }"), "must be between -1 and 1, both excluded, is 1", "6:82", "");
+    holds(&refused("g = 0 }", "g = 1 }"), "must be between -1 and 1, both excluded, is 1", "6:83", "");
 }
 
 #[test]
 fn a_conservative_half_space_is_refused() {
     let text = GOOD.replace("sphere = { radius_mm = 1.0 }", "half_space = {}");
     let rule = "a conservative half-space has walks of infinite mean length";
-    holds(&errors(&text.replace("0.8, 0.7]", "1, 0.7]")), rule, "6:61", "band `G` absorbs nothing");
+    holds(&errors(&text.replace("0.8, 0.7]", "1, 0.7]")), rule, "6:62", "band `G` absorbs nothing");
     let parts = "{ sigma_a_per_mm = 0, sigma_s_per_mm = 1, g = 0 }";
     holds(&errors(&text.replace(COEFFICIENTS, parts)), rule, "6:49", "band `R`");
     good(&text);

@@ -7,7 +7,7 @@ use crate::experiment::validate::{Walk, unsupported_keywords};
 
 #[test]
 fn unknown_keys_are_named_with_what_was_meant() {
-    holds(&refused("albedo =", "albdo ="), "unknown key `albdo`", "6:52", "did you mean `albedo`?");
+    holds(&refused("albedo =", "albdo ="), "unknown key `albdo`", "6:53", "did you mean `albedo`?");
     let message = refused_with("[display]\nzzz = 1\n");
     holds(&message, "unknown key `zzz`", "15:1", "known keys: `exposure_stops`");
     holds(&refused("seed = 1", "seed = 1\nsed = 2"), "unknown key `sed`", "3:1", "did you mean `seed`?");
@@ -23,7 +23,7 @@ fn wrong_types_are_named() {
     holds(
         &refused("toward = [0, 0, -1]", "toward = 3"),
         "expected an array or a table, found 3",
-        "7:52",
+        "7:49",
         "",
     );
     holds(&refused("{ rgb = {} }", "\"rgb\""), "expected a table, found a string", "3:9", "");
@@ -69,7 +69,7 @@ fn numbers_are_finite_and_in_range() {
     holds(&message, "must be at least 3, is 2", "4:78", "");
     let direction = "{ cos_z = 1.5, azimuth_deg = 0 }";
     let message = refused("toward = [0, 0, -1]", &format!("toward = {direction}"));
-    holds(&message, "must be at most 1, is 1.5", "7:62", "");
+    holds(&message, "must be at most 1, is 1.5", "7:59", "");
     let fov = "sensor.perspective = { resolution = [1, 1], position_mm = [0, 0, 3], look_at_mm = [0, 0, 0], \
                up = [0, 1, 0], fov_deg = 180 }";
     let message = refused("sensor.probe = { point_mm = [0, 0, 3], toward = [0, 0, -1] }", fov);
