@@ -88,18 +88,26 @@ impl Loader<'_> {
         let cells: Option<Vec<CellSpec>> =
             trees.iter().zip(&points).map(|(tree, points)| cell(tree, &axes, points)).collect();
         let first = self.first_cell(&trees[0]);
+        let settings = self.settings();
         match (self.findings.into_sorted(), cells, typed::<ExperimentFile>(&first)) {
             (findings, Some(cells), Some(mut file)) if findings.is_empty() => {
                 file.sweep = resolved::sweep(&axes);
                 file.setting.clear();
                 let origins = origins::list(&first, &file);
                 let axes = axes.iter().map(Axis::from).collect();
-                Ok(Experiment { path: self.path.to_path_buf(), file, cells, axes, origins })
+                Ok(Experiment { path: self.path.to_path_buf(), file, cells, axes, settings, origins })
             }
             (findings, ..) if findings.is_empty() => {
                 Err(Error::input("the experiment passed every rule and still does not fit its types"))
             }
             (findings, ..) => Err(Error::Input(findings)),
+        }
+    }
+
+    fn settings(&self) -> Vec<String> {
+        match self.root.get("setting").map(|node| &node.value) {
+            Some(Value::Table(settings)) => settings.keys().cloned().collect(),
+            _ => Vec::new(),
         }
     }
 

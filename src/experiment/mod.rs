@@ -50,7 +50,7 @@ mod sweep_csv;
 pub mod validate;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use registry::{Registry, RegistryEntry};
 pub use sweep::resolve_path;
@@ -69,6 +69,8 @@ pub struct Experiment {
     pub cells: Vec<CellSpec>,
     /// The axes of the sweep.
     pub axes: Vec<Axis>,
+    /// The names of the settings that the file offers.
+    pub settings: Vec<String>,
     /// Dotted key, value and origin of everything in the first cell, sorted by key; an origin is a
     /// place, `--set ...`, or `default`.
     pub origins: Vec<(String, String, String)>,
