@@ -96,16 +96,17 @@ impl Working {
 /// and returns the exit code: all that a program of one's own needs.
 pub fn main(registry: &Registry) -> ExitCode {
     let command = Command::parse(); // usage errors exit with 2
+    let out = &mut std::io::stdout();
     let outcome = match &command.action {
         Action::Run(args) => run::run(args, registry),
         Action::Verify(args) => verify::run(args, registry),
         Action::Report(args) => report::run(args),
         Action::Plan(args) => plan::run(args, registry),
-        Action::Check(args) => check::run(args, registry),
-        Action::Init(args) => init::run(args),
-        Action::List(args) => list::run(args, registry),
-        Action::Schema(args) => schema::run(args, registry),
-        Action::Completions(args) => completions::run(args, Command::command()),
+        Action::Check(args) => check::run(args, registry, out).map(|()| 0),
+        Action::Init(args) => init::run(args, out).map(|()| 0),
+        Action::List(args) => list::run(args, registry, out).map(|()| 0),
+        Action::Schema(args) => schema::run(args, registry, out).map(|()| 0),
+        Action::Completions(args) => completions::run(args, Command::command(), out).map(|()| 0),
     };
     match outcome {
         Ok(code) => ExitCode::from(code),

@@ -1,4 +1,139 @@
 //! Experiment files: schema, validation, build.
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::error::{Error, Result};
+
+/// From words to scenes.
+pub mod build;
+
+/// A TOML text as a tree with places.
+pub mod document;
+
+/// The estimators that come with the program.
+pub mod estimators;
+
+/// From a text to an experiment.
+pub mod load;
+
+/// Every value and where it comes from.
+mod origins;
+
+/// Setting values by dotted key.
+mod overrides;
+
+/// The estimators that a program knows by name.
+pub mod registry;
+
+/// What entries mean: bands, unit directions, coefficients per band.
+pub mod resolve;
+
+/// Canonical content of cells and experiments.
+mod resolved;
+
+/// Rules between values.
+mod rules;
+
 /// What a file may say.
 pub mod schema;
+
+/// The JSON Schema of a file.
+pub mod schema_json;
+
+/// "Did you mean".
+pub mod suggest;
+
+/// Axes, points and cells.
+pub mod sweep;
+
+/// Rows from a CSV file.
+mod sweep_csv;
+
+/// The walk along the schema.
+pub mod validate;
+
+#[cfg(test)]
+pub(crate) mod tests;
+
+pub use registry::{Registry, RegistryEntry};
+pub use sweep::resolve_path;
+
+use schema::{ExperimentFile, LightEntry, Object, Sensor};
+
+/// A validated experiment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// The file that it was read from.
+    pub path: PathBuf,
+    /// Name, seed, bands, estimators, pairing, budget, claims and display of all cells; object, sensor
+    /// and lights of the first. Sweeps stand in it as rows, CSV files read; settings are applied.
+    pub file: ExperimentFile,
+    /// The cells, the last axis fastest. Without a sweep there is one, labelled `base`.
+    pub cells: Vec<CellSpec>,
+    /// The axes of the sweep.
+    pub axes: Vec<Axis>,
+    /// The names of the settings that the file offers.
+    pub settings: Vec<String>,
+    /// Dotted key, value and origin of everything in the first cell, sorted by key; an origin is a
+    /// place, `--set ...`, or `default`.
+    pub origins: Vec<(String, String, String)>,
+}
+
+/// An axis of the sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// Its name.
+    pub name: String,
+    /// The labels of its points in order.
+    pub labels: Vec<String>,
+}
+
+/// One point of the sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CellSpec {
+    /// The labels of its points, joined by commas.
+    pub label: String,
+    /// Axis -> label.
+    pub axes: BTreeMap<String, String>,
+    /// The body.
+    pub object: Object,
+    /// What is measured.
+    pub sensor: Sensor,
+    /// The lights.
+    pub light: Vec<LightEntry>,
+    /// The columns of the rows that the cell took, as texts; where two axes have a column of one
+    /// name, that of the first.
+    pub csv_row: BTreeMap<String, String>,
+    /// The line of the first CSV row that the cell took, counted from 1.
+    pub csv_line: Option<usize>,
+    /// Dotted key -> value that the sweep set.
+    pub sweep_values: BTreeMap<String, Value>,
+}
+
+/// What the command line adds to a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LoadOptions {
+    /// `key=value` arguments, applied in order after the setting.
+    pub sets: Vec<String>,
+    /// The `[setting.NAME]` to apply.
+    pub setting: Option<String>,
+}
+
+/// Reads and validates an experiment file.
+///
+/// # Errors
+/// The file cannot be read, or everything that is wrong with it, at once.
+pub fn load(path: &Path, options: &LoadOptions, registry: &Registry) -> Result<Experiment> {
+    let text = std::fs::read_to_string(path).map_err(Error::io(path, "read the experiment"))?;
+    load::load_text(path, &text, options, registry)
+}
+
+impl From<&sweep::SweepAxis> for Axis {
+    fn from(axis: &sweep::SweepAxis) -> Axis {
+        let labels = axis.points.iter().map(|point| point.label.clone()).collect();
+        Axis { name: axis.name.clone(), labels }
+    }
+}

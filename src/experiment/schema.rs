@@ -44,7 +44,8 @@ pub struct ExperimentFile {
     /// What must hold.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub claim: Vec<ClaimEntry>,
-    /// Named sets of overrides, chosen by `--setting NAME`: dotted key -> value.
+    /// Named sets of overrides, chosen by `--setting NAME`: dotted key -> value. Tables in braces are
+    /// values, others only group keys.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub setting: BTreeMap<String, BTreeMap<String, Value>>,
     /// How pictures are shown; never changes a number.
@@ -71,7 +72,7 @@ pub enum Bands {
         count: usize,
     },
     /// A list of 1 to 1024 named bands.
-    Explicit(Vec<ExplicitBand>),
+    Explicit(#[schemars(length(min = 1, max = 1024))] Vec<ExplicitBand>),
 }
 
 /// One band of an explicit list.
@@ -79,6 +80,7 @@ pub enum Bands {
 #[serde(deny_unknown_fields)]
 pub struct ExplicitBand {
     /// Its name, unique in the list.
+    #[schemars(length(min = 1))]
     pub name: String,
     /// Lower wavelength, nm; needed by dispersion formulas and for colour.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -309,6 +311,7 @@ pub enum EtaFormula {
     /// n^2 = 1 + sum_i b_i l^2 / (l^2 - c_i), l in um.
     Sellmeier {
         /// Strengths.
+        #[schemars(length(min = 1))]
         b: Vec<f64>,
         /// Squared resonance wavelengths, um^2.
         c_um2: Vec<f64>,
@@ -429,6 +432,7 @@ fn default_paths_per_pass() -> usize {
 /// One light: an optional name and exactly one kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["directional"] }, { "required": ["solid_angle"] }, { "required": ["environment"] }]))]
 pub struct LightEntry {
     /// Name in observables (`mean@sun`); without it `light_1`, `light_2`, ...
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -457,6 +461,7 @@ pub struct Directional {
 /// A disc of directions of uniform radiance; exactly one of `radiance`, `irradiance`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["radiance"] }, { "required": ["irradiance"] }]))]
 pub struct SolidAngle {
     /// From the scene towards the middle of the disc.
     pub toward: Direction,
@@ -474,6 +479,7 @@ pub struct SolidAngle {
 /// Light from all directions; exactly one of `radiance`, `map`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["radiance"] }, { "required": ["map"] }]))]
 pub struct Environment {
     /// Constant radiance, W/(mm^2 sr).
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -495,7 +501,8 @@ pub struct Environment {
 /// The kinds are those that the program registers (`scatterproof list`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EstimatorEntry {
-    /// Name in tables and claims.
+    /// Name in tables and claims, unique.
+    #[schemars(length(min = 1))]
     pub name: String,
     /// The kind and its options.
     #[serde(flatten)]
@@ -530,13 +537,28 @@ pub struct Sweep {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepRow {
-    /// Label in tables.
+    /// Label in tables, unique in the axis.
+    #[schemars(length(min = 1))]
     pub label: String,
     /// A value for each of `keys`.
     pub values: Vec<Value>,
+    /// Further numbers and texts of the row, for `equals.column`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub columns: BTreeMap<String, Scalar>,
+}
+
+/// A number or a text.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Scalar {
+    /// A number.
+    Number(f64),
+    /// A text.
+    Text(String),
 }
 
 /// A sweep read from a CSV file with a header row; lines that start with # are comments.
+/// A column `label` labels the rows; without it the texts of `columns` do.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepCsv {
@@ -551,6 +573,7 @@ pub struct SweepCsv {
 #[serde(deny_unknown_fields)]
 pub struct Pair {
     /// Dotted keys left out of the streams' key, as `object.shape`.
+    #[schemars(length(min = 1))]
     pub over: Vec<String>,
 }
 
@@ -593,6 +616,7 @@ pub struct SmallValues {
 /// One claim: exactly one kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["equals"] }, { "required": ["agree"] }]))]
 pub struct ClaimEntry {
     /// Label in verdict tables.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -622,6 +646,7 @@ pub enum Expect {
 /// (and `error_column`) of the row that the cell took from a CSV sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["value"] }, { "required": ["column"] }]))]
 pub struct Equals {
     /// The estimator; all of them without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -661,6 +686,7 @@ pub struct Equals {
 #[serde(deny_unknown_fields)]
 pub struct Agree {
     /// The estimators: two or more, or one with `across`.
+    #[schemars(length(min = 1))]
     pub estimators: Vec<String>,
     /// Axis of the sweep whose cells must agree.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -680,16 +706,10 @@ pub struct Agree {
 }
 
 /// How pictures are shown.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Display {
     /// Stops by which PNG pictures are brightened.
     #[serde(default)]
     pub exposure_stops: f64,
-}
-
-impl Default for Display {
-    fn default() -> Self {
-        Display { exposure_stops: 0.0 }
-    }
 }

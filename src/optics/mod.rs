@@ -14,3 +14,12 @@ pub mod microfacet;
 
 /// Phase functions.
 pub mod phase;
+
+/// Dispersion formulas.
+pub mod dispersion;
+
+/// Bands as linear sRGB, through the CIE colour matching functions.
+pub mod colour;
+
+/// Measured materials.
+pub mod materials;

@@ -1,0 +1,106 @@
+//! `scatterproof check`: validates experiment files.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::experiment::{Experiment, LoadOptions, Registry, load};
+
+/// Validate experiment files and say everything that is wrong with them.
+///
+/// Without `--setting`, every setting that a file offers is validated too.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Experiment files.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Override a key, as `budget.passes=64` or `object.shape.sphere.radius_mm=2`; repeatable.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub sets: Vec<String>,
+    /// Apply the overrides of `[setting.NAME]`.
+    #[arg(long, value_name = "NAME")]
+    pub setting: Option<String>,
+}
+
+/// Checks every file, a line of output for each good one.
+///
+/// # Errors
+/// The findings of all files together.
+pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
+    let mut findings = Vec::new();
+    for path in &args.files {
+        let options = LoadOptions { sets: args.sets.clone(), setting: args.setting.clone() };
+        let load_setting = |setting: &String| {
+            load(path, &LoadOptions { setting: Some(setting.clone()), ..options.clone() }, registry)
+        };
+        let checked = load(path, &options, registry).and_then(|experiment| {
+            let others: &[String] = if args.setting.is_some() { &[] } else { &experiment.settings };
+            others.iter().try_for_each(|setting| load_setting(setting).map(|_| ()))?;
+            Ok(experiment)
+        });
+        match checked {
+            Ok(experiment) => {
+                writeln!(out, "{}: ok, {}", path.display(), summary(&experiment))
+                    .map_err(Error::io(Path::new("stdout"), "print"))?;
+            }
+            Err(Error::Input(more)) => findings.extend(more),
+            Err(other) => return Err(other),
+        }
+    }
+    if findings.is_empty() { Ok(()) } else { Err(Error::Input(findings)) }
+}
+
+fn summary(experiment: &Experiment) -> String {
+    let file = &experiment.file;
+    [
+        counted(experiment.cells.len(), "cell"),
+        counted(file.estimator.len(), "estimator"),
+        counted(file.bands.list().len(), "band"),
+        counted(file.claim.len(), "claim"),
+    ]
+    .join(", ")
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::tests::{GOOD, registry};
+
+    fn check(texts: &[&str]) -> (String, Result<()>) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let files = texts.iter().enumerate().map(|(i, text)| {
+            let path = folder.path().join(format!("{i}.toml"));
+            std::fs::write(&path, text).expect("the file is written");
+            path
+        });
+        let args = Args { files: files.collect(), sets: Vec::new(), setting: None };
+        let mut out = Vec::new();
+        let result = run(&args, &registry(), &mut out);
+        (String::from_utf8(out).expect("it is text"), result)
+    }
+
+    #[test]
+    fn good_files_are_summed_up() {
+        let (out, result) = check(&[GOOD]);
+        assert!(
+            result.is_ok() && out.ends_with("0.toml: ok, 1 cell, 1 estimator, 3 bands, 0 claims\n"),
+            "{out}"
+        );
+    }
+
+    #[test]
+    fn findings_of_all_files_and_settings_come_together() {
+        let setting = format!("{GOOD}[setting.bad]\nseed = -1\n");
+        let (out, result) = check(&[&GOOD.replace("seed", "sed"), GOOD, &setting]);
+        let message = result.expect_err("two files are bad").to_string();
+        assert!(
+            message.contains("unknown key `sed`") && message.contains("must be at least 0, is -1"),
+            "{message}"
+        );
+        assert!(out.contains("1.toml: ok") && !out.contains("2.toml"), "{out}");
+    }
+}

@@ -1,0 +1,44 @@
+//! `scatterproof completions`: prints a completion script for a shell. Door for `clap_complete`.
+
+use std::io::Write;
+use std::path::Path;
+
+use clap_complete::Shell;
+
+use crate::error::{Error, Result};
+
+/// Print a completion script, as in `scatterproof completions bash > ~/.bash_completion.d/scatterproof`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The shell.
+    pub shell: Shell,
+}
+
+/// Prints the script for `command`, the whole command line.
+///
+/// # Errors
+/// The output cannot be written.
+pub fn run(args: &Args, mut command: clap::Command, out: &mut dyn Write) -> Result<()> {
+    let mut script = Vec::new();
+    let name = command.get_name().to_string();
+    clap_complete::generate(args.shell, &mut command, name, &mut script);
+    out.write_all(&script).map_err(Error::io(Path::new("stdout"), "print"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Args as _;
+
+    #[test]
+    fn scripts_name_the_subcommands() {
+        let check = super::super::check::Args::augment_args(clap::Command::new("check"));
+        let command = clap::Command::new("scatterproof").subcommand(check);
+        for shell in [Shell::Bash, Shell::Zsh, Shell::Fish] {
+            let mut out = Vec::new();
+            run(&Args { shell }, command.clone(), &mut out).expect("it prints");
+            let script = String::from_utf8(out).expect("it is text");
+            assert!(script.contains("check") && script.contains("setting"), "{shell}");
+        }
+    }
+}

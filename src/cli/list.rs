@@ -1,0 +1,160 @@
+//! `scatterproof list`: names what an experiment file may use.
+
+use std::io::Write;
+use std::path::Path;
+
+use clap::ValueEnum;
+
+use crate::error::{Error, Result};
+use crate::experiment::Registry;
+use crate::experiment::schema_json::json_schema;
+use crate::experiment::validate::grammar::{Form, Grammar, doc, keys};
+use crate::optics::{dispersion, materials};
+
+/// Name what an experiment file may use: estimators, materials, shapes and more.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Only this; everything without it.
+    pub topic: Option<Topic>,
+}
+
+/// What can be listed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Topic {
+    /// Kinds of `[[estimator]]` and their options.
+    Estimators,
+    /// Measured media, for `medium.preset`.
+    Materials,
+    /// Glasses, for `eta = { material = NAME }`.
+    Glasses,
+    /// Kinds of `bands`.
+    Bands,
+    /// Kinds of `object.shape`.
+    Shapes,
+    /// Kinds of `object.boundary`.
+    Boundaries,
+    /// Kinds of `object.medium`.
+    Media,
+    /// Kinds of `sensor`.
+    Sensors,
+    /// Kinds of `[[light]]`.
+    Lights,
+    /// Kinds of `budget`.
+    Budgets,
+    /// Kinds of `[[claim]]`.
+    Claims,
+}
+
+/// Prints the topic, or all of them under headings.
+///
+/// # Errors
+/// The output cannot be written.
+pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
+    let text = match args.topic {
+        Some(topic) => lines(topic, registry),
+        None => {
+            let sections = Topic::value_variants().iter().map(|topic| {
+                let heading = topic.to_possible_value().map(|v| v.get_name().to_string());
+                format!("{}\n{}", heading.unwrap_or_default(), indented(&lines(*topic, registry)))
+            });
+            sections.collect::<Vec<_>>().join("\n")
+        }
+    };
+    out.write_all(text.as_bytes()).map_err(Error::io(Path::new("stdout"), "print"))
+}
+
+fn lines(topic: Topic, registry: &Registry) -> String {
+    let schema = |path: &[&str]| table(&schema_names(registry, path));
+    match topic {
+        Topic::Estimators => estimators(registry),
+        Topic::Materials => table(&materials::MATERIALS.map(|m| (m.name.to_string(), numbers(&m)))),
+        Topic::Glasses => {
+            table(&dispersion::GLASSES.map(|g| (g.name.to_string(), g.source.to_string())))
+        }
+        Topic::Bands => schema(&["bands"]),
+        Topic::Shapes => schema(&["object", "shape"]),
+        Topic::Boundaries => schema(&["object", "boundary"]),
+        Topic::Media => schema(&["object", "medium"]),
+        Topic::Sensors => schema(&["sensor"]),
+        Topic::Lights => schema(&["light", "0"]),
+        Topic::Budgets => schema(&["budget"]),
+        Topic::Claims => schema(&["claim", "0"]),
+    }
+}
+
+fn estimators(registry: &Registry) -> String {
+    let entries = registry.entries.iter().map(|entry| {
+        let options = indented(&table(&entry.option_docs()));
+        format!("{}  {}\n{options}", entry.kind, entry.doc)
+    });
+    entries.collect()
+}
+
+fn numbers(material: &materials::Material) -> String {
+    format!(
+        "reduced sigma_s {:?}, sigma_a {:?} per mm, eta {}; {}",
+        material.reduced_sigma_s,
+        material.sigma_a,
+        material.eta,
+        materials::SOURCE
+    )
+}
+
+/// The names that may stand at a path, with the first line of their documentation.
+fn schema_names(registry: &Registry, path: &[&str]) -> Vec<(String, String)> {
+    let grammar = Grammar::new(json_schema(registry));
+    let Some(schema) = grammar.at(path) else { return Vec::new() };
+    let pair = |name: &str, doc: &str| (name.to_string(), doc.to_string());
+    match grammar.form(schema) {
+        Form::Variants(variants) => variants.iter().map(|v| pair(v.name, v.doc)).collect(),
+        Form::Plain(plain) => {
+            keys(plain).into_iter().map(|key| pair(key, doc(&plain["properties"][key]))).collect()
+        }
+        Form::Anything | Form::Choice(_) => Vec::new(),
+    }
+}
+
+/// Names and texts in two columns.
+fn table(rows: &[(String, String)]) -> String {
+    let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    rows.iter().map(|(name, text)| format!("{name:width$}  {text}\n")).collect()
+}
+
+fn indented(text: &str) -> String {
+    text.lines().map(|line| format!("  {line}\n")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::tests::registry;
+
+    fn list(topic: Option<Topic>) -> String {
+        let mut out = Vec::new();
+        run(&Args { topic }, &registry(), &mut out).expect("it prints");
+        String::from_utf8(out).expect("it is text")
+    }
+
+    #[test]
+    fn every_topic_has_names_with_a_line_of_documentation() {
+        for topic in Topic::value_variants() {
+            let text = list(Some(*topic));
+            assert!(!text.is_empty(), "{topic:?} is empty");
+            for line in text.lines() {
+                assert!(line.split_whitespace().count() > 2, "{topic:?} has a bare line: {line}");
+            }
+        }
+        assert!(list(Some(Topic::Shapes)).contains("half_space     Everything below z = 0."));
+        assert!(
+            list(Some(Topic::Estimators))
+                .contains("path  Path tracing.\n  max_bounces  The longest path.")
+        );
+        assert!(list(Some(Topic::Lights)).contains("directional"));
+    }
+
+    #[test]
+    fn everything_has_headings() {
+        let text = list(None);
+        assert!(text.contains("materials\n  apple ") && text.contains("sensors\n"), "{text}");
+    }
+}

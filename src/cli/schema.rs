@@ -1,0 +1,33 @@
+//! `scatterproof schema`: prints the JSON Schema of experiment files.
+
+use std::io::Write;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::experiment::Registry;
+use crate::experiment::schema_json::json_schema;
+
+/// Print the JSON Schema of experiment files, from which editors complete and check.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+/// Prints the schema, the registered estimators in it.
+///
+/// # Errors
+/// The output cannot be written.
+pub fn run(_: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
+    writeln!(out, "{:#}", json_schema(registry)).map_err(Error::io(Path::new("stdout"), "print"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_prints_json() {
+        let mut out = Vec::new();
+        run(&Args {}, &crate::experiment::tests::registry(), &mut out).expect("it prints");
+        let schema: serde_json::Value = serde_json::from_slice(&out).expect("it is JSON");
+        assert_eq!(schema["title"], "scatterproof experiment");
+    }
+}

@@ -1,0 +1,210 @@
+//! From a text to a validated experiment: overrides, the walk, the sweep, the rules, the types.
+
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+
+use super::document::{self, Node, Value};
+use super::registry::Registry;
+use super::rules::{self, At, CELL_KEYS, Findings, Known};
+use super::schema::{Bands, ClaimEntry, ExperimentFile};
+use super::schema_json::json_schema;
+use super::sweep::{self, Point, SweepAxis};
+use super::validate::Walk;
+use super::validate::grammar::Grammar;
+use super::{Axis, CellSpec, Experiment, LoadOptions, origins, overrides, resolved};
+use crate::error::{Diagnostic, Error, Place, Result};
+
+/// Reads, overrides and validates the experiment in `text`, which stands at `path`.
+///
+/// # Errors
+/// Everything that is wrong with it, at once.
+pub fn load_text(
+    path: &Path,
+    text: &str,
+    options: &LoadOptions,
+    registry: &Registry,
+) -> Result<Experiment> {
+    let grammar = Grammar::new(json_schema(registry));
+    let mut root = document::parse(&path.display().to_string(), text).map_err(Error::Input)?;
+    let overridden = apply(&mut root, options, &grammar).map_err(Error::Input)?;
+    let loader = Loader { path, root, grammar, findings: Findings::default() };
+    loader.experiment(&overridden)
+}
+
+/// Applies the chosen setting, then the `--set` arguments; the keys that they set, and where.
+fn apply(
+    root: &mut Node,
+    options: &LoadOptions,
+    grammar: &Grammar,
+) -> std::result::Result<Vec<(String, Place)>, Vec<Diagnostic>> {
+    let mut findings = Vec::new();
+    let mut entries = Vec::new();
+    if let Some(name) = &options.setting {
+        match overrides::setting(root, name) {
+            Ok(setting) => entries.extend(setting),
+            Err(finding) => findings.push(finding),
+        }
+    }
+    for argument in &options.sets {
+        match document::parse_set(argument) {
+            Ok(entry) => entries.push(entry),
+            Err(errors) => findings.extend(errors),
+        }
+    }
+    let mut overridden = Vec::new();
+    for (key, value) in entries {
+        let place = value.key.clone().unwrap_or_else(|| value.origin.place.clone());
+        match overrides::set(root, &key, value, grammar) {
+            Ok(()) => overridden.push((key, place)),
+            Err(finding) => findings.push(finding),
+        }
+    }
+    if findings.is_empty() { Ok(overridden) } else { Err(findings) }
+}
+
+struct Loader<'a> {
+    path: &'a Path,
+    root: Node,
+    grammar: Grammar,
+    findings: Findings,
+}
+
+impl Loader<'_> {
+    fn experiment(self, overridden: &[(String, Place)]) -> Result<Experiment> {
+        let mut walk = Walk::new(&self.grammar, false);
+        walk.root(&self.root, &CELL_KEYS);
+        walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
+        let axes = sweep::axes(&self.root, self.path, overridden, &self.findings);
+        self.shared_rules(axes.as_deref());
+        let bands: Option<Bands> = self.root.get("bands").and_then(typed);
+        let Some(axes) = axes else {
+            self.cell_rules(&self.root, bands.as_ref(), true);
+            return Err(Error::Input(self.findings.into_sorted()));
+        };
+        let points = sweep::cells(&axes);
+        let trees: Vec<Node> = points.iter().map(|points| self.cell_tree(points)).collect();
+        trees.iter().for_each(|tree| self.cell_rules(tree, bands.as_ref(), false));
+        let cells: Option<Vec<CellSpec>> =
+            trees.iter().zip(&points).map(|(tree, points)| cell(tree, &axes, points)).collect();
+        let first = self.first_cell(&trees[0]);
+        let settings = self.settings();
+        match (self.findings.into_sorted(), cells, typed::<ExperimentFile>(&first)) {
+            (findings, Some(cells), Some(mut file)) if findings.is_empty() => {
+                file.sweep = resolved::sweep(&axes);
+                file.setting.clear();
+                let origins = origins::list(&first, &file);
+                let axes = axes.iter().map(Axis::from).collect();
+                Ok(Experiment { path: self.path.to_path_buf(), file, cells, axes, settings, origins })
+            }
+            (findings, ..) if findings.is_empty() => {
+                Err(Error::input("the experiment passed every rule and still does not fit its types"))
+            }
+            (findings, ..) => Err(Error::Input(findings)),
+        }
+    }
+
+    fn settings(&self) -> Vec<String> {
+        match self.root.get("setting").map(|node| &node.value) {
+            Some(Value::Table(settings)) => settings.keys().cloned().collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Rules of what all cells share.
+    fn shared_rules(&self, axes: Option<&[SweepAxis]>) {
+        let at = At::new(&self.root, &self.findings);
+        if let Some(bands) = at.typed("bands") {
+            rules::bands(at.to("bands"), &bands);
+        }
+        let estimators = self.root.get("estimator");
+        if let Some(entries) = estimators {
+            rules::unique_names(at.to("estimator"), entries, "estimators");
+        }
+        if let Some(over) = self.root.at(&["pair", "over"]) {
+            rules::pair(at.to("pair").to("over"), over, &self.grammar);
+        }
+        let names = estimators.map(Node::items).unwrap_or_default();
+        let names = names.iter().filter_map(|entry| entry.get("name")?.as_str()).collect();
+        let known = Known { estimators: names, axes };
+        let claims = at.to("claim");
+        for (i, entry) in self.root.get("claim").map(Node::items).unwrap_or_default().iter().enumerate()
+        {
+            if let Some(claim) = typed::<ClaimEntry>(entry) {
+                rules::claim(claims.item(i), &claim, &known);
+            }
+        }
+    }
+
+    /// The walk and the rules of object, sensor and lights in one cell.
+    fn cell_rules(&self, tree: &Node, bands: Option<&Bands>, lenient: bool) {
+        let mut walk = Walk::new(&self.grammar, lenient);
+        CELL_KEYS.iter().for_each(|key| walk.entry(tree, key));
+        walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
+        let at = At::new(tree, &self.findings);
+        if let Some(bands) = bands {
+            rules::object(at.to("object"), bands);
+            rules::lights(at.to("light"), bands.list().len());
+        }
+        if let Some(sensor) = at.typed("sensor") {
+            let shape = at.to("object").typed("shape");
+            rules::sensor(at.to("sensor"), &sensor, shape.as_ref());
+        }
+    }
+
+    /// Object, sensor and lights of the cell at `points`.
+    fn cell_tree(&self, points: &[&Point]) -> Node {
+        let mut tree = Node { value: Value::Table(Default::default()), ..self.bare_root() };
+        if let (Value::Table(entries), Value::Table(all)) = (&mut tree.value, &self.root.value) {
+            let kept = all.iter().filter(|(key, _)| CELL_KEYS.contains(&key.as_str()));
+            entries.extend(kept.map(|(key, node)| (key.clone(), node.clone())));
+        }
+        for (key, value) in points.iter().flat_map(|point| &point.sets) {
+            if let Err(finding) = overrides::set(&mut tree, key, value.clone(), &self.grammar) {
+                self.findings.add(finding);
+            }
+        }
+        tree
+    }
+
+    fn bare_root(&self) -> Node {
+        Node::empty_table(self.root.origin.clone())
+    }
+
+    /// The document with the first cell's object, sensor and lights, and without sweep and settings.
+    fn first_cell(&self, tree: &Node) -> Node {
+        let mut first = self.root.clone();
+        if let (Value::Table(entries), Value::Table(cell)) = (&mut first.value, &tree.value) {
+            entries.extend(cell.clone());
+            entries.retain(|key, _| key != "sweep" && key != "setting");
+        }
+        first
+    }
+}
+
+fn typed<T: DeserializeOwned>(node: &Node) -> Option<T> {
+    serde_json::from_value(node.to_json()).ok()
+}
+
+fn cell(tree: &Node, axes: &[SweepAxis], points: &[&Point]) -> Option<CellSpec> {
+    let labels: Vec<&str> = points.iter().map(|point| point.label.as_str()).collect();
+    let mut csv_row = std::collections::BTreeMap::new();
+    for (name, column) in points.iter().flat_map(|point| &point.columns) {
+        csv_row.entry(name.clone()).or_insert_with(|| column.text.clone());
+    }
+    let sets = points.iter().flat_map(|point| &point.sets);
+    Some(CellSpec {
+        label: if labels.is_empty() { "base".into() } else { labels.join(", ") },
+        axes: axes
+            .iter()
+            .map(|axis| axis.name.clone())
+            .zip(labels.iter().map(|l| l.to_string()))
+            .collect(),
+        object: typed(tree.get("object")?)?,
+        sensor: typed(tree.get("sensor")?)?,
+        light: typed(tree.get("light")?)?,
+        csv_row,
+        csv_line: points.iter().find_map(|point| point.csv_line),
+        sweep_values: sets.map(|(key, value)| (key.clone(), value.to_json())).collect(),
+    })
+}

@@ -1,0 +1,55 @@
+//! The estimators that a program knows by name.
+
+use schemars::Schema;
+use serde_json::Value as Json;
+
+use super::estimators::Build;
+use super::validate::grammar;
+
+/// The estimators that an experiment file may name.
+#[derive(Clone, Debug, Default)]
+pub struct Registry {
+    /// One entry a kind, in the order in which they are listed.
+    pub entries: Vec<RegistryEntry>,
+}
+
+/// One kind of estimator.
+#[derive(Clone, Copy, Debug)]
+pub struct RegistryEntry {
+    /// The name under which an `[[estimator]]` asks for it.
+    pub kind: &'static str,
+    /// What it does, in one line.
+    pub doc: &'static str,
+    /// The schema of its options, `|| schemars::schema_for!(Options)`; options must refuse unknown
+    /// keys and keep to the keywords that validation understands.
+    pub options_schema: fn() -> Schema,
+    /// Builds it from its validated options and a scene.
+    pub build: Build,
+}
+
+impl Registry {
+    /// The entry of a kind.
+    pub fn get(&self, kind: &str) -> Option<&RegistryEntry> {
+        self.entries.iter().find(|entry| entry.kind == kind)
+    }
+
+    /// The names of all kinds.
+    pub fn kinds(&self) -> Vec<&'static str> {
+        self.entries.iter().map(|entry| entry.kind).collect()
+    }
+}
+
+impl RegistryEntry {
+    /// The schema of its options as JSON, with its own definitions beside it.
+    pub fn options(&self) -> Json {
+        (self.options_schema)().to_value()
+    }
+
+    /// Its options with the first line of their documentation.
+    pub fn option_docs(&self) -> Vec<(String, String)> {
+        let options = self.options();
+        let keys = grammar::keys(&options).into_iter();
+        keys.map(|key| (key.to_string(), grammar::doc(&options["properties"][key]).to_string()))
+            .collect()
+    }
+}

@@ -1,0 +1,127 @@
+//! Rules of `[[claim]]`.
+
+use std::collections::BTreeMap;
+
+use super::At;
+use crate::experiment::schema::{Agree, ClaimEntry, Equals};
+use crate::experiment::suggest;
+use crate::experiment::sweep::SweepAxis;
+
+/// The names that claims may use.
+pub struct Known<'a> {
+    /// Names of estimators.
+    pub estimators: Vec<&'a str>,
+    /// The sweep; none where it could not be read.
+    pub axes: Option<&'a [SweepAxis]>,
+}
+
+/// The rules of one claim.
+pub fn claim(at: At, claim: &ClaimEntry, known: &Known) {
+    if let Some(equals) = &claim.equals {
+        expected(at.to("equals"), equals, known);
+    }
+    if let Some(agree) = &claim.agree {
+        agreement(at.to("agree"), agree, known);
+    }
+}
+
+fn expected(at: At, claim: &Equals, known: &Known) {
+    if let Some(name) = &claim.estimator {
+        estimator(at.to("estimator"), name, known);
+    }
+    if claim.error.is_some() && claim.value.is_none() {
+        at.to("error").report("`error` belongs to `value`, and there is none");
+    }
+    if claim.error_column.is_some() && claim.column.is_none() {
+        at.to("error_column").report("`error_column` belongs to `column`, and there is none");
+    }
+    if let Some(axes) = known.axes {
+        if let Some(name) = &claim.column {
+            column(at.to("column"), name, axes, false);
+        }
+        if let Some(name) = &claim.error_column {
+            column(at.to("error_column"), name, axes, true);
+        }
+        filter(at, &claim.only, axes);
+    }
+}
+
+fn agreement(at: At, claim: &Agree, known: &Known) {
+    let names = at.to("estimators");
+    for (i, name) in claim.estimators.iter().enumerate() {
+        estimator(names.item(i), name, known);
+        if claim.estimators[..i].contains(name) {
+            names.item(i).report(format!("`{name}` stands twice"));
+        }
+    }
+    if claim.estimators.len() == 1 && claim.across.is_none() {
+        names.report_help(
+            "one estimator agrees with itself",
+            "name two or more, or the axis `across` which its cells must agree",
+        );
+    }
+    let Some(axes) = known.axes else { return };
+    if let Some(name) = &claim.across {
+        axis(at.to("across"), name, axes);
+        if claim.only.contains_key(name) {
+            let rule = format!("`{name}` is compared across, `where` cannot fix it");
+            at.to("where").to(name).key().report(rule);
+        }
+    }
+    filter(at, &claim.only, axes);
+}
+
+fn estimator(at: At, name: &str, known: &Known) {
+    if !known.estimators.contains(&name) {
+        let help = suggest::help(name, &known.estimators, "estimators");
+        at.report_help(format!("unknown estimator `{name}`"), help);
+    }
+}
+
+fn axis<'a>(at: At, name: &str, axes: &'a [SweepAxis]) -> Option<&'a SweepAxis> {
+    let axis = axes.iter().find(|axis| axis.name == name);
+    if axis.is_none() {
+        let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
+        at.report_help(format!("unknown axis `{name}`"), suggest::help(name, &names, "axes"));
+    }
+    axis
+}
+
+fn filter(at: At, only: &BTreeMap<String, String>, axes: &[SweepAxis]) {
+    for (name, label) in only {
+        let at = at.to("where").to(name);
+        let Some(axis) = axis(at.key(), name, axes) else { continue };
+        let labels: Vec<&str> = axis.points.iter().map(|point| point.label.as_str()).collect();
+        if !labels.contains(&label.as_str()) {
+            let help = suggest::help(label, &labels, "labels");
+            at.report_help(format!("unknown label `{label}` of axis `{name}`"), help);
+        }
+    }
+}
+
+/// A column of expected values: every row of the axis that holds it gives a finite number.
+fn column(at: At, name: &str, axes: &[SweepAxis], is_error: bool) {
+    let has = |axis: &&SweepAxis| axis.points.iter().any(|point| point.columns.contains_key(name));
+    let Some(axis) = axes.iter().find(has) else {
+        let columns = axes.iter().flat_map(|axis| &axis.points).flat_map(|point| point.columns.keys());
+        let mut columns: Vec<&str> = columns.map(String::as_str).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        let help = suggest::help(name, &columns, "columns");
+        return at.report_help(format!("no row of the sweep has a column `{name}`"), help);
+    };
+    for point in &axis.points {
+        let Some(column) = point.columns.get(name) else {
+            at.report(format!("row `{}` of axis `{}` has no column `{name}`", point.label, axis.name));
+            continue;
+        };
+        let number = column.text.parse::<f64>().ok().filter(|x| x.is_finite());
+        if number.is_none() {
+            let rule = format!("column `{name}` must be a number, is `{}`", column.text);
+            at.findings.at(&column.place, rule, None);
+        } else if is_error && number.is_some_and(|x| x < 0.0) {
+            let rule = format!("a standard error must be at least 0, is {}", column.text);
+            at.findings.at(&column.place, rule, None);
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Rules of `[[light]]`.
+
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+use super::sensor::direction;
+use super::{At, nonzero, spectrum};
+use crate::experiment::schema::{Environment, LightEntry, SolidAngle, Spectrum};
+
+/// The rules of all lights in so many bands.
+pub fn lights(at: At, bands: usize) {
+    let mut names = BTreeSet::new();
+    for i in 0..at.count() {
+        let Some(light) = at.typed::<LightEntry>(&i.to_string()) else { continue };
+        let at = at.item(i);
+        let name = light.name.clone().unwrap_or_else(|| format!("light_{}", i + 1));
+        if !names.insert(name.clone()) {
+            at.to("name").report(format!("two lights are named `{name}`"));
+        }
+        if let Some(directional) = &light.directional {
+            let at = at.to("directional");
+            direction(at.to("toward"), &directional.toward);
+            radiometric(at.to("irradiance"), &directional.irradiance, bands);
+        }
+        if let Some(disc) = &light.solid_angle {
+            solid_angle(at.to("solid_angle"), disc, bands);
+        }
+        if let Some(sky) = &light.environment {
+            environment(at.to("environment"), sky, bands);
+        }
+    }
+}
+
+fn radiometric(at: At, values: &Spectrum, bands: usize) {
+    spectrum(at, values, bands, "at least 0", |x| x >= 0.0);
+}
+
+fn solid_angle(at: At, disc: &SolidAngle, bands: usize) {
+    direction(at.to("toward"), &disc.toward);
+    if let Some(radiance) = &disc.radiance {
+        radiometric(at.to("radiance"), radiance, bands);
+    }
+    if let Some(irradiance) = &disc.irradiance {
+        radiometric(at.to("irradiance"), irradiance, bands);
+        if disc.solid_angle_sr >= TAU {
+            at.to("solid_angle_sr").report_help(
+                format!("must be less than 2 pi beside `irradiance`, is {}", disc.solid_angle_sr),
+                "give `radiance` instead",
+            );
+        }
+    }
+}
+
+fn environment(at: At, sky: &Environment, bands: usize) {
+    if let Some(radiance) = &sky.radiance {
+        radiometric(at.to("radiance"), radiance, bands);
+    }
+    if let Some(axis) = sky.hemisphere {
+        nonzero(at.to("hemisphere"), axis);
+    }
+    if sky.scale.is_some() && sky.map.is_none() {
+        at.to("scale").report("`scale` multiplies a `map`, and there is none");
+    }
+}

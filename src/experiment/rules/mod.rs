@@ -1,0 +1,140 @@
+//! What the schema cannot say: rules between values, each with the place of the offending key.
+
+use std::cell::RefCell;
+
+use serde::de::DeserializeOwned;
+
+use super::document::Node;
+use super::schema::Spectrum;
+use crate::error::{Diagnostic, Place};
+
+mod bands;
+mod claims;
+mod entries;
+mod lights;
+mod object;
+mod sensor;
+
+pub use bands::bands;
+pub use claims::{Known, claim};
+pub use entries::{CELL_KEYS, pair, unique_names};
+pub use lights::lights;
+pub use object::object;
+pub use sensor::sensor;
+
+/// Where the rules put their findings; a finding that is already there is not repeated.
+#[derive(Default)]
+pub struct Findings(RefCell<Vec<Diagnostic>>);
+
+impl Findings {
+    /// Adds a finding unless it is already there.
+    pub fn add(&self, finding: Diagnostic) {
+        let mut findings = self.0.borrow_mut();
+        if !findings.contains(&finding) {
+            findings.push(finding);
+        }
+    }
+
+    /// Adds what is wrong at `place`.
+    pub fn at(&self, place: &Place, rule: impl Into<String>, help: Option<String>) {
+        self.add(Diagnostic { rule: rule.into(), place: Some(place.clone()), help });
+    }
+
+    /// Everything found, in the order of the text.
+    pub fn into_sorted(self) -> Vec<Diagnostic> {
+        let mut findings = self.0.into_inner();
+        findings.sort_by_key(|f| f.place.as_ref().map(|p| (p.name.to_string(), p.span.start)));
+        findings
+    }
+}
+
+/// A node under the eye of a rule.
+#[derive(Clone, Copy)]
+pub struct At<'a> {
+    node: &'a Node,
+    findings: &'a Findings,
+    /// Whether findings are about the key rather than the value.
+    is_key: bool,
+}
+
+impl<'a> At<'a> {
+    /// Looks at `node` and reports to `findings`.
+    pub fn new(node: &'a Node, findings: &'a Findings) -> At<'a> {
+        At { node, findings, is_key: false }
+    }
+
+    /// The entry or element `word`; the node itself where there is none.
+    pub fn to(self, word: &str) -> At<'a> {
+        At { node: self.node.at(&[word]).unwrap_or(self.node), ..self }
+    }
+
+    /// The key under which it stands.
+    pub fn key(self) -> At<'a> {
+        At { is_key: true, ..self }
+    }
+
+    fn place(self) -> &'a Place {
+        self.node.key.as_ref().filter(|_| self.is_key).unwrap_or(self.node.place())
+    }
+
+    /// The element `index`.
+    pub fn item(self, index: usize) -> At<'a> {
+        self.to(&index.to_string())
+    }
+
+    /// The entry `word` as its type; none where it is missing or the walk has refused it.
+    pub fn typed<T: DeserializeOwned>(self, word: &str) -> Option<T> {
+        serde_json::from_value(self.node.at(&[word])?.to_json()).ok()
+    }
+
+    /// The number of elements.
+    pub fn count(self) -> usize {
+        self.node.items().len()
+    }
+
+    /// What is wrong here.
+    pub fn report(self, rule: impl Into<String>) {
+        self.findings.at(self.place(), rule, None);
+    }
+
+    /// What is wrong here, and what to do.
+    pub fn report_help(self, rule: impl Into<String>, help: impl Into<String>) {
+        self.findings.at(self.place(), rule, Some(help.into()));
+    }
+}
+
+/// A list must have an entry per band.
+fn one_per_band(at: At, entries: usize, bands: usize) {
+    if entries != bands {
+        at.report_help(
+            format!("there are {bands} bands, the list has {entries} entries"),
+            "give one number for all bands, or a list with one number per band",
+        );
+    }
+}
+
+/// A spectrum has an entry per band, and every entry keeps a rule: `must` says it in words.
+fn spectrum(at: At, spectrum: &Spectrum, bands: usize, must: &str, holds: fn(f64) -> bool) {
+    match spectrum {
+        Spectrum::Grey(value) => value_rule(at, *value, must, holds),
+        Spectrum::PerBand(values) => {
+            one_per_band(at, values.len(), bands);
+            values.iter().enumerate().for_each(|(i, value)| value_rule(at.item(i), *value, must, holds));
+        }
+    }
+}
+
+fn value_rule(at: At, value: f64, must: &str, holds: fn(f64) -> bool) {
+    if !holds(value) {
+        at.report(format!("must be {must}, is {value}"));
+    }
+}
+
+/// A vector that gives a direction has a length.
+fn nonzero(at: At, vector: [f64; 3]) -> bool {
+    let is_zero = vector == [0.0; 3];
+    if is_zero {
+        at.report("a direction must not be the zero vector");
+    }
+    !is_zero
+}

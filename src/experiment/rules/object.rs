@@ -1,0 +1,152 @@
+//! Rules of the body: shape, boundary, medium.
+
+use super::{At, one_per_band, spectrum, value_rule};
+use crate::experiment::resolve::{Band, BandMedium, eta_materials};
+use crate::experiment::schema::{
+    Bands, Boundary, Coefficients, Eta, EtaFormula, Medium, Shape, Spectrum,
+};
+use crate::experiment::suggest;
+use crate::optics::materials;
+
+/// The rules of the body in the bands.
+pub fn object(at: At, bands: &Bands) {
+    let list = bands.list();
+    let body: Option<Shape> = at.typed("shape");
+    if let Some(body) = &body {
+        shape(at.to("shape"), body);
+    }
+    if let Some(surface) = at.typed("boundary") {
+        boundary(at.to("boundary"), &surface, &list);
+    }
+    if let Some(inside) = at.typed("medium") {
+        medium(at.to("medium"), &inside, bands);
+        if matches!(body, Some(Shape::HalfSpace {})) {
+            conservative(at.to("medium"), &inside, &list);
+        }
+    }
+}
+
+fn shape(at: At, shape: &Shape) {
+    match shape {
+        Shape::Box { size_mm } => positive(at.to("box").to("size_mm"), size_mm),
+        Shape::DrilledBox { size_mm, .. } => positive(at.to("drilled_box").to("size_mm"), size_mm),
+        Shape::Torus { major_radius_mm, minor_radius_mm, .. } => {
+            if minor_radius_mm >= major_radius_mm {
+                at.to("torus").to("minor_radius_mm").report(format!(
+                    "must be less than `major_radius_mm`, is {minor_radius_mm} of {major_radius_mm}"
+                ));
+            }
+        }
+        Shape::CavitySphere { radius_mm, cavity_radius_mm, .. } => {
+            if cavity_radius_mm >= radius_mm {
+                at.to("cavity_sphere").to("cavity_radius_mm").report(format!(
+                    "must be less than `radius_mm`, is {cavity_radius_mm} of {radius_mm}"
+                ));
+            }
+        }
+        _ => {}
+    }
+}
+
+fn positive(at: At, values: &[f64]) {
+    for (i, value) in values.iter().enumerate() {
+        value_rule(at.item(i), *value, "greater than 0", |x| x > 0.0);
+    }
+}
+
+fn boundary(at: At, boundary: &Boundary, bands: &[Band]) {
+    match boundary {
+        Boundary::Smooth { eta: index } => eta(at.to("smooth").to("eta"), index, bands),
+        Boundary::Rough { eta: index, .. } => eta(at.to("rough").to("eta"), index, bands),
+        Boundary::Matched {} => {}
+    }
+}
+
+fn eta(at: At, index: &Eta, bands: &[Band]) {
+    match index {
+        Eta::Grey(value) => value_rule(at, *value, "greater than 0", |x| x > 0.0),
+        Eta::PerBand(values) => {
+            one_per_band(at, values.len(), bands.len());
+            positive(at, values);
+        }
+        Eta::Formula(EtaFormula::Material(name)) if !eta_materials().contains(&name.as_str()) => {
+            let help = suggest::help(name, &eta_materials(), "materials");
+            at.to("material").report_help(format!("unknown material `{name}`"), help);
+        }
+        Eta::Formula(EtaFormula::Sellmeier { b, c_um2 }) if b.len() != c_um2.len() => {
+            let counts = format!("`b` has {} entries, `c_um2` has {}", b.len(), c_um2.len());
+            at.to("sellmeier").to("c_um2").report(counts);
+        }
+        Eta::Formula(_) => {
+            if let Err(why) = index.per_band(bands) {
+                at.report(why);
+            }
+        }
+    }
+}
+
+fn medium(at: At, medium: &Medium, bands: &Bands) {
+    match medium {
+        Medium::Coefficients(given) => coefficients(at.to("coefficients"), given, bands.list().len()),
+        Medium::Preset { name, .. } => {
+            let at = at.to("preset");
+            if materials::find(name).is_none() {
+                let help = suggest::help(name, &materials::names(), "materials");
+                at.to("name").report_help(format!("unknown material `{name}`"), help);
+            }
+            if !matches!(bands, Bands::Rgb {}) {
+                let help = "use `bands = { rgb = {} }`, or `medium.coefficients` with numbers per band";
+                at.report_help("built-in materials are measured in rgb bands only", help);
+            }
+        }
+    }
+}
+
+/// The pairs of keys that say what a medium is.
+const PAIRS: [[&str; 2]; 3] = [
+    ["sigma_t_per_mm", "albedo"],
+    ["sigma_a_per_mm", "sigma_s_per_mm"],
+    ["sigma_a_per_mm", "reduced_sigma_s_per_mm"],
+];
+
+fn coefficients(at: At, given: &Coefficients, bands: usize) {
+    let named: [(&str, &Option<Spectrum>); 5] = [
+        ("sigma_t_per_mm", &given.sigma_t_per_mm),
+        ("albedo", &given.albedo),
+        ("sigma_a_per_mm", &given.sigma_a_per_mm),
+        ("sigma_s_per_mm", &given.sigma_s_per_mm),
+        ("reduced_sigma_s_per_mm", &given.reduced_sigma_s_per_mm),
+    ];
+    let keys: Vec<&str> = named.iter().filter(|(_, s)| s.is_some()).map(|(key, _)| *key).collect();
+    if !PAIRS.iter().any(|pair| keys == pair) {
+        let pairs = PAIRS.map(|[a, b]| format!("(`{a}`, `{b}`)")).join(", ");
+        let found = if keys.is_empty() { "none".into() } else { suggest::quoted(&keys) };
+        at.report_help(format!("exactly one pair of coefficients is needed, found {found}"), pairs);
+    }
+    for (key, values) in named {
+        let Some(values) = values else { continue };
+        match key {
+            "albedo" => {
+                spectrum(at.to(key), values, bands, "between 0 and 1", |x| (0.0..=1.0).contains(&x))
+            }
+            _ => spectrum(at.to(key), values, bands, "at least 0", |x| x >= 0.0),
+        }
+    }
+    spectrum(at.to("g"), &given.g, bands, "between -1 and 1, both excluded", |g| g.abs() < 1.0);
+}
+
+/// Without absorption a walk in a half-space returns surely, but after infinitely many steps on average.
+fn conservative(at: At, medium: &Medium, bands: &[Band]) {
+    let key = match medium {
+        Medium::Coefficients(given) if given.albedo.is_some() => "albedo",
+        _ => "sigma_a_per_mm",
+    };
+    let Some(coefficients) = medium.per_band(bands.len()) else { return };
+    let lossless = |(c, _): &(&BandMedium, &Band)| c.sigma_a == 0.0 && c.sigma_s > 0.0;
+    if let Some((_, band)) = coefficients.iter().zip(bands).find(lossless) {
+        at.to("coefficients").to(key).report_help(
+            "a conservative half-space has walks of infinite mean length",
+            format!("band `{}` absorbs nothing: let it absorb a little, or use a slab", band.name),
+        );
+    }
+}

@@ -1,0 +1,54 @@
+//! Rules of `sensor`.
+
+use super::{At, nonzero};
+use crate::experiment::resolve::unit;
+use crate::experiment::schema::{Direction, Sensor, Shape};
+use crate::math::DVec3;
+
+/// Sines of the angle between view and `up` below this leave the image's turn undefined.
+const PARALLEL: f64 = 1e-9;
+
+/// Directions are directions, `up` is not along the view, fluxes of planes are about +z.
+pub fn sensor(at: At, sensor: &Sensor, shape: Option<&Shape>) {
+    match sensor {
+        Sensor::Orthographic { toward, up, .. } => {
+            let at = at.to("orthographic");
+            if direction(at.to("toward"), toward) {
+                upright(at.to("up"), *up, toward.unit());
+            }
+        }
+        Sensor::Perspective { position_mm, look_at_mm, up, .. } => {
+            let at = at.to("perspective");
+            let view = DVec3::from_array(*look_at_mm) - DVec3::from_array(*position_mm);
+            if view == DVec3::ZERO {
+                at.to("look_at_mm").report("`look_at_mm` must differ from `position_mm`");
+            } else {
+                upright(at.to("up"), *up, unit(view.to_array()));
+            }
+        }
+        Sensor::Probe { toward, .. } => {
+            direction(at.to("probe").to("toward"), toward);
+        }
+        Sensor::Flux { axis, .. } => {
+            let at = at.to("flux").to("axis");
+            let is_planar = matches!(shape, Some(Shape::HalfSpace {} | Shape::Slab { .. }));
+            if nonzero(at, *axis) && is_planar && !(axis[..2] == [0.0, 0.0] && axis[2] > 0.0) {
+                at.report("the axis must be +z on a half_space and on a slab");
+            }
+        }
+    }
+}
+
+/// A vector that is a direction has a length.
+pub fn direction(at: At, direction: &Direction) -> bool {
+    match direction {
+        Direction::Vector(vector) => nonzero(at, *vector),
+        Direction::Polar(_) => true,
+    }
+}
+
+fn upright(at: At, up: [f64; 3], view: DVec3) {
+    if nonzero(at, up) && !(unit(up).cross(view).abs().max_element() > PARALLEL) {
+        at.report("`up` must not be parallel to the view");
+    }
+}

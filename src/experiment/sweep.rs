@@ -1,0 +1,272 @@
+//! The sweep of an experiment file: its axes, their points, and the cells that they span.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use super::document::{Node, Source, Value};
+use super::overrides::{is_within, overlap, relabel};
+use super::rules::{CELL_KEYS, Findings};
+use super::suggest;
+use super::sweep_csv;
+use crate::error::Place;
+
+/// More cells than this are taken for a mistake.
+const MOST_CELLS: usize = 100_000;
+
+/// One axis.
+#[derive(Clone, Debug)]
+pub struct SweepAxis {
+    /// Its name.
+    pub name: String,
+    /// Its points in order.
+    pub points: Vec<Point>,
+}
+
+/// One point of an axis.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Its label.
+    pub label: String,
+    /// Where it stands.
+    pub place: Place,
+    /// The dotted keys that it sets, and the values.
+    pub sets: Vec<(String, Node)>,
+    /// The columns of its row.
+    pub columns: BTreeMap<String, Column>,
+    /// The line of its CSV file, counted from 1.
+    pub csv_line: Option<usize>,
+}
+
+/// One field of a row.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// Its text.
+    pub text: String,
+    /// Where it stands.
+    pub place: Place,
+}
+
+/// The path of a file that an experiment file names, relative to the folder of that file.
+pub fn resolve_path(experiment: &Path, named: &str) -> PathBuf {
+    experiment.parent().unwrap_or(Path::new("")).join(named)
+}
+
+/// Reads the axes of a document; none where something is wrong, the findings say what.
+/// `overridden` are the keys that a setting or `--set` has set, which a sweep must not set again.
+pub fn axes(
+    root: &Node,
+    experiment: &Path,
+    overridden: &[(String, Place)],
+    findings: &Findings,
+) -> Option<Vec<SweepAxis>> {
+    let entries = root.get("sweep").map(Node::items).unwrap_or_default();
+    let read = entries.iter().map(|entry| axis(entry, experiment, findings));
+    let axes: Vec<Option<SweepAxis>> = read.collect();
+    let axes: Option<Vec<SweepAxis>> = axes.into_iter().collect();
+    let axes = axes?;
+    let sound = [
+        unique_axes(&axes, entries, findings),
+        keys_apart(&axes, findings),
+        not_overridden(&axes, overridden, findings),
+        few_cells(&axes, entries, findings),
+    ];
+    sound.iter().all(|ok| *ok).then_some(axes)
+}
+
+/// The points of every cell, the first axis slowest. Without axes there is one cell.
+pub fn cells(axes: &[SweepAxis]) -> Vec<Vec<&Point>> {
+    axes.iter().fold(vec![Vec::new()], |cells, axis| {
+        let extend = |cell: Vec<_>| axis.points.iter().map(move |point| [&cell[..], &[point]].concat());
+        cells.into_iter().flat_map(extend).collect()
+    })
+}
+
+fn axis(entry: &Node, experiment: &Path, findings: &Findings) -> Option<SweepAxis> {
+    let mut points = match form(entry, findings)? {
+        Form::Values => from_values(entry, findings),
+        Form::Rows => from_rows(entry, findings),
+        Form::Csv => {
+            let entry = entry.get("csv")?;
+            let path = entry.get("path").and_then(Node::as_str)?;
+            sweep_csv::points(entry, &resolve_path(experiment, path), findings)
+        }
+    }?;
+    let first_key = points.first().and_then(|point| point.sets.first()).map(|(key, _)| key.clone());
+    let named = entry.get("name").and_then(Node::as_str).map(String::from);
+    let name = named.or_else(|| Some(first_key?.rsplit('.').next()?.to_string()))?;
+    let source = Source::Sweep(name.as_str().into());
+    for (_, value) in points.iter_mut().filter(|p| p.csv_line.is_none()).flat_map(|p| &mut p.sets) {
+        relabel(value, &source);
+    }
+    let known_keys = cell_keys_only(&points, findings);
+    (unique_labels(&points, findings) && known_keys).then_some(SweepAxis { name, points })
+}
+
+enum Form {
+    Values,
+    Rows,
+    Csv,
+}
+
+fn form(entry: &Node, findings: &Findings) -> Option<Form> {
+    let keys = ["csv", "key", "keys", "rows", "values"];
+    let given: Vec<&str> = keys.into_iter().filter(|key| entry.get(key).is_some()).collect();
+    match given[..] {
+        ["csv"] => Some(Form::Csv),
+        ["key", "values"] => Some(Form::Values),
+        ["keys", "rows"] => Some(Form::Rows),
+        _ => {
+            let found = if given.is_empty() { "none".into() } else { suggest::quoted(&given) };
+            let rule = "a sweep needs exactly one of `key` with `values`, `keys` with `rows`, `csv`";
+            findings.at(entry.place(), format!("{rule}; found {found}"), None);
+            None
+        }
+    }
+}
+
+fn from_values(entry: &Node, findings: &Findings) -> Option<Vec<Point>> {
+    let (key, values) = (entry.get("key")?, entry.get("values")?);
+    not_empty(values, findings)?;
+    let point = |value: &Node| {
+        Some(Point {
+            label: value.label(),
+            place: value.origin.place.clone(),
+            sets: vec![setting(key, value)?],
+            columns: BTreeMap::new(),
+            csv_line: None,
+        })
+    };
+    values.items().iter().map(point).collect()
+}
+
+fn from_rows(entry: &Node, findings: &Findings) -> Option<Vec<Point>> {
+    let (keys, rows) = (entry.get("keys")?, entry.get("rows")?);
+    not_empty(keys, findings)?;
+    not_empty(rows, findings)?;
+    let points: Vec<Option<Point>> =
+        rows.items().iter().map(|row| from_row(keys.items(), row, findings)).collect();
+    points.into_iter().collect()
+}
+
+fn from_row(keys: &[Node], row: &Node, findings: &Findings) -> Option<Point> {
+    let (label, values) = (row.get("label")?, row.get("values")?);
+    let count = values.items().len();
+    if count != keys.len() {
+        let rule = format!("the row has {count} values for {} keys", keys.len());
+        findings.at(values.place(), rule, None);
+        return None;
+    }
+    let sets: Option<Vec<_>> = keys.iter().zip(values.items()).map(|(k, v)| setting(k, v)).collect();
+    let columns = match row.get("columns").map(|node| &node.value) {
+        Some(Value::Table(columns)) => {
+            columns.iter().map(|(name, node)| (name.clone(), column(node))).collect()
+        }
+        _ => BTreeMap::new(),
+    };
+    Some(Point {
+        label: label.as_str()?.to_string(),
+        place: label.origin.place.clone(),
+        sets: sets?,
+        columns,
+        csv_line: None,
+    })
+}
+
+fn column(node: &Node) -> Column {
+    Column { text: node.label(), place: node.origin.place.clone() }
+}
+
+/// A key with its value, which takes the place of the key's text for findings about the key.
+fn setting(key: &Node, value: &Node) -> Option<(String, Node)> {
+    let value = Node { key: Some(key.origin.place.clone()), ..value.clone() };
+    Some((key.as_str()?.to_string(), value))
+}
+
+fn not_empty(list: &Node, findings: &Findings) -> Option<()> {
+    if list.items().is_empty() {
+        findings.at(list.place(), "empty sweep", None);
+        return None;
+    }
+    Some(())
+}
+
+fn unique_labels(points: &[Point], findings: &Findings) -> bool {
+    let mut labels = BTreeSet::new();
+    let twice: Vec<&Point> = points.iter().filter(|point| !labels.insert(&point.label)).collect();
+    for point in &twice {
+        findings.at(&point.place, format!("label `{}` stands twice on the axis", point.label), None);
+    }
+    twice.is_empty()
+}
+
+fn cell_keys_only(points: &[Point], findings: &Findings) -> bool {
+    let sets = points.first().map(|point| &point.sets[..]).unwrap_or_default();
+    let is_foreign = |key: &str| !key.split('.').next().is_some_and(|word| CELL_KEYS.contains(&word));
+    let foreign: Vec<_> = sets.iter().filter(|(key, _)| is_foreign(key)).collect();
+    for (key, value) in &foreign {
+        let place = value.key.as_ref().unwrap_or(&value.origin.place);
+        let help = "a sweep sets keys that begin with `object`, `sensor` or `light`";
+        findings.at(place, format!("`{key}` cannot be swept"), Some(help.into()));
+    }
+    foreign.is_empty()
+}
+
+fn unique_axes(axes: &[SweepAxis], entries: &[Node], findings: &Findings) -> bool {
+    let mut names = BTreeSet::new();
+    let mut sound = true;
+    for (axis, entry) in axes.iter().zip(entries) {
+        if !names.insert(&axis.name) {
+            sound = false;
+            let place = entry.get("name").unwrap_or(entry).place();
+            let help = "give the sweep another `name`";
+            findings.at(place, format!("two axes are named `{}`", axis.name), Some(help.into()));
+        }
+    }
+    sound
+}
+
+/// No key is set twice: neither within an axis nor by two of them, nor one below the other.
+fn keys_apart(axes: &[SweepAxis], findings: &Findings) -> bool {
+    let sets = axes.iter().filter_map(|axis| axis.points.first()).flat_map(|point| &point.sets);
+    let mut seen: Vec<&str> = Vec::new();
+    let mut sound = true;
+    for (key, value) in sets {
+        if let Some(other) = seen.iter().find(|other| overlap(other, key)) {
+            sound = false;
+            let place = value.key.as_ref().unwrap_or(&value.origin.place);
+            let rule = match *other == key {
+                true => format!("`{key}` is swept twice"),
+                false => format!("`{key}` and `{other}` are swept, and one contains the other"),
+            };
+            findings.at(place, rule, None);
+        }
+        seen.push(key);
+    }
+    sound
+}
+
+fn not_overridden(axes: &[SweepAxis], overridden: &[(String, Place)], findings: &Findings) -> bool {
+    let swept: Vec<(&str, &str)> = axes
+        .iter()
+        .filter_map(|axis| Some((axis, axis.points.first()?)))
+        .flat_map(|(axis, point)| point.sets.iter().map(|(key, _)| (axis.name.as_str(), key.as_str())))
+        .collect();
+    let mut sound = true;
+    for (key, place) in overridden {
+        if let Some((axis, _)) = swept.iter().find(|(_, swept)| is_within(key, swept)) {
+            sound = false;
+            let rule = format!("`{key}` has no effect: the sweep `{axis}` sets it in every cell");
+            findings.at(place, rule, None);
+        }
+    }
+    sound
+}
+
+fn few_cells(axes: &[SweepAxis], entries: &[Node], findings: &Findings) -> bool {
+    let count = axes.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.points.len()));
+    let sound = count.is_some_and(|n| n <= MOST_CELLS);
+    if !sound && let Some(entry) = entries.last() {
+        findings.at(entry.place(), format!("the sweep has more than {MOST_CELLS} cells"), None);
+    }
+    sound
+}

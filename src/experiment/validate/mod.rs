@@ -1,0 +1,372 @@
+//! A generic walk of a document along the JSON Schema that the types of `schema` generate: types,
+//! keys, variants, ranges. It reports every violation, not the first.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value as Json;
+
+use super::document::{Node, Value};
+use super::suggest;
+use crate::error::{Diagnostic, Place};
+
+/// A JSON Schema as the grammar of a file.
+pub mod grammar;
+
+/// The regular expressions that schemas use.
+mod pattern;
+
+use grammar::{Form, Grammar, Variant};
+
+/// The keywords of JSON Schema that the walk understands, and those that carry no rule.
+const KEYWORDS: [&str; 27] = [
+    "$defs",
+    "$ref",
+    "$schema",
+    "additionalProperties",
+    "anyOf",
+    "const",
+    "default",
+    "description",
+    "enum",
+    "exclusiveMaximum",
+    "exclusiveMinimum",
+    "format",
+    "items",
+    "maxItems",
+    "maxLength",
+    "maxProperties",
+    "maximum",
+    "minItems",
+    "minLength",
+    "minProperties",
+    "minimum",
+    "oneOf",
+    "pattern",
+    "properties",
+    "required",
+    "title",
+    "type",
+];
+
+/// The findings of a walk.
+pub struct Walk<'a> {
+    grammar: &'a Grammar,
+    findings: Vec<Diagnostic>,
+    /// Whether keys may be missing (where a sweep that is itself at fault might supply them).
+    lenient: bool,
+}
+
+impl<'a> Walk<'a> {
+    /// A walk along `grammar`; `lenient` walks let required keys be missing.
+    pub fn new(grammar: &'a Grammar, lenient: bool) -> Walk<'a> {
+        Walk { grammar, findings: Vec::new(), lenient }
+    }
+
+    /// Everything found so far.
+    pub fn into_findings(self) -> Vec<Diagnostic> {
+        self.findings
+    }
+
+    /// Checks the whole document but its entries `except`.
+    pub fn root(&mut self, node: &Node, except: &[&str]) {
+        let mut schema = self.grammar.root().clone();
+        if let Some(properties) = schema["properties"].as_object_mut() {
+            except.iter().for_each(|key| properties[*key] = Json::Bool(true));
+        }
+        if let Some(required) = schema["required"].as_array_mut() {
+            required.retain(|key| !except.iter().any(|e| key == e));
+        }
+        if let Value::Table(entries) = &node.value {
+            self.table(node, entries, &schema, "");
+        }
+    }
+
+    /// Checks one top-level entry, which must be there.
+    pub fn entry(&mut self, root: &Node, key: &str) {
+        match (root.get(key), self.grammar.at(&[key])) {
+            (Some(node), Some(schema)) => self.node(node, schema, key),
+            _ if self.lenient => {}
+            _ => self.missing(root, key, ""),
+        }
+    }
+
+    /// Checks `node`, which stands at the dotted `path`, along `schema`.
+    pub fn node(&mut self, node: &Node, schema: &Json, path: &str) {
+        match self.grammar.form(schema) {
+            Form::Anything => self.finite(node),
+            Form::Choice(alternatives) => {
+                match alternatives.iter().find(|a| self.accepts(a, &node.value)) {
+                    Some(alternative) => self.node(node, alternative, path),
+                    None => self.wrong_type(node, schema),
+                }
+            }
+            Form::Variants(variants) => self.variants(node, schema, &variants, path),
+            Form::Plain(plain) if !self.accepts(plain, &node.value) => self.wrong_type(node, plain),
+            Form::Plain(plain) => match &node.value {
+                Value::Table(entries) => self.table(node, entries, plain, path),
+                Value::Array(items) => self.array(node, items, plain, path),
+                Value::String(text) => self.string(node, text, plain),
+                Value::Integer(number) => self.number(node, *number as f64, plain),
+                Value::Float(number) => self.number(node, *number, plain),
+                Value::Bool(_) | Value::Datetime => {}
+            },
+        }
+    }
+
+    fn report(&mut self, place: &Place, rule: String, help: Option<String>) {
+        self.findings.push(Diagnostic { rule, place: Some(place.clone()), help });
+    }
+
+    fn accepts(&self, schema: &Json, value: &Value) -> bool {
+        self.types(schema).iter().any(|name| match value {
+            Value::Bool(_) => *name == "boolean",
+            Value::Integer(_) => matches!(*name, "integer" | "number"),
+            Value::Float(_) => *name == "number",
+            Value::String(_) => *name == "string",
+            Value::Array(_) => *name == "array",
+            Value::Table(_) => *name == "object",
+            Value::Datetime => false,
+        })
+    }
+
+    /// The JSON types that a schema accepts.
+    fn types<'b>(&'b self, schema: &'b Json) -> Vec<&'b str> {
+        match self.grammar.form(schema) {
+            Form::Anything => vec!["boolean", "integer", "number", "string", "array", "object"],
+            Form::Choice(alternatives) => alternatives.iter().flat_map(|a| self.types(a)).collect(),
+            Form::Variants(variants) => {
+                let mut types = Vec::new();
+                if variants.iter().any(|v| v.content.is_none()) {
+                    types.push("string");
+                }
+                if variants.iter().any(|v| v.content.is_some()) {
+                    types.push("object");
+                }
+                types
+            }
+            Form::Plain(plain) => match &plain["type"] {
+                Json::String(name) => vec![name],
+                list => grammar::strings(Some(list)),
+            },
+        }
+    }
+
+    fn wrong_type(&mut self, node: &Node, schema: &Json) {
+        let types: Vec<&str> =
+            self.types(schema).into_iter().filter(|t| *t != "null").map(article).collect();
+        let rule = format!("expected {}, found {}", suggest::join(&types, "or"), found(node));
+        let doc = grammar::doc(schema);
+        self.report(node.place(), rule, (!doc.is_empty()).then(|| doc.to_string()));
+    }
+
+    fn missing(&mut self, node: &Node, key: &str, path: &str) {
+        let path = join_path(path, key);
+        let words: Vec<&str> = path.split('.').collect();
+        let doc = self.grammar.at(&words).map(grammar::doc).filter(|doc| !doc.is_empty());
+        let help = doc.map(|doc| format!("`{key}`: {doc}"));
+        self.report(node.place(), format!("missing key `{path}`"), help);
+    }
+
+    fn table(&mut self, node: &Node, entries: &BTreeMap<String, Node>, schema: &Json, path: &str) {
+        let known = grammar::keys(schema);
+        let mut meant = Vec::new();
+        for (key, entry) in entries {
+            let path = join_path(path, key);
+            match (schema["properties"].get(key), &schema["additionalProperties"]) {
+                (Some(property), _) => self.node(entry, property, &path),
+                (None, Json::Bool(false)) => {
+                    meant.extend(suggest::nearest(key, &known));
+                    let help = Some(suggest::help(key, &known, "keys"));
+                    let place = entry.key.as_ref().unwrap_or(&entry.origin.place);
+                    self.report(place, format!("unknown key `{key}`"), help);
+                }
+                (None, rest) if rest.is_object() => self.node(entry, rest, &path),
+                (None, _) => self.finite(entry),
+            }
+        }
+        for key in grammar::strings(schema.get("required")) {
+            if !self.lenient && !entries.contains_key(key) && !meant.contains(&key) {
+                self.missing(node, key, path);
+            }
+        }
+        self.one_of(node, entries, schema, &meant);
+    }
+
+    /// A table whose `oneOf` lists keys of which exactly one must be there.
+    fn one_of(&mut self, node: &Node, entries: &BTreeMap<String, Node>, schema: &Json, meant: &[&str]) {
+        let Some(alternatives) = schema.get("oneOf").and_then(Json::as_array) else { return };
+        let keys: Vec<&str> =
+            alternatives.iter().flat_map(|a| grammar::strings(a.get("required"))).collect();
+        let given: Vec<&str> = keys.iter().copied().filter(|key| entries.contains_key(*key)).collect();
+        let needed = suggest::quoted(&keys);
+        match given[..] {
+            [_] => {}
+            [] if self.lenient || keys.iter().any(|key| meant.contains(key)) => {}
+            [] => {
+                self.report(node.place(), format!("exactly one of {needed} is needed, found none"), None)
+            }
+            [.., last] => {
+                let place = entries[last].key.clone().unwrap_or_else(|| node.place().clone());
+                let rule =
+                    format!("exactly one of {needed} is needed, found {}", suggest::quoted(&given));
+                self.report(&place, rule, None);
+            }
+        }
+    }
+
+    fn array(&mut self, node: &Node, items: &[Node], schema: &Json, path: &str) {
+        let bound = |keyword: &str| schema[keyword].as_u64().map(|n| n as usize);
+        let (least, most) = (bound("minItems").unwrap_or(0), bound("maxItems").unwrap_or(usize::MAX));
+        if items.len() < least || items.len() > most {
+            let needed = match (least, most) {
+                (least, most) if least == most => format!("exactly {least}"),
+                (least, _) if items.len() < least => format!("at least {least}"),
+                (_, most) => format!("at most {most}"),
+            };
+            let last = path.rsplit('.').next().unwrap_or(path);
+            let rule = match items.len() {
+                0 => format!("`{last}` is empty, it must have {needed} {}", entries_word(least)),
+                n => format!("`{last}` must have {needed} entries, has {n}"),
+            };
+            self.report(node.place(), rule, None);
+        }
+        if let Some(schema) = schema.get("items") {
+            for (i, item) in items.iter().enumerate() {
+                self.node(item, schema, &join_path(path, &i.to_string()));
+            }
+        }
+    }
+
+    fn string(&mut self, node: &Node, text: &str, schema: &Json) {
+        let doc = Some(grammar::doc(schema)).filter(|doc| !doc.is_empty()).map(String::from);
+        if text.is_empty() && schema["minLength"].as_u64().is_some_and(|least| least > 0) {
+            self.report(node.place(), "must not be empty".into(), doc.clone());
+        }
+        if let Some(pattern) = schema["pattern"].as_str()
+            && !pattern::matches(pattern, text)
+        {
+            self.report(node.place(), format!("`{text}` has a wrong form"), doc);
+        }
+    }
+
+    fn number(&mut self, node: &Node, number: f64, schema: &Json) {
+        if !number.is_finite() {
+            return self.finite(node);
+        }
+        type Rule = (&'static str, &'static str, fn(f64, f64) -> bool);
+        let rules: [Rule; 4] = [
+            ("minimum", "at least", |x, bound| x >= bound),
+            ("maximum", "at most", |x, bound| x <= bound),
+            ("exclusiveMinimum", "greater than", |x, bound| x > bound),
+            ("exclusiveMaximum", "less than", |x, bound| x < bound),
+        ];
+        for (keyword, words, holds) in rules {
+            if let Some(bound) = schema[keyword].as_f64()
+                && !holds(number, bound)
+            {
+                let doc = Some(grammar::doc(schema)).filter(|doc| !doc.is_empty()).map(String::from);
+                self.report(node.place(), format!("must be {words} {bound}, is {number}"), doc);
+            }
+        }
+    }
+
+    /// Refuses NaN, infinities and dates in values that the schema leaves open.
+    fn finite(&mut self, node: &Node) {
+        match &node.value {
+            Value::Float(number) if !number.is_finite() => {
+                self.report(node.place(), "must be a finite number".into(), None);
+            }
+            Value::Datetime => self.report(node.place(), "dates have no use here".into(), None),
+            Value::Array(items) => items.iter().for_each(|item| self.finite(item)),
+            Value::Table(entries) => entries.values().for_each(|entry| self.finite(entry)),
+            _ => {}
+        }
+    }
+
+    fn variants(&mut self, node: &Node, schema: &Json, variants: &[Variant], path: &str) {
+        let names: Vec<&str> = variants.iter().map(|v| v.name).collect();
+        match &node.value {
+            Value::String(text) if variants.iter().any(|v| v.content.is_none()) => {
+                if !variants.iter().any(|v| v.content.is_none() && v.name == text) {
+                    self.unknown_variant(node.place(), text, &names);
+                }
+            }
+            Value::Table(entries) if variants.iter().any(|v| v.content.is_some()) => {
+                for (key, entry) in entries {
+                    match variants.iter().find(|v| v.name == key).and_then(|v| v.content) {
+                        Some(content) => self.node(entry, content, &join_path(path, key)),
+                        None => {
+                            let place = entry.key.as_ref().unwrap_or(&entry.origin.place);
+                            self.unknown_variant(place, key, &names);
+                        }
+                    }
+                }
+                self.one_variant(node, entries, &names);
+            }
+            _ => self.wrong_type(node, schema),
+        }
+    }
+
+    fn one_variant(&mut self, node: &Node, entries: &BTreeMap<String, Node>, names: &[&str]) {
+        let given: Vec<&str> = entries.keys().map(String::as_str).collect();
+        let rule = match given.len() {
+            0 if self.lenient => return,
+            0 => format!("exactly one of {} is needed, found none", suggest::quoted(names)),
+            1 => return,
+            _ => format!("only one kind may be given, found {}", suggest::quoted(&given)),
+        };
+        self.report(node.place(), rule, None);
+    }
+
+    fn unknown_variant(&mut self, place: &Place, name: &str, names: &[&str]) {
+        self.report(place, format!("unknown kind `{name}`"), Some(suggest::help(name, names, "kinds")));
+    }
+}
+
+/// The keywords of a schema that the walk would silently ignore: none in a schema that is enforced.
+pub fn unsupported_keywords(schema: &Json) -> Vec<String> {
+    let Some(object) = schema.as_object() else { return Vec::new() };
+    let mut unsupported: Vec<String> =
+        object.keys().filter(|key| !KEYWORDS.contains(&key.as_str())).cloned().collect();
+    for (key, value) in object {
+        let inner: Vec<&Json> = match key.as_str() {
+            "properties" | "$defs" => value.as_object().into_iter().flat_map(|o| o.values()).collect(),
+            "anyOf" | "oneOf" => value.as_array().into_iter().flatten().collect(),
+            "items" | "additionalProperties" => vec![value],
+            _ => Vec::new(),
+        };
+        unsupported.extend(inner.into_iter().flat_map(unsupported_keywords));
+    }
+    unsupported
+}
+
+fn join_path(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_string() } else { format!("{path}.{key}") }
+}
+
+fn entries_word(count: usize) -> &'static str {
+    if count == 1 { "entry" } else { "entries" }
+}
+
+fn article(json_type: &str) -> &str {
+    match json_type {
+        "boolean" => "true or false",
+        "integer" => "an integer",
+        "number" => "a number",
+        "string" => "a string",
+        "array" => "an array",
+        _ => "a table",
+    }
+}
+
+fn found(node: &Node) -> String {
+    match &node.value {
+        Value::Bool(value) => value.to_string(),
+        Value::Integer(value) => value.to_string(),
+        Value::Float(value) => value.to_string(),
+        Value::String(_) => "a string".into(),
+        Value::Array(_) => "an array".into(),
+        Value::Table(_) => "a table".into(),
+        Value::Datetime => "a date".into(),
+    }
+}
