@@ -52,13 +52,14 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     let mut table = Table::new(&["cell", "estimator", "observables", "passes", "CPU time"]);
     let mut total = 0.0;
     for job in &plan.jobs {
-        let (passes, time) = match if args.dry { None } else { estimate_seconds(job, &experiment.file.budget) } {
-            Some((passes, seconds)) => {
-                total += seconds;
-                (passes.to_string(), format!("{seconds:.1} s"))
-            }
-            None => ("-".into(), "-".into()),
-        };
+        let (passes, time) =
+            match if args.dry { None } else { estimate_seconds(job, &experiment.file.budget) } {
+                Some((passes, seconds)) => {
+                    total += seconds;
+                    (passes.to_string(), format!("{seconds:.1} s"))
+                }
+                None => ("-".into(), "-".into()),
+            };
         table.push(vec![
             experiment.cells[job.cell].label.clone(),
             experiment.file.estimator[job.estimator_index].name.clone(),

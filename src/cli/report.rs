@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::error::Result;
 use crate::report;
 use crate::results::store::RecordFolder;
-use crate::verify::FAMILY_LEVEL;
+use crate::verify::judge::FAMILY_LEVEL;
 
 /// Make tables, images and pages again, from records alone.
 #[derive(clap::Args, Debug)]

@@ -6,8 +6,8 @@ use super::{Reading, Working, listen};
 use crate::error::Result;
 use crate::experiment::load;
 use crate::experiment::registry::Registry;
-use crate::report::{self, table};
-use crate::verify::FAMILY_LEVEL;
+use crate::report::{self, terminal};
+use crate::verify::judge::FAMILY_LEVEL;
 
 /// Run experiments: progress on a terminal, then a table and the place of the report.
 ///
@@ -30,13 +30,13 @@ pub struct Args {
 pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     let interrupt = listen()?;
     let options = args.working.options();
-    let read = |file| load(file, &args.reading.options(), registry);
+    let read = |file: &PathBuf| load(file, &args.reading.options(), registry);
     let experiments = args.files.iter().map(read).collect::<Result<Vec<_>>>()?;
     for experiment in &experiments {
         let (folder, _) = crate::run::run(experiment, registry, &options, &interrupt)?;
         let material = report::write(&folder, FAMILY_LEVEL)?;
-        print!("{}", table::run_summary(&material).to_text());
-        for note in report::notes(&material) {
+        print!("{}", terminal::run_table(&material).to_text());
+        for note in terminal::notes(&material) {
             println!("note: {note}");
         }
         println!("\nreport: {}", folder.root().join("report.html").display());

@@ -8,8 +8,9 @@ use crate::experiment::registry::Registry;
 use crate::experiment::{Experiment, load};
 use crate::report::table::verdict_table;
 use crate::results::store::{RecordFolder, Stored};
+use crate::verify::judge::{FAMILY_LEVEL, judge};
+use crate::verify::junit;
 use crate::verify::verdict::{self, Verdict};
-use crate::verify::{FAMILY_LEVEL, judge::judge, junit};
 
 /// Judge the claims of experiments; runs what has no record yet.
 ///
@@ -53,7 +54,11 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     let verdicts = judge(&records, FAMILY_LEVEL);
     tell(&verdicts, args.verbose);
     if let Some(path) = &args.junit {
-        crate::results::atomic::write(path, junit::to_junit(&verdicts).as_bytes(), "write the JUnit file")?;
+        crate::results::atomic::write(
+            path,
+            junit::to_junit(&verdicts).as_bytes(),
+            "write the JUnit file",
+        )?;
     }
     Ok(verdict::exit_code(&verdicts))
 }
@@ -75,8 +80,11 @@ fn measured(
 
 fn tell(verdicts: &[Verdict], verbose: bool) {
     let green = verdicts.iter().filter(|v| v.is_green()).count();
-    let shown: Vec<Verdict> =
-        verdicts.iter().filter(|v| verbose || !v.is_green() || v.is_summary()).cloned().collect();
+    let shown: Vec<Verdict> = verdicts
+        .iter()
+        .filter(|v| verbose || !v.is_green() || v.test == "sum of z^2")
+        .cloned()
+        .collect();
     if !shown.is_empty() {
         print!("{}", verdict_table(&shown).to_text());
     }
@@ -84,8 +92,16 @@ fn tell(verdicts: &[Verdict], verbose: bool) {
         "{green} of {} verdicts are green; family-wise level {FAMILY_LEVEL:e} over all of them (Holm)",
         verdicts.len()
     );
-    if let Some(worst) = verdicts.iter().filter_map(|v| v.detectable_share()).max_by(f64::total_cmp) {
-        println!("largest defect that could have gone unseen (99 % power): {:.2} % of the value", 100.0 * worst);
+    if let Some(worst) = verdicts
+        .iter()
+        .filter(|v| v.expected != 0.0 && v.detectable.is_finite())
+        .map(|v| v.detectable)
+        .max_by(f64::total_cmp)
+    {
+        println!(
+            "largest defect that could have gone unseen (99 % power): {:.2} % of the value",
+            100.0 * worst
+        );
     }
 }
 

@@ -544,8 +544,7 @@ mod tests {
                     environment(1.0, -DVec3::Z, 1.0, "below"),
                 ];
                 let slab = Shape::Slab { thickness: 1.0 };
-                let scene =
-                    scene(slab, Boundary::Smooth { eta }, medium(b, albedo, g), lights, down());
+                let scene = scene(slab, Boundary::Smooth { eta }, medium(b, albedo, g), lights, down());
                 let (means, scores) = measure(scene, roulette, 100, 3);
                 for (expected, (mean, error)) in [reflected, transmitted].iter().zip(&means[6..8]) {
                     assert!((mean - expected).abs() < 5.0 * error && *error < 3e-3, "{means:?}");
@@ -578,10 +577,8 @@ mod tests {
         let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.2 };
         let boundary = Boundary::Rough { eta: 1.3, facets };
         let whole = vec![environment(1.0, DVec3::Z, 2.0, "sky")];
-        let halves = vec![
-            environment(1.0, DVec3::X, 1.0, "right"),
-            environment(1.0, -DVec3::X, 1.0, "left"),
-        ];
+        let halves =
+            vec![environment(1.0, DVec3::X, 1.0, "right"), environment(1.0, -DVec3::X, 1.0, "left")];
         let mut results = Vec::new();
         for lights in [whole, halves] {
             let scene = scene(SPHERE, boundary, medium(2.0, 0.9, 0.5), lights, off_axis());
@@ -595,13 +592,27 @@ mod tests {
     #[test]
     #[ignore]
     fn speed() {
-        for roulette in [Roulette::Analog, Roulette::Below(0.5), Roulette::Below(0.25), Roulette::Below(0.1)] {
+        for roulette in
+            [Roulette::Analog, Roulette::Below(0.5), Roulette::Below(0.25), Roulette::Below(0.1)]
+        {
             let sky = environment(1.0, DVec3::Z, 2.0, "sky");
-            let scene = scene(SPHERE, Boundary::Smooth { eta: 1.3 }, medium(10.0, 0.99, 0.0), vec![sky], off_axis());
+            let scene = scene(
+                SPHERE,
+                Boundary::Smooth { eta: 1.3 },
+                medium(10.0, 0.99, 0.0),
+                vec![sky],
+                off_axis(),
+            );
             let start = std::time::Instant::now();
             let (means, scores) = measure(scene, roulette, 2000, 1);
             let s = start.elapsed().as_secs_f64();
-            println!("{roulette:?}: {:.0} paths/s, eff {:.3}, {:?} {:?}", 2e6 / s, 1e-9/(means[0].1*means[0].1*s), means[0], scores.cost);
+            println!(
+                "{roulette:?}: {:.0} paths/s, eff {:.3}, {:?} {:?}",
+                2e6 / s,
+                1e-9 / (means[0].1 * means[0].1 * s),
+                means[0],
+                scores.cost
+            );
         }
     }
 }

@@ -159,7 +159,11 @@ impl<'a> Builder<'a> {
             let bad = channel.iter().filter(|x| !x.is_finite() || **x < 0.0).count();
             if bad > 0 {
                 return Err(Error::input_help(
-                    format!("{}: {bad} texels of band `{}` are negative or not finite", path.display(), band.name),
+                    format!(
+                        "{}: {bad} texels of band `{}` are negative or not finite",
+                        path.display(),
+                        band.name
+                    ),
                     "repair the map; a radiance is a finite number that is not negative",
                 ));
             }
@@ -233,7 +237,14 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Sensor {
         let right = view.cross(DVec3::from(up)).normalize();
         let down = view.cross(right);
         let [width, height] = *resolution;
-        Screen { width, height, origin: DVec3::from(origin), right: pixel * right, down: pixel * down, view }
+        Screen {
+            width,
+            height,
+            origin: DVec3::from(origin),
+            right: pixel * right,
+            down: pixel * down,
+            view,
+        }
     };
     match words {
         schema::Sensor::Orthographic { resolution, center_mm, toward, up, width_mm } => {

@@ -63,7 +63,8 @@ impl From<RouletteOption> for Roulette {
 
 /// Options from their validated JSON.
 pub fn read<T: for<'a> Deserialize<'a>>(options: &Json) -> Result<T> {
-    serde_json::from_value(options.clone()).map_err(|error| Error::input(format!("estimator options: {error}")))
+    serde_json::from_value(options.clone())
+        .map_err(|error| Error::input(format!("estimator options: {error}")))
 }
 
 /// How a registered estimator is built from its options and a scene.

@@ -35,8 +35,11 @@ enum Strategy {
 
 /// The registry of the tests: `path` and `snee`.
 pub fn registry() -> Registry {
-    let entry =
-        |kind, doc| RegistryEntry { kind, doc, options_schema: || schemars::schema_for!(Options) };
+    let entry = |kind, doc| {
+        let options_schema = || schemars::schema_for!(Options);
+        let build = |_: &_, _| Err(crate::error::Error::input("never built"));
+        RegistryEntry { kind, doc, options_schema, build }
+    };
     Registry { entries: vec![entry("path", "Path tracing."), entry("snee", "Specular connections.")] }
 }
 

@@ -343,7 +343,10 @@ mod tests {
                 let point = |k: u32| R3.map(|step| (f64::from(k) * step).fract());
                 let nulls = (0..n).filter(|&k| surface.sample(wo, point(k)).is_none()).count();
                 let counted = nulls as f64 / f64::from(n);
-                assert!((counted - sum(&failed)).abs() < 2e-3, "{surface:?} {cos}: {counted} {failed:?}");
+                assert!(
+                    (counted - sum(&failed)).abs() < 2e-3,
+                    "{surface:?} {cos}: {counted} {failed:?}"
+                );
             }
         }
     }

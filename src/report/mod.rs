@@ -26,6 +26,8 @@ pub mod number;
 mod page;
 /// Aligned text, Markdown and CSV.
 pub mod table;
+/// For the terminal.
+pub mod terminal;
 
 /// Everything that a report is made from.
 pub struct Material {

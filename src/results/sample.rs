@@ -34,6 +34,7 @@ pub fn stored(noise: f64) -> Stored {
         resolved: json!({"display": {"exposure_stops": 0.0}, "name": "sample"}),
         claims_hash: "a0".into(),
         claims: json!([]),
+        post_hoc: vec![],
         comparisons: vec![],
         bands: vec![band("R", [1.0, 0.0, 0.0]), band("G", [0.0, 1.0, 0.0])],
         cells: vec![cell],

@@ -48,7 +48,8 @@ impl Scope<'_> {
         for cell in self.cells(&words.only) {
             let spec = &self.experiment.cells[cell];
             let read = |column: &String| number(spec, column);
-            let value = words.value.map_or_else(|| words.column.as_ref().map_or(Ok(f64::NAN), read), Ok)?;
+            let value =
+                words.value.map_or_else(|| words.column.as_ref().map_or(Ok(f64::NAN), read), Ok)?;
             let error = match (words.error, &words.error_column) {
                 (Some(error), _) => error,
                 (None, Some(column)) => read(column)?,
@@ -98,7 +99,10 @@ impl Scope<'_> {
                 let mut groups: BTreeMap<Vec<(&String, &String)>, Vec<usize>> = BTreeMap::new();
                 for &cell in &cells {
                     let axes = self.experiment.cells[cell].axes.iter();
-                    groups.entry(axes.filter(|(name, _)| *name != axis).collect()).or_default().push(cell);
+                    groups
+                        .entry(axes.filter(|(name, _)| *name != axis).collect())
+                        .or_default()
+                        .push(cell);
                 }
                 for group in groups.values() {
                     for name in &words.estimators {
@@ -120,7 +124,8 @@ impl Scope<'_> {
     }
 
     fn cells(&self, only: &BTreeMap<String, String>) -> Vec<usize> {
-        let chosen = |spec: &CellSpec| only.iter().all(|(axis, label)| spec.axes.get(axis) == Some(label));
+        let chosen =
+            |spec: &CellSpec| only.iter().all(|(axis, label)| spec.axes.get(axis) == Some(label));
         (0..self.experiment.cells.len()).filter(|&i| chosen(&self.experiment.cells[i])).collect()
     }
 
@@ -139,7 +144,11 @@ impl Scope<'_> {
             let list: Vec<String> = known.iter().map(|o| format!("{} ({})", o.name, o.class)).collect();
             Error::input_help(
                 format!("claim {} names observable `{name}` of class `{class}`", claim + 1),
-                format!("the sensor of cell `{}` has {}", self.experiment.cells[cell].label, list.join(", ")),
+                format!(
+                    "the sensor of cell `{}` has {}",
+                    self.experiment.cells[cell].label,
+                    list.join(", ")
+                ),
             )
         })
     }

@@ -64,9 +64,11 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
             ));
         }
         for (estimator_index, entry) in experiment.file.estimator.iter().enumerate() {
-            let (kind, options) = entry.kind.iter().next().ok_or_else(|| {
-                Error::input(format!("estimator `{}` has no kind", entry.name))
-            })?;
+            let (kind, options) = entry
+                .kind
+                .iter()
+                .next()
+                .ok_or_else(|| Error::input(format!("estimator `{}` has no kind", entry.name)))?;
             let registered = registry.get(kind).ok_or_else(|| {
                 Error::input(format!("estimator `{}`: unknown kind `{kind}`", entry.name))
             })?;
@@ -75,7 +77,8 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
             }
             let estimator = (registered.build)(options, Arc::clone(&scene))?;
             let groups = band_groups(estimator.band_use(), bands.len());
-            let groups = groups.into_iter().map(|group| streams(experiment, cell, &bands, &entry.name, group));
+            let groups =
+                groups.into_iter().map(|group| streams(experiment, cell, &bands, &entry.name, group));
             let label = match cell.label.as_str() {
                 "" => entry.name.clone(),
                 cell => format!("{cell} / {}", entry.name),

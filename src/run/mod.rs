@@ -28,6 +28,7 @@ use interrupt::Interrupt;
 use progress::Progress;
 
 pub use jobs::{Plan, plan};
+pub use pilot::estimate_seconds;
 
 /// How to run; nothing here changes a result.
 #[derive(Clone, Debug)]
@@ -82,10 +83,10 @@ pub fn run(
     progress.finish();
     let assembled = assemble::assemble(experiment, &plan, played?)?;
     let folder = RecordFolder::new(&root);
-    let record = folder.write(&assembled.record, &assembled.arrays)?;
+    let stored = folder.write(assembled.record, assembled.arrays)?;
     folder.write_timing(&assembled.timing)?;
     folder.write_provenance(&Provenance::collect(options.threads))?;
-    Ok((folder, Stored { record, arrays: assembled.arrays }))
+    Ok((folder, stored))
 }
 
 /// Whether the folder holds a record of exactly this experiment, its claims included.

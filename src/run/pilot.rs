@@ -19,6 +19,20 @@ pub fn passes(job: &Job, budget: &Budget, stop: &dyn Fn() -> bool) -> Option<u64
     }
 }
 
+/// Passes that a budget pays for and the CPU seconds they will take, from a short pilot; `None` where
+/// the pilot saw nothing to time.
+pub fn estimate_seconds(job: &Job, budget: &Budget) -> Option<(u64, f64)> {
+    let passes = passes(job, budget, &|| false)?;
+    let mut played = 1;
+    loop {
+        let cpu = job.play(Stage::Pilot, 0, played, 0, &|| false)?.tally.cpu_seconds;
+        if cpu > 0.02 || played >= passes {
+            return Some((passes, cpu / played as f64 * passes as f64));
+        }
+        played *= 2;
+    }
+}
+
 /// Doubles the pilot until it has used a twentieth of the budget, then divides.
 fn for_seconds(job: &Job, seconds: f64, stop: &dyn Fn() -> bool) -> Option<u64> {
     let mut passes = 1;

@@ -119,7 +119,8 @@ fn alias_table(weights: &[f64]) -> Vec<(f64, u32)> {
     // Rounding can leave a small slot without a partner: it keeps itself, unless it has no weight.
     for s in small {
         if weights[s] == 0.0 {
-            table[s] = (0.0, (0..n).max_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap_or(s) as u32);
+            table[s] =
+                (0.0, (0..n).max_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap_or(s) as u32);
         }
     }
     table

@@ -113,6 +113,11 @@ fn state(trial: Trial, adjusted_p: Option<f64>, level: f64, own_level: f64) -> V
     };
     verdict.note = note(&found, &evidence, detect, &verdict);
     verdict.outcome = expected_outcome(&claim, found, &mut verdict.note);
+    if claim.post_hoc {
+        let reason = "post hoc: claimed when passes had been played; another seed makes it evidence";
+        verdict.note = reason.into();
+        verdict.outcome = Outcome::Invalid(reason.into());
+    }
     verdict
 }
 

@@ -56,6 +56,17 @@ fn a_mean_equals_its_value_and_not_another() {
 }
 
 #[test]
+fn a_claim_made_after_the_run_is_not_green() {
+    let mut s = with_claim(stored(0.1), "equals", None, value(1.0, 0.0), None);
+    s.record.post_hoc = vec![0];
+    assert_invalid(&one(&s), "post hoc");
+    // Nor is a control that expects invalidity.
+    let mut s = with_claim(stored(0.1), "equals", Some("invalid"), value(1.0, 0.0), None);
+    s.record.post_hoc = vec![0];
+    assert_invalid(&one(&s), "post hoc");
+}
+
+#[test]
 fn a_stated_error_widens_the_test() {
     let wide = equals(stored(0.1), 1.06, 0.05, None);
     assert_eq!(wide.outcome, Outcome::Pass);

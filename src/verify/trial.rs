@@ -1,9 +1,7 @@
 //! What one comparison shows by itself, before it is held against the others.
 
-use serde_json::Value;
-
 use super::verdict::{Outcome, Verdict};
-use crate::results::record::{Against, Bias, Comparison, EstimatorRun, Quantity};
+use crate::results::record::{Against, Bias, Comparison, EstimatorRun, Quantity, Record};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::{Estimate, Spread, Test};
 use crate::stats::moments::Moments;
@@ -37,6 +35,8 @@ pub(super) struct Claim {
     pub kind: String,
     /// The outcome that makes it green.
     pub expect: Expect,
+    /// It was made when passes had already been played.
+    pub post_hoc: bool,
 }
 
 /// The outcome that makes a claim green.
@@ -49,8 +49,8 @@ pub(super) enum Expect {
 
 impl Claim {
     /// Reads claim `index` of a record: `name`, `expect`, and the one other key, its kind.
-    pub fn of(claims: &Value, index: usize) -> Claim {
-        let entry = &claims[index];
+    pub fn of(record: &Record, index: usize) -> Claim {
+        let entry = &record.claims[index];
         let text = |key: &str| entry[key].as_str();
         let kind = ["equals", "agree"].iter().find(|kind| !entry[**kind].is_null());
         let kind = kind.map_or("claim", |kind| *kind).to_string();
@@ -60,7 +60,7 @@ impl Claim {
             _ => Expect::Pass,
         };
         let label = text("name").map_or_else(|| format!("{kind} #{}", index + 1), String::from);
-        Claim { label, kind, expect }
+        Claim { label, kind, expect, post_hoc: record.post_hoc.contains(&index) }
     }
 }
 
@@ -148,7 +148,7 @@ impl<'a> Arm<'a> {
 
 /// Judges one comparison by itself.
 pub(super) fn trial(stored: &Stored, comparison: &Comparison) -> Trial {
-    let claim = Claim::of(&stored.record.claims, comparison.claim);
+    let claim = Claim::of(&stored.record, comparison.claim);
     let a = Arm::of(stored, &comparison.quantity);
     let (other, paired) = match &comparison.against {
         Against::Value { .. } => (None, false),

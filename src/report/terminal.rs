@@ -1,0 +1,57 @@
+//! What `run` prints when it is done: a row per measurement, short enough for a terminal.
+
+use super::Material;
+use super::number::{significant, with_error};
+use super::table::Table;
+use crate::results::measurements::Measurement;
+
+/// One row per cell and estimator: the sensor's first observable in every band, passes, CPU time, speed.
+pub fn run_table(material: &Material) -> Table {
+    let record = &material.stored.record;
+    let mut header = vec!["cell", "estimator", "observable"];
+    header.extend(record.bands.iter().map(|band| band.name.as_str()));
+    header.extend(["passes", "CPU s", "paths/s/core"]);
+    let mut table = Table::new(&header);
+    for cell in &record.cells {
+        for run in &cell.runs {
+            let Some(first) = run.observables.first() else { continue };
+            let own = |m: &&Measurement| {
+                let observable = m.observable == first.name && m.class == first.class;
+                observable && m.cell == cell.label && m.estimator == run.estimator
+            };
+            let mut row = vec![cell.label.clone(), run.estimator.clone(), first.name.clone()];
+            row.extend(material.rows.iter().filter(own).map(|m| with_error(m.mean, m.std_error)));
+            let cost = material.timing.as_ref().and_then(|t| t.of(&cell.label, &run.estimator));
+            let rate = cost.and_then(|c| c.paths_per_second());
+            row.push(run.passes.to_string());
+            row.push(cost.map_or(String::new(), |c| significant(c.cpu_seconds, 3)));
+            row.push(rate.map_or(String::new(), |rate| significant(rate, 3)));
+            table.push(row);
+        }
+    }
+    table
+}
+
+/// Notes of estimators and counts of anomalies, each once with the cells that it concerns.
+pub fn notes(material: &Material) -> Vec<String> {
+    let mut lines: Vec<(String, Vec<String>)> = Vec::new();
+    let mut add = |text: String, cell: &str| match lines.iter_mut().find(|(known, _)| *known == text) {
+        Some((_, cells)) => cells.push(cell.to_string()),
+        None => lines.push((text, vec![cell.to_string()])),
+    };
+    for cell in &material.stored.record.cells {
+        for run in &cell.runs {
+            run.notes.iter().for_each(|note| add(format!("{}: {note}", run.estimator), &cell.label));
+            for (name, _) in run.anomalies.iter().filter(|(_, count)| **count > 0) {
+                let total = run.cost.get("paths").copied().unwrap_or(0);
+                let count = run.anomalies[name];
+                add(format!("{}: {count} of `{name}` in {total} paths", run.estimator), &cell.label);
+            }
+        }
+    }
+    let line = |(text, cells): (String, Vec<String>)| {
+        let cells: Vec<String> = cells.into_iter().filter(|cell| !cell.is_empty()).collect();
+        if cells.is_empty() { text } else { format!("{text} [{}]", cells.join("; ")) }
+    };
+    lines.into_iter().map(line).collect()
+}
