@@ -103,4 +103,5 @@ fn a_good_file_is_accepted() {
 mod cells;
 mod claims;
 mod objects;
+mod robust;
 mod walk;

@@ -31,20 +31,20 @@ fn shape(at: At, shape: &Shape) {
         Shape::Box { size_mm } => positive(at.to("box").to("size_mm"), size_mm),
         Shape::DrilledBox { size_mm, .. } => positive(at.to("drilled_box").to("size_mm"), size_mm),
         Shape::Torus { major_radius_mm, minor_radius_mm, .. } => {
-            if minor_radius_mm >= major_radius_mm {
-                at.to("torus").to("minor_radius_mm").report(format!(
-                    "must be less than `major_radius_mm`, is {minor_radius_mm} of {major_radius_mm}"
-                ));
-            }
+            let at = at.to("torus").to("minor_radius_mm");
+            less(at, *minor_radius_mm, "major_radius_mm", *major_radius_mm);
         }
         Shape::CavitySphere { radius_mm, cavity_radius_mm, .. } => {
-            if cavity_radius_mm >= radius_mm {
-                at.to("cavity_sphere").to("cavity_radius_mm").report(format!(
-                    "must be less than `radius_mm`, is {cavity_radius_mm} of {radius_mm}"
-                ));
-            }
+            let at = at.to("cavity_sphere").to("cavity_radius_mm");
+            less(at, *cavity_radius_mm, "radius_mm", *radius_mm);
         }
         _ => {}
+    }
+}
+
+fn less(at: At, value: f64, key: &str, bound: f64) {
+    if value >= bound {
+        at.report(format!("must be less than `{key}`, is {value} of {bound}"));
     }
 }
 

@@ -48,7 +48,7 @@ pub fn direction(at: At, direction: &Direction) -> bool {
 }
 
 fn upright(at: At, up: [f64; 3], view: DVec3) {
-    if nonzero(at, up) && !(unit(up).cross(view).abs().max_element() > PARALLEL) {
+    if nonzero(at, up) && unit(up).cross(view).abs().max_element() <= PARALLEL {
         at.report("`up` must not be parallel to the view");
     }
 }
