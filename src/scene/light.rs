@@ -76,7 +76,8 @@ impl Light {
         match &self.emission {
             Emission::Directional { .. } => (0.0, 0.0),
             Emission::Cap { frame, height, radiance } => {
-                if 1.0 - wi.dot(frame.n) < *height {
+                // `<=`: the whole sphere (height 2) includes the direction opposite to its axis.
+                if 1.0 - wi.dot(frame.n) <= *height {
                     (radiance[band], pdf_cap(*height))
                 } else {
                     (0.0, 0.0)
@@ -128,6 +129,16 @@ mod tests {
                 let sample = light.sample(0, u);
                 assert_eq!(light.eval(0, sample.wi), (sample.radiance, sample.pdf.unwrap_or(0.0)));
             }
+        }
+    }
+
+    /// The whole sphere has no hole where its axis points away from.
+    #[test]
+    fn the_whole_sphere_is_whole() {
+        let all = Emission::Cap { frame: Frame::about(DVec3::Z), height: 2.0, radiance: vec![1.0] };
+        let light = Light { name: "sky".into(), emission: all };
+        for wi in [DVec3::Z, -DVec3::Z, DVec3::X] {
+            assert_eq!(light.eval(0, wi).0, 1.0);
         }
     }
 
