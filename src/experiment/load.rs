@@ -77,10 +77,10 @@ impl Loader<'_> {
         walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
         let axes = sweep::axes(&self.root, self.path, overridden, &self.findings);
         self.shared_rules(axes.as_deref());
-        let bands: Option<Bands> = self.root.get("bands").and_then(typed);
+        let bands = self.bands();
         let Some(axes) = axes else {
             self.cell_rules(&self.root, bands.as_ref(), true);
-            return Err(Error::Input(self.findings.into_sorted()));
+            return Err(refusal(self.findings.into_sorted()));
         };
         let points = sweep::cells(&axes);
         let trees: Vec<Node> = points.iter().map(|points| self.cell_tree(points)).collect();
@@ -97,11 +97,16 @@ impl Loader<'_> {
                 let axes = axes.iter().map(Axis::from).collect();
                 Ok(Experiment { path: self.path.to_path_buf(), file, cells, axes, settings, origins })
             }
-            (findings, ..) if findings.is_empty() => {
-                Err(Error::input("the experiment passed every rule and still does not fit its types"))
-            }
-            (findings, ..) => Err(Error::Input(findings)),
+            (findings, ..) => Err(refusal(findings)),
         }
+    }
+
+    /// The bands where nothing is wrong with them: their number may be absurd else.
+    fn bands(&self) -> Option<Bands> {
+        let mut walk = Walk::new(&self.grammar, false);
+        walk.entry(&self.root, "bands");
+        let is_sound = walk.into_findings().is_empty();
+        self.root.get("bands").filter(|_| is_sound).and_then(typed)
     }
 
     fn settings(&self) -> Vec<String> {
@@ -179,6 +184,14 @@ impl Loader<'_> {
             entries.retain(|key, _| key != "sweep" && key != "setting");
         }
         first
+    }
+}
+
+/// The findings, of which there must be one where an experiment is refused.
+fn refusal(findings: Vec<Diagnostic>) -> Error {
+    match findings.is_empty() {
+        true => Error::input("the experiment passed every rule and still does not fit its types"),
+        false => Error::Input(findings),
     }
 }
 

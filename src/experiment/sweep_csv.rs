@@ -107,6 +107,10 @@ struct Set {
 
 fn columns(entry: &Node, header: &[String], findings: &Findings) -> Option<Vec<Set>> {
     let Some(Value::Table(columns)) = entry.get("columns").map(|node| &node.value) else { return None };
+    if columns.is_empty() {
+        findings.at(entry.get("columns")?.place(), "empty sweep: `columns` sets no key", None);
+        return None;
+    }
     let known: Vec<&str> = header.iter().map(String::as_str).collect();
     let mut sets = Vec::new();
     for (name, key) in columns {

@@ -208,6 +208,8 @@ fn bad_csv_files_are_refused_at_their_line() {
         message.contains("the row has 2 fields, the header 3") && message.contains("t.csv:2:1"),
         "{message}"
     );
+    let message = csv_error("r\n1\n", "csv = { path = \"t.csv\", columns = {} }");
+    assert!(message.contains("empty sweep: `columns` sets no key"), "{message}");
     let message = csv_error("r,a,expected\n", CSV_SWEEP);
     assert!(message.contains("empty sweep"), "{message}");
     let message = csv_error("", &CSV_SWEEP.replace("t.csv", "u.csv"));

@@ -22,6 +22,11 @@ fn bands_run_upwards_and_have_unique_names() {
     holds(&refused("rgb = {}", bands), "`from_nm` needs `to_nm` beside it", "3:47", "");
     let message = refused("rgb = {}", "spectral = { from_nm = 400, to_nm = 700, count = 2000 }");
     assert!(message.contains("must be at most 1024, is 2000"), "{message}");
+    let message = refused("rgb = {}", "spectral = { from_nm = 400, to_nm = 700, count = 99999999999 }");
+    assert!(message.contains("must be at most 1024, is 99999999999"), "{message}");
+    let narrow = GOOD.replace("rgb = {}", "spectral = { from_nm = 400, to_nm = 400.5, count = 100 }");
+    let message = errors(&narrow.replace("[0.9, 0.8, 0.7]", "0.9"));
+    holds(&message, "bins must be at least 0.01 nm wide", "3:62", "");
     let message = refused("rgb = {}", "explicit = []");
     assert!(message.contains("`explicit` is empty, it must have at least 1 entry"), "{message}");
 }
@@ -148,6 +153,8 @@ fn fluxes_of_planes_are_about_z() {
     let text = GOOD.replace("sphere = { radius_mm = 1.0 }", "slab = { thickness_mm = 1 }");
     let rule = "the axis must be +z on a half_space and on a slab";
     holds(&errors(&text.replace(SENSOR, flux)), rule, "7:34", "");
+    let down = flux.replace("[0, 1, 1]", "[0, 0, -1]");
+    holds(&errors(&text.replace(SENSOR, &down)), rule, "7:34", "");
     good(&GOOD.replace(SENSOR, flux));
     good(&text.replace(SENSOR, &flux.replace("[0, 1, 1]", "[0, 0, 2]")));
 }

@@ -8,6 +8,8 @@ use crate::experiment::validate::{Walk, unsupported_keywords};
 #[test]
 fn unknown_keys_are_named_with_what_was_meant() {
     holds(&refused("albedo =", "albdo ="), "unknown key `albdo`", "6:53", "did you mean `albedo`?");
+    let message = refused("radius_mm = 1.0", "raduis_mm = 1.0");
+    holds(&message, "unknown key `raduis_mm`", "4:25", "did you mean `radius_mm`?");
     let message = refused_with("[display]\nzzz = 1\n");
     holds(&message, "unknown key `zzz`", "15:1", "known keys: `exposure_stops`");
     holds(&refused("seed = 1", "seed = 1\nsed = 2"), "unknown key `sed`", "3:1", "did you mean `seed`?");
@@ -62,6 +64,10 @@ fn numbers_are_finite_and_in_range() {
     }
     let message = refused("radius_mm = 1.0", "radius_mm = -3");
     holds(&message, "must be greater than 0, is -3", "4:37", "");
+    let message = refused("radius_mm = 1.0", "radius_mm = 0");
+    holds(&message, "must be greater than 0, is 0", "4:37", "");
+    let message = refused("path = {}", "path = { max_bounces = 5000000000 }");
+    holds(&message, "must be at most 4294967295, is 5000000000", "13:24", "");
     holds(&refused("passes = 16", "passes = 1"), "must be at least 2, is 1", "8:17", "");
     let torus =
         "torus = { major_radius_mm = 2, minor_radius_mm = 1, segments = [2, 8], normals = \"flat\" }";
@@ -149,7 +155,9 @@ fn syntax_errors_come_out_together() {
 
 #[test]
 fn the_walk_enforces_every_keyword_of_the_schema() {
-    assert_eq!(unsupported_keywords(&json_schema(&registry())), Vec::<String>::new());
+    for registry in [registry(), crate::experiment::estimators::builtin()] {
+        assert_eq!(unsupported_keywords(&json_schema(&registry)), Vec::<String>::new());
+    }
     let planted = serde_json::json!({ "properties": { "a": { "type": "number", "multipleOf": 2 } } });
     assert_eq!(unsupported_keywords(&planted), ["multipleOf"]);
 }

@@ -18,7 +18,7 @@ mod pattern;
 use grammar::{Form, Grammar, Variant};
 
 /// The keywords of JSON Schema that the walk understands, and those that carry no rule.
-const KEYWORDS: [&str; 27] = [
+const KEYWORDS: [&str; 24] = [
     "$defs",
     "$ref",
     "$schema",
@@ -33,12 +33,9 @@ const KEYWORDS: [&str; 27] = [
     "format",
     "items",
     "maxItems",
-    "maxLength",
-    "maxProperties",
     "maximum",
     "minItems",
     "minLength",
-    "minProperties",
     "minimum",
     "oneOf",
     "pattern",
@@ -261,7 +258,8 @@ impl<'a> Walk<'a> {
             ("exclusiveMaximum", "less than", |x, bound| x < bound),
         ];
         for (keyword, words, holds) in rules {
-            if let Some(bound) = schema[keyword].as_f64()
+            let of_format = || format_maximum(schema).filter(|_| keyword == "maximum");
+            if let Some(bound) = schema[keyword].as_f64().or_else(of_format)
                 && !holds(number, bound)
             {
                 let doc = Some(grammar::doc(schema)).filter(|doc| !doc.is_empty()).map(String::from);
@@ -338,6 +336,17 @@ pub fn unsupported_keywords(schema: &Json) -> Vec<String> {
         unsupported.extend(inner.into_iter().flat_map(unsupported_keywords));
     }
     unsupported
+}
+
+/// The largest number of an integer type narrower than the 64 bits of the file's integers.
+fn format_maximum(schema: &Json) -> Option<f64> {
+    match schema["format"].as_str()? {
+        "uint8" => Some(f64::from(u8::MAX)),
+        "uint16" => Some(f64::from(u16::MAX)),
+        "uint32" => Some(f64::from(u32::MAX)),
+        "int32" => Some(f64::from(i32::MAX)),
+        _ => None,
+    }
 }
 
 fn join_path(path: &str, key: &str) -> String {
