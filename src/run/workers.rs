@@ -152,9 +152,12 @@ impl Pool<'_> {
         let passes = pilot::passes(job, self.budget, &|| self.settings.interrupt.raised())?;
         let keep_level = batch_level(passes);
         let path = checkpoint::path(self.settings.root, &job.identity);
+        // Where a state goes too far or too coarsely, its passes are played again; they were seen all the
+        // same, so what is claimed since then stays claimed too late.
+        let claims = || checkpoint::claims(&path, &job.identity).unwrap_or_else(|| job.claims.clone());
         let done = checkpoint::load(&path, &job.identity, keep_level)
             .filter(|block| block.next_pass() <= passes)
-            .unwrap_or_else(|| Block { claims: job.claims.clone(), ..Block::empty(0, keep_level) });
+            .unwrap_or_else(|| Block { claims: claims(), ..Block::empty(0, keep_level) });
         let next = done.next_pass();
         sender.send(Message::Begin { job: index, passes, done: Box::new(done) }).ok()?;
         Some(Active { job: index, passes, next, seconds_per_pass: None })
