@@ -175,6 +175,8 @@ struct Collector<'a> {
 struct Running {
     passes: u64,
     done: Block,
+    /// Passes that the state on disk holds.
+    on_disk: u64,
     /// Blocks that came before their turn, by first pass.
     early: BTreeMap<u64, Block>,
     saved: Instant,
@@ -190,7 +192,8 @@ impl<'a> Collector<'a> {
             let job = match message {
                 Message::Begin { job, passes, done } => {
                     let (early, saved) = (BTreeMap::new(), Instant::now());
-                    self.running.insert(job, Running { passes, done: *done, early, saved });
+                    let on_disk = done.next_pass();
+                    self.running.insert(job, Running { passes, done: *done, on_disk, early, saved });
                     job
                 }
                 Message::Played { job, block } => {
@@ -234,7 +237,7 @@ impl<'a> Collector<'a> {
         if self.running.get(&job).is_some_and(|r| r.done.next_pass() == r.passes)
             && let Some(running) = self.running.remove(&job)
         {
-            if running.done.tally.passes > 0 {
+            if running.done.next_pass() > running.on_disk {
                 self.save(job, &running.done)?;
             }
             self.finished.insert(job, running.done);
