@@ -1,1 +1,9 @@
-fn main() {}
+//! Integration tests, one binary: the program as a user runs it, and the sources as a reader sees them.
+
+mod cli;
+mod damage;
+mod interruption;
+mod layering;
+mod reproducibility;
+mod tokens;
+mod work;

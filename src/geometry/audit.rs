@@ -136,7 +136,7 @@ pub fn inward(normal: DVec3, u: Source) -> DVec3 {
 /// 10^-x without a transcendental: a power of ten, linear between.
 fn decades(x: f64) -> f64 {
     let whole = x.floor();
-    0.1f64.powi(whole as i32) * (1.0 - 0.9 * (x - whole))
+    (0..whole as u32).fold(1.0, |power, _| 0.1 * power) * (1.0 - 0.9 * (x - whole))
 }
 
 fn pick(n: usize, u: Source) -> usize {

@@ -52,9 +52,15 @@ pub fn save(path: &Path, identity: &str, block: &Block) -> Result<()> {
     atomic::write(path, &bytes, "save the state of the run")
 }
 
-/// Reads the state of a job, with gates kept at `keep_level`; `None` where there is none that fits.
-pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
+/// The claims that stood before the first passes of a job's state, whether or not [`load`] can go on
+/// from its passes: they were seen.
+pub fn claims(path: &Path, identity: &str) -> Option<Vec<String>> {
     let bytes = std::fs::read(path).ok()?;
+    parts(&bytes, identity).map(|(header, _)| header.claims)
+}
+
+/// Header and numbers of an undamaged state of the job.
+fn parts<'a>(bytes: &'a [u8], identity: &str) -> Option<(Header, &'a [u8])> {
     let (body, checksum) = bytes.split_last_chunk::<32>()?;
     if hash_bytes(body) != *checksum {
         return None;
@@ -62,9 +68,13 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
     let (length, rest) = body.split_first_chunk::<8>()?;
     let (header, numbers) = rest.split_at_checked(u64::from_le_bytes(*length) as usize)?;
     let header: Header = serde_json::from_slice(header).ok()?;
-    if header.identity != identity {
-        return None;
-    }
+    (header.identity == identity).then_some((header, numbers))
+}
+
+/// Reads the state of a job, with gates kept at `keep_level`; `None` where there is none that fits.
+pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
+    let bytes = std::fs::read(path).ok()?;
+    let (header, numbers) = parts(&bytes, identity)?;
     let mut numbers = numbers.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b));
     let mut take = |n: usize| -> Option<Vec<f64>> {
         let taken: Vec<f64> = numbers.by_ref().take(n).collect();

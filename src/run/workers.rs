@@ -152,9 +152,12 @@ impl Pool<'_> {
         let passes = pilot::passes(job, self.budget, &|| self.settings.interrupt.raised())?;
         let keep_level = batch_level(passes);
         let path = checkpoint::path(self.settings.root, &job.identity);
+        // Where a state goes too far or too coarsely, its passes are played again; they were seen all the
+        // same, so what is claimed since then stays claimed too late.
+        let claims = || checkpoint::claims(&path, &job.identity).unwrap_or_else(|| job.claims.clone());
         let done = checkpoint::load(&path, &job.identity, keep_level)
             .filter(|block| block.next_pass() <= passes)
-            .unwrap_or_else(|| Block { claims: job.claims.clone(), ..Block::empty(0, keep_level) });
+            .unwrap_or_else(|| Block { claims: claims(), ..Block::empty(0, keep_level) });
         let next = done.next_pass();
         sender.send(Message::Begin { job: index, passes, done: Box::new(done) }).ok()?;
         Some(Active { job: index, passes, next, seconds_per_pass: None })
@@ -172,6 +175,8 @@ struct Collector<'a> {
 struct Running {
     passes: u64,
     done: Block,
+    /// Passes that the state on disk holds.
+    on_disk: u64,
     /// Blocks that came before their turn, by first pass.
     early: BTreeMap<u64, Block>,
     saved: Instant,
@@ -187,7 +192,8 @@ impl<'a> Collector<'a> {
             let job = match message {
                 Message::Begin { job, passes, done } => {
                     let (early, saved) = (BTreeMap::new(), Instant::now());
-                    self.running.insert(job, Running { passes, done: *done, early, saved });
+                    let on_disk = done.next_pass();
+                    self.running.insert(job, Running { passes, done: *done, on_disk, early, saved });
                     job
                 }
                 Message::Played { job, block } => {
@@ -231,7 +237,7 @@ impl<'a> Collector<'a> {
         if self.running.get(&job).is_some_and(|r| r.done.next_pass() == r.passes)
             && let Some(running) = self.running.remove(&job)
         {
-            if running.done.tally.passes > 0 {
+            if running.done.next_pass() > running.on_disk {
                 self.save(job, &running.done)?;
             }
             self.finished.insert(job, running.done);

@@ -1,0 +1,253 @@
+//! The command line: what it says of bad input, with which exit code, and what each command does.
+
+use super::work::{IMAGE, SENSOR, Work, edit, replaced};
+
+/// `run` and `plan` refuse the experiment with exit code 2 and these words.
+#[track_caller]
+fn refused(work: &Work, words: &[&str]) {
+    for command in ["run x.toml", "plan x.toml --dry", "verify x.toml"] {
+        let ran = work.run(command);
+        ran.exits(2).check(ran.stdout().is_empty(), "nothing but the error is said");
+        ran.complains_of(words);
+    }
+    assert!(!work.path("results").exists(), "bad input leaves nothing behind");
+}
+
+/// An experiment that `check` refuses already.
+#[track_caller]
+fn bad(old: &str, new: &str, words: &[&str]) {
+    let work = Work::with(&edit(old, new));
+    refused(&work, words);
+    let ran = work.run("check x.toml");
+    ran.exits(2).complains_of(words);
+}
+
+#[test]
+fn words_and_types() {
+    let help = "did you mean `radius_mm`?";
+    bad("{ radius_mm", "{ radius_m", &["unknown key `radius_m`", "x.toml:4:25", help]);
+    bad("seed", "sead", &["unknown key `sead`", "x.toml:2:1", "did you mean `seed`?"]);
+    bad("seed", "sead", &["missing key `seed`"]);
+    bad(
+        "mm = 1.0",
+        "mm = \"one\"",
+        &["expected a number, found a string", "x.toml:4:37", "Radius, mm."],
+    );
+    bad("path = {}", "pth = {}", &["unknown key `pth`", "x.toml:17:1", "did you mean `path`?"]);
+    bad("ggx", "gxg", &["`gxg`", "x.toml:5:44", "ggx"]);
+    bad("seed = 7", "seed =", &["x.toml:2:"]);
+    bad("seed = 7", "seed = 7\nseed = 8", &["x.toml:3:1"]);
+    bad(
+        "name = \"x\"",
+        "name = \"../x\"",
+        &["`../x` has a wrong form", "x.toml:1:8", "letters, digits"],
+    );
+}
+
+#[test]
+fn numbers_out_of_range() {
+    bad("mm = 1.0", "mm = nan", &["must be a finite number", "x.toml:4:37"]);
+    bad("mm = 1.0", "mm = inf", &["must be a finite number", "x.toml:4:37"]);
+    bad("mm = 1.0", "mm = 0", &["must be greater than 0, is 0", "x.toml:4:37"]);
+    bad("[1, 2, 4]", "[1, -2, 4]", &["must be at least 0, is -2", "x.toml:6:53"]);
+    for g in ["1", "-1.0", "3"] {
+        bad(
+            "g = 0.2",
+            &format!("g = {g}"),
+            &["must be between -1 and 1, both excluded, is ", "x.toml:6:90"],
+        );
+    }
+    for eta in ["0", "-1.3"] {
+        bad("eta = 1.3", &format!("eta = {eta}"), &["must be greater than 0, is ", "x.toml:5:68"]);
+    }
+    bad("passes = 100", "passes = 1", &["must be at least 2, is 1", "x.toml:8:17"]);
+    bad("irradiance = 1.0", "irradiance = -1", &["must be at least 0, is -1", "x.toml:11:50"]);
+}
+
+#[test]
+fn sweeps_and_bodies_that_cannot_be() {
+    let sweep =
+        "[[sweep]]\nkey = \"object.shape.sphere.radius_mm\"\nvalues = []\n[[light]]\nname = \"sun\"";
+    bad("[[light]]\nname = \"sun\"", sweep, &["empty sweep", "x.toml:11:10"]);
+    let half_space = edit("sphere = { radius_mm = 1.0 }", "half_space = {}");
+    let work = Work::with(&replaced(&half_space, "0.8, 0.7]", "1, 0.7]"));
+    let rule = "a conservative half-space has walks of infinite mean length";
+    refused(&work, &[rule, "x.toml:6:68", "band `G` absorbs nothing", "use a slab"]);
+}
+
+#[test]
+fn several_violations_come_together() {
+    let text = replaced(&edit("{ radius_mm", "{ radius_m"), "g = 0.2", "g = 1");
+    let text = replaced(&replaced(&text, "eta = 1.3", "eta = -1"), "path = {}", "pth = {}");
+    let work = Work::with(&text);
+    let words =
+        ["unknown key `radius_m`", "x.toml:5:68", "both excluded", "unknown key `pth`", "4 errors"];
+    refused(&work, &words);
+    work.write("good.toml", IMAGE);
+    work.run("check x.toml good.toml x.toml").exits(2).complains("8 errors").says("good.toml: ok");
+    // Nothing runs where one file is bad, be it the last.
+    work.run("run good.toml x.toml").exits(2).complains("4 errors");
+    assert!(!work.path("results").exists());
+}
+
+/// Corners of a tetrahedron and its four faces.
+const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+const FACES: &str = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+fn with_mesh(mesh: Option<&str>) -> Work {
+    let shape = "mesh = { path = \"body.obj\", normals = \"flat\" }";
+    let work = Work::with(&edit("sphere = { radius_mm = 1.0 }", shape));
+    mesh.into_iter().for_each(|mesh| work.write("body.obj", mesh));
+    work
+}
+
+#[test]
+fn meshes() {
+    let bad = |mesh: Option<&str>, words: &[&str]| {
+        let work = with_mesh(mesh);
+        refused(&work, &[&["body.obj", "help:"], words].concat());
+    };
+    bad(None, &["could not read the mesh", "relative to the experiment file"]);
+    bad(Some(&format!("{CORNERS}f 1 3 2\nf 1 2 4\nf 1 4 3\n")), &["3 boundary edges", "close the mesh"]);
+    bad(Some(&format!("{CORNERS}{FACES}f 1 2 9\n")), &["out of bounds", "export it again"]);
+    bad(Some(CORNERS), &["no triangles"]);
+    bad(Some(""), &["no triangles"]);
+    bad(Some(&format!("{CORNERS}{FACES}f 1 2 2\n")), &["1 triangle has no area", "triangle 4"]);
+    bad(Some(&format!("{CORNERS}v 0 0 nan\n{FACES}")), &["vertex"]);
+    bad(Some("\u{0}\u{1}\u{2}"), &[]);
+    with_mesh(Some(&format!("{CORNERS}{FACES}"))).run("run x.toml -q --set budget.passes=2").exits(0);
+}
+
+#[test]
+fn sensors_in_bodies_and_too_much_memory() {
+    let work = Work::with(&edit("center_mm = [0, 0, 3]", "center_mm = [0, 0, 0.5]"));
+    refused(&work, &["the sensor at [0, 0, 0.5] mm stands inside the body", "move it outside"]);
+
+    let explicit: Vec<String> = (0..1024).map(|i| format!("{{ name = \"b{i}\" }}")).collect();
+    let bands = format!("bands = {{ explicit = [{}] }}", explicit.join(", "));
+    let text = edit("[12, 12]", "[16384, 16384]").replace("bands = { rgb = {} }", &bands);
+    let text = text.replace("[1, 2, 4]", "1").replace("[0.9, 0.8, 0.7]", "0.9");
+    let work = Work::with(&text);
+    let words = ["error: the run would need", "TiB of memory", "lower the sensor's resolution"];
+    let ran = work.run("run x.toml");
+    ran.exits(2).complains_of(&words);
+    let ran = work.run("plan x.toml --dry");
+    ran.exits(2).complains_of(&words);
+    assert!(!work.path("results").exists());
+}
+
+#[test]
+fn overrides() {
+    let work = Work::with(IMAGE);
+    let set = |set: &str| work.run(&format!("check x.toml --set {set}"));
+    let ran = set("object.shape.sphere.radius=2");
+    ran.exits(2)
+        .complains("unknown key `radius`")
+        .complains("--set:1:")
+        .complains("did you mean `radius_mm`?");
+    set("seed").exits(2).complains("needs `key=value`").complains("for example");
+    set("seed=-1").exits(2).complains("must be at least 0, is -1").complains("--set:1:");
+    set("light.7.name=\"x\"").exits(2).complains("past its end");
+    set("seed=[").exits(2).complains("--set:1:");
+    let ran = work.run("run x.toml --setting quick");
+    ran.exits(2).complains("unknown setting `quick`").complains("there are no settings here");
+    work.write("y.toml", &format!("{IMAGE}[setting.quick]\nbudget.passes = 8\n"));
+    work.run("check y.toml --setting quik").exits(2).complains("did you mean `quick`?");
+    let ran = work.run("plan y.toml --dry --setting quick");
+    ran.exits(0).says("8 passes").says("setting");
+}
+
+#[test]
+fn files_that_are_not_there() {
+    let work = Work::new();
+    for command in ["run no.toml", "check no.toml", "plan no.toml", "verify no.toml"] {
+        work.run(command).exits(3).complains("could not read").complains("no.toml");
+    }
+    work.run("report nowhere").exits(3).complains("nowhere").complains("`scatterproof run` makes one");
+    std::fs::create_dir(work.path("empty")).expect("a folder");
+    work.run("verify empty")
+        .exits(2)
+        .complains("empty holds neither")
+        .complains("name an experiment file");
+    std::fs::write(work.path("binary.toml"), [0xff, 0xfe, 0]).expect("a file");
+    let ran = work.run("check binary.toml");
+    ran.complains("binary.toml").check([Some(2), Some(3)].contains(&ran.code()), "refused");
+}
+
+#[test]
+fn usage() {
+    let work = Work::with(IMAGE);
+    for arguments in ["", "rum x.toml", "run", "run x.toml --threads 0", "run x.toml --treads 2"] {
+        let ran = work.run(arguments);
+        ran.exits(2).complains("Usage: scatterproof");
+    }
+    work.run("rum x.toml").complains("'run'");
+    work.run("--version").exits(0).says(concat!("scatterproof ", env!("CARGO_PKG_VERSION")));
+    work.run("--help").exits(0).says("Exit codes: 0 all well, 1 a claim failed").says("130 interrupted");
+    let commands = ["run", "verify", "report", "plan", "check", "init", "list", "schema", "completions"];
+    for command in commands {
+        work.run("--help").says(&format!("\n  {command} "));
+        let ran = work.run(&format!("{command} --help"));
+        ran.exits(0).says(&format!("Usage: scatterproof {command}"));
+        for line in ran.stdout().lines().filter(|line| line.trim_start().starts_with("--")) {
+            ran.check(line.trim_start().len() < 100 || line.contains("  "), "help lines are readable");
+        }
+    }
+}
+
+#[test]
+fn plan_check_list_schema_completions() {
+    let work = Work::with(IMAGE);
+    let ran = work.run("check x.toml");
+    ran.exits(0).says("x.toml: ok, 1 cell, 2 estimators, 3 bands, 0 claims\n");
+    let ran = work.run("plan x.toml --dry --set budget.passes=9");
+    ran.exits(0).says("object.shape.sphere.radius_mm").says("9 passes").says("--set").says("memory: ");
+    ran.says("1 cells, 2 measurements").check(!work.path("results").exists(), "a plan writes nothing");
+    work.run("plan x.toml --threads 2").exits(0).says("100 ").says("s on 2 threads");
+    work.run("list").exits(0).says("estimators\n").says("half_space").says("Everything below z = 0.");
+    work.run("list estimators").exits(0).says("path").says("roulette");
+    let ran = work.run("schema");
+    let schema: serde_json::Value = serde_json::from_str(&ran.exits(0).stdout()).expect("JSON");
+    assert!(schema["properties"]["object"].is_object(), "{schema:#}");
+    let ran = work.run("completions bash");
+    std::fs::write(work.path("completions"), ran.exits(0).stdout()).expect("a file");
+    work.shell("bash -n completions && source ./completions && complete -p scatterproof").exits(0);
+}
+
+#[test]
+fn init_run_verify_report() {
+    let work = Work::new();
+    work.run("init").exits(0).says("next: scatterproof run experiment.toml");
+    work.run("init").exits(2).complains("experiment.toml exists already").complains("name another file");
+    work.run("init no/such/folder.toml").exits(3).complains("no/such/folder.toml");
+    let ran = work.run("run experiment.toml --setting quick");
+    ran.exits(0).says("report: results/furnace/report.html").says("eta=1.1");
+    ran.check(ran.stderr().is_empty(), "no bar where there is no terminal");
+    ran.check(!ran.stdout().contains(['\u{1b}', '\r']), "no control characters");
+
+    let views = ["report.html", "report.md", "measurements.csv", "verdicts.csv", "summary.json"];
+    let views = views.map(|view| format!("results/furnace/{view}"));
+    let before = views.each_ref().map(|view| work.read(view));
+    let record = work.files("results/furnace/record");
+    views.iter().for_each(|view| std::fs::remove_file(work.path(view)).expect("removed"));
+    work.run("report results/furnace").exits(0).says("results/furnace/report.html");
+    assert_eq!(before, views.each_ref().map(|view| work.read(view)), "the same from the record alone");
+    assert_eq!(record, work.files("results/furnace/record"), "a report changes no record");
+
+    let ran = work.run("verify experiment.toml --setting quick --junit junit.xml --verbose");
+    ran.exits(0).says("verdicts are green");
+    assert!(work.read("junit.xml").contains("<testsuite"), "{}", work.read("junit.xml"));
+    // A folder is judged as it is; and a claim that is wrong is found.
+    work.run("verify results/furnace").exits(0);
+    let text = work.read("experiment.toml").replace("value = 1.0", "value = 1.5");
+    work.write("wrong.toml", &text.replace("\"furnace\"", "\"wrong\""));
+    work.run("verify wrong.toml -q").exits(1).says("off by -33");
+}
+
+#[test]
+fn no_bar_where_there_is_no_terminal() {
+    let work = Work::with(&edit(SENSOR, &SENSOR.replace("[12, 12]", "[40, 40]")));
+    let ran = work.run("run x.toml --threads 2");
+    ran.exits(0).check(ran.stderr().is_empty(), "nothing is drawn");
+    ran.check(!ran.stdout().contains(['\u{1b}', '\r']), "no control characters");
+}

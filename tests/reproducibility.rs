@@ -1,0 +1,209 @@
+//! One experiment, one record, byte for byte: on any threads, in any blocks, in any folder, in pieces.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use super::work::{IMAGE, Work, edit, probe, replaced, same};
+
+type Files = BTreeMap<String, Vec<u8>>;
+
+fn record(work: &Work, out: &str, options: &str) -> Files {
+    work.run(&format!("run x.toml -q --out {out} {options}")).exits(0);
+    work.record(out)
+}
+
+/// The record of a text in a folder of its own.
+fn fresh(text: &str) -> Files {
+    record(&Work::with(text), "results", "")
+}
+
+/// The arrays of a record.
+fn arrays(files: &Files) -> Files {
+    files
+        .iter()
+        .filter(|(name, _)| name.ends_with(".npy"))
+        .map(|(n, b)| (n.clone(), b.clone()))
+        .collect()
+}
+
+fn json(files: &Files) -> Value {
+    serde_json::from_slice(&files["record.json"]).expect("JSON")
+}
+
+/// Gate bytes by what was measured: hash of the cell's content and estimator.
+fn gates(files: &Files) -> BTreeMap<(String, String), Vec<u8>> {
+    let text = |value: &Value| value.as_str().expect("a text").to_string();
+    let mut gates = BTreeMap::new();
+    for cell in json(files)["cells"].as_array().expect("cells") {
+        for run in cell["runs"].as_array().expect("runs") {
+            let key = (text(&cell["content_hash"]), text(&run["estimator"]));
+            let before = gates.insert(key, files[&text(&run["gates"])].clone());
+            assert!(before.is_none(), "two cells are the same");
+        }
+    }
+    gates
+}
+
+#[test]
+fn threads_blocks_and_folders_change_no_byte() {
+    for text in [IMAGE.to_string(), probe()] {
+        let work = Work::with(&text);
+        let first = record(&work, "first", "");
+        for threads in [1, 2, 7] {
+            let other = record(&work, &format!("t{threads}"), &format!("--threads {threads}"));
+            same(&first, &other, &format!("{threads} threads"));
+        }
+        for passes in [1, 3, 16, 1000] {
+            let options = format!("--threads 2 --block-passes {passes}");
+            let other = record(&work, &format!("b{passes}"), &options);
+            same(&first, &other, &format!("blocks of {passes} passes"));
+        }
+        same(&first, &fresh(&text), "another folder");
+        same(&first, &record(&work, "first", ""), "run again");
+    }
+}
+
+#[test]
+fn a_pilots_budget_is_the_same_on_any_threads() {
+    let text = replaced(&probe(), "passes = 100", "relative_error = { at_most = 0.05 }");
+    let work = Work::with(&text);
+    let first = record(&work, "first", "--threads 1");
+    let passes = json(&first)["cells"][0]["runs"][0]["passes"].as_u64().expect("passes");
+    assert!(passes >= 128, "{passes}");
+    same(&first, &record(&work, "second", "--threads 7 --block-passes 5"), "7 threads");
+}
+
+#[test]
+fn more_passes_keep_those_that_were_played() {
+    for text in [IMAGE.to_string(), probe()] {
+        let passes = |n: u64| replaced(&text, "passes = 100", &format!("passes = {n}"));
+        let work = Work::with(&passes(50));
+        let mut before = record(&work, "results", "");
+        // 300 passes are kept in wider batches than 100.
+        for n in [100, 300, 50, 2] {
+            work.write("x.toml", &passes(n));
+            let grown = record(&work, "results", "--threads 2 --block-passes 7");
+            same(&grown, &fresh(&passes(n)), &format!("{n} passes, in pieces and at once"));
+            assert_ne!(arrays(&before), arrays(&grown));
+            before = grown;
+        }
+    }
+}
+
+fn swept(values: &str) -> String {
+    let sweep = format!("[[sweep]]\nkey = \"object.shape.sphere.radius_mm\"\nvalues = {values}\n");
+    probe().replace("passes = 100", "passes = 20") + &sweep
+}
+
+#[test]
+fn the_order_of_a_sweep_changes_no_number() {
+    let forward = gates(&fresh(&swept("[1.0, 1.5, 2.0]")));
+    assert_eq!(forward.len(), 6);
+    assert_eq!(forward, gates(&fresh(&swept("[2.0, 1.0, 1.5]"))));
+    for (key, bytes) in gates(&fresh(&swept("[1.5]"))) {
+        assert_eq!(forward.get(&key), Some(&bytes), "a cell by itself");
+    }
+    let mut numbers: Vec<&Vec<u8>> = forward.values().collect();
+    numbers.sort();
+    numbers.dedup();
+    assert_eq!(numbers.len(), 6, "cells and estimators have numbers of their own");
+}
+
+#[test]
+fn what_names_the_streams_and_what_does_not() {
+    let base = fresh(&probe());
+    let numbers = |old: &str, new: &str| arrays(&fresh(&replaced(&probe(), old, new)));
+    for (old, new) in [("seed = 7", "seed = 8"), ("name = \"mis\"", "name = \"path\"")] {
+        let other = numbers(old, new);
+        let mis = &arrays(&base)["cells/000/mis.gates.npy"];
+        assert!(other.values().all(|bytes| bytes != mis), "{new} changes the numbers");
+    }
+    let claim = "seed = 7\ndescription = \"something\"\ndisplay.exposure_stops = 2\n\
+                 claim = [{ agree = { estimators = [\"mis\", \"analog\"], detect = 0.5 } }]";
+    assert_eq!(numbers("seed = 7", claim), arrays(&base), "claims and words are no part of the numbers");
+    let reversed = {
+        let (head, tail) = IMAGE.split_once("[[estimator]]").expect("estimators");
+        let entries: Vec<&str> = tail.split("[[estimator]]").collect();
+        format!("{head}[[estimator]]{}[[estimator]]{}", entries[1], entries[0])
+    };
+    assert_eq!(arrays(&fresh(&reversed)), arrays(&fresh(IMAGE)), "the order of the estimators");
+}
+
+/// The same boundary in two forms: cells that differ in their words alone.
+fn boundaries(more: &str) -> String {
+    edit("passes = 100", "passes = 20")
+        + more
+        + "[[sweep]]\nname = \"form\"\nkeys = [\"object.boundary\"]\n\
+           rows = [{ label = \"grey\", values = [{ smooth = { eta = 1.3 } }] },\n\
+                   { label = \"bands\", values = [{ smooth = { eta = [1.3, 1.3, 1.3] } }] }]\n\
+           [[claim]]\nagree = { estimators = [\"mis\"], across = \"form\", detect = 0.5 }\n"
+}
+
+#[test]
+fn paired_cells_share_their_streams() {
+    for (more, is_paired) in [("", false), ("[pair]\nover = [\"object.boundary\"]\n", true)] {
+        let files = fresh(&boundaries(more));
+        for name in ["mis", "analog"] {
+            for kind in ["gates", "pixels"] {
+                let [grey, bands] =
+                    [0, 1].map(|cell| &files[&format!("cells/{cell:03}/{name}.{kind}.npy")]);
+                assert_eq!(grey == bands, is_paired, "{name} {kind}");
+            }
+        }
+        assert_ne!(json(&files)["cells"][0]["content_hash"], json(&files)["cells"][1]["content_hash"]);
+        let comparisons = json(&files)["comparisons"].to_string();
+        assert!(comparisons.contains(&format!("\"paired\":{is_paired}")), "{comparisons}");
+    }
+    // Paired over something else, they do not.
+    let files = fresh(&boundaries("[pair]\nover = [\"object.shape\"]\n"));
+    assert_ne!(files["cells/000/mis.gates.npy"], files["cells/001/mis.gates.npy"]);
+}
+
+/// The furnace of `init`, whose claim holds, in 64 passes of one estimator and without its claim.
+fn furnace() -> (Work, String, String) {
+    let work = Work::new();
+    work.run("init x.toml").exits(0);
+    let text = work.read("x.toml").replace("\"furnace\"", "\"x\"");
+    let (head, tail) = text.split_once("[[claim]]").expect("a claim");
+    let (_, settings) = tail.split_once("# Named").expect("settings");
+    (work, text.clone(), format!("{head}# {settings}"))
+}
+
+/// The claim is judged green where it was made before the passes, and not where it came after.
+#[track_caller]
+fn is_post_hoc(work: &Work, options: &str) {
+    let ran = work.run(&format!("verify x.toml -q {options}"));
+    ran.exits(3).says("post hoc").says("0 of 9 verdicts are green");
+}
+
+#[test]
+fn claims_made_after_the_run_are_not_green() {
+    let (work, claimed, bare) = furnace();
+    work.write("x.toml", &claimed);
+    work.run("verify x.toml -q --out claimed").exits(0).says("9 of 9 verdicts are green");
+
+    work.write("x.toml", &bare);
+    let before = record(&work, "results", "");
+    work.write("x.toml", &claimed);
+    is_post_hoc(&work, "");
+    same(&arrays(&before), &arrays(&work.record("results")), "a claim changes no number");
+    assert_eq!(json(&work.record("results"))["post_hoc"].to_string(), "[0]");
+    // Nothing washes it clean but another seed: neither a second look, nor more or fewer passes.
+    is_post_hoc(&work, "");
+    for passes in [100, 64, 32, 300, 100] {
+        is_post_hoc(&work, &format!("--set budget.passes={passes}"));
+    }
+    work.run("verify results/x").exits(3).says("post hoc");
+    work.run("verify x.toml -q --set seed=5").exits(0).says("9 of 9 verdicts are green");
+
+    // A claim that was there stays evidence beside one that came later.
+    work.write(
+        "x.toml",
+        &(claimed.clone() + "[[claim]]\nequals = { value = 1.0, source = \"x\", detect = 0.1 }\n"),
+    );
+    let ran = work.run("verify x.toml -q --out claimed");
+    ran.exits(3).says("post hoc").says("9 of 18 verdicts are green");
+    work.write("x.toml", &claimed.replace("detect = 0.05", "detect = 0.06"));
+    is_post_hoc(&work, "--out claimed");
+}
