@@ -170,20 +170,16 @@ mod tests {
     use super::super::testing::{Uniform, bodies};
     use super::*;
 
-    const RAYS: u64 = 150_000;
-    const SEGMENTS: u64 = 1_000_000;
-
-    #[test]
-    fn no_ray_from_inside_is_lost() {
+    fn aim(rays: u64) {
         for (name, shape) in bodies() {
             let mut u = Uniform::new(1);
-            let audit = audit_aim(&shape, RAYS, &mut || u.next());
-            assert_eq!(audit, AimAudit { rays: RAYS, lost: 0 }, "{name}");
+            let audit = audit_aim(&shape, rays, &mut || u.next());
+            println!("{name}: {audit:?}");
+            assert_eq!(audit, AimAudit { rays, lost: 0 }, "{name}");
         }
     }
 
-    #[test]
-    fn no_walk_escapes() {
+    fn walk(segments: u64) {
         let analytic = [
             ("half-space", Shape::HalfSpace),
             ("slab", Shape::Slab { thickness: 0.1 }),
@@ -192,9 +188,32 @@ mod tests {
         ];
         for (name, shape) in bodies().into_iter().chain(analytic) {
             let mut u = Uniform::new(2);
-            let audit = audit_walk(&shape, SEGMENTS, &mut || u.next());
+            let audit = audit_walk(&shape, segments, &mut || u.next());
+            println!("{name}: {audit:?}");
             assert_eq!((audit.lost, audit.escaped, audit.wrong), (0, 0, 0), "{name} {audit:?}");
-            assert!(audit.hits > SEGMENTS / 8, "{name} {audit:?}");
+            assert!(audit.hits > segments / 8, "{name} {audit:?}");
         }
+    }
+
+    #[test]
+    fn no_ray_from_inside_is_lost() {
+        aim(150_000);
+    }
+
+    #[test]
+    fn no_walk_escapes() {
+        walk(1_000_000);
+    }
+
+    #[test]
+    #[ignore = "minutes: 1e7 rays at edges and as many at vertices of each mesh"]
+    fn no_ray_from_inside_is_lost_long() {
+        aim(30_000_000);
+    }
+
+    #[test]
+    #[ignore = "many minutes: 1e8 segments on each body"]
+    fn no_walk_escapes_long() {
+        walk(100_000_000);
     }
 }

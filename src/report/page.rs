@@ -55,12 +55,12 @@ fn measured(material: &Material) -> Vec<Block> {
         }
         let rows: Vec<&Measurement> =
             material.rows.iter().filter(|row| row.cell == cell.label).collect();
-        blocks.push(Block::Table(measurement_table(&rows, &bands)));
         let figures = material.figures.iter().filter(|figure| figure.cell == cell.label);
         let figures: Vec<FigureBlock> = figures.map(figure_block).collect();
         if !figures.is_empty() {
             blocks.push(Block::Figures(figures));
         }
+        blocks.push(Block::Table(measurement_table(&rows, &bands)));
     }
     blocks
 }
