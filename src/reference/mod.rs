@@ -1,1 +1,4 @@
-//! Stub.
+//! Oracles: a value and its stated error, from closed forms and quadrature. They never use estimators.
+
+/// Semi-infinite, index-matched, isotropically scattering media.
+pub mod chandrasekhar;

@@ -44,3 +44,40 @@ pub fn square_to_cosine_hemisphere(u: [f64; 2]) -> DVec3 {
 pub fn pdf_cosine_hemisphere(cos: f64) -> f64 {
     cos.max(0.0) * FRAC_1_PI
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid() -> impl Iterator<Item = [f64; 2]> {
+        (1..40).flat_map(|i| (1..40).map(move |j| [f64::from(i) / 40.0, f64::from(j) / 41.0]))
+    }
+
+    /// Area of the image of a unit of the square, by central differences.
+    fn jacobian(map: impl Fn([f64; 2]) -> DVec3, u: [f64; 2]) -> f64 {
+        let e = 1e-6;
+        let a = (map([u[0] + e, u[1]]) - map([u[0] - e, u[1]])) / (2.0 * e);
+        let b = (map([u[0], u[1] + e]) - map([u[0], u[1] - e])) / (2.0 * e);
+        a.cross(b).length()
+    }
+
+    /// D2: every density is the inverse Jacobian of its map, and the images lie where they should.
+    #[test]
+    fn densities_are_inverse_jacobians() {
+        for u in grid() {
+            let disc = |u| {
+                let [x, y] = square_to_disc(u);
+                DVec3::new(x, y, 0.0)
+            };
+            assert!((jacobian(disc, u) * PDF_AREA_DISC - 1.0).abs() < 1e-6);
+            assert!(disc(u).length() < 1.0);
+            for height in [1e-3, 0.5, 2.0] {
+                let cap = |u| square_to_cap(height, u);
+                assert!((jacobian(cap, u) * pdf_cap(height) - 1.0).abs() < 1e-6, "{height} {u:?}");
+            }
+            let cosine = square_to_cosine_hemisphere;
+            assert!((jacobian(cosine, u) * pdf_cosine_hemisphere(cosine(u).z) - 1.0).abs() < 1e-6);
+            assert!((cosine(u).length() - 1.0).abs() < 1e-15);
+        }
+    }
+}
