@@ -62,8 +62,9 @@ fn inputs<I>(index: u64, mut make: impl FnMut(&mut Stream) -> I) -> Vec<I> {
 fn kernels(criterion: &mut Criterion) {
     let group = &mut criterion.benchmark_group("kernel");
     group.sample_size(30);
-    group.warm_up_time(Duration::from_millis(500));
-    group.measurement_time(Duration::from_secs(2));
+    group.warm_up_time(Duration::from_millis(300));
+    group.measurement_time(Duration::from_millis(1500));
+    group.nresamples(10_000);
     sampling(group);
     boundaries(group);
     geometry(group);
@@ -156,8 +157,9 @@ fn paths(criterion: &mut Criterion) {
     let group = &mut criterion.benchmark_group("path");
     group.sample_size(20);
     group.sampling_mode(SamplingMode::Flat);
-    group.warm_up_time(Duration::from_millis(500));
-    group.measurement_time(Duration::from_secs(2));
+    group.warm_up_time(Duration::from_millis(300));
+    group.measurement_time(Duration::from_millis(1500));
+    group.nresamples(10_000);
     group.throughput(Throughput::Elements(PATHS as u64));
     let boundaries = [
         ("smooth", Boundary::Smooth { eta: 1.3 }),

@@ -248,7 +248,9 @@ impl File<'_> {
         for (i, token) in self.tokens.iter().enumerate() {
             let door = DOORS.iter().find(|(name, _)| *name == token.text);
             let Some((name, doors)) = door else { continue };
-            let continues = i >= 2 && self.text(i - 1) == "::" && self.tokens[i - 2].is_word();
+            let continues = i >= 2
+                && self.text(i - 1) == "::"
+                && (self.tokens[i - 2].is_word() && self.text(i - 2) != "use");
             let is_imported = i >= 1 && ["use", "crate"].contains(&self.text(i - 1));
             let is_named = (self.text(i + 1) == "::" && !continues) || is_imported;
             let is_free = token.is_test && TEST_CRATES.contains(name);

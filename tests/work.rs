@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -243,12 +243,4 @@ impl Started<'_> {
         let Started { work, arguments, child } = self;
         work.ran(&arguments, child.wait_with_output().expect("its output"))
     }
-}
-
-/// Number of states in a results folder.
-pub fn states(root: &Path) -> usize {
-    fs::read_dir(root.join("state")).map_or(0, |entries| {
-        let names = entries.map(|entry| entry.expect("an entry").file_name());
-        names.filter(|name| name.to_string_lossy().ends_with(".state")).count()
-    })
 }
