@@ -75,10 +75,10 @@ fn sampling(group: &mut BenchmarkGroup<WallTime>) {
     let pass = pass();
     time(group, "stream, 8 draws", &indices, |index| {
         let mut stream = pass.stream(index, Purpose::Walk);
-        (0..8).map(|_| stream.next()).sum::<f64>()
+        (0..8).map(|_| stream.draw()).sum::<f64>()
     });
-    time(group, "exponential distance", &inputs(1, Stream::next), |u| sample_exponential(10.0, u));
-    let directions = inputs(2, |s| (square_to_cap(2.0, s.next2()), s.next2()));
+    time(group, "exponential distance", &inputs(1, Stream::draw), |u| sample_exponential(10.0, u));
+    let directions = inputs(2, |s| (square_to_cap(2.0, s.draw2()), s.draw2()));
     for g in [0.0, 0.8] {
         let phase = HenyeyGreenstein { g };
         let name = format!("Henyey-Greenstein sample, g {g}");
@@ -87,8 +87,8 @@ fn sampling(group: &mut BenchmarkGroup<WallTime>) {
 }
 
 fn boundaries(group: &mut BenchmarkGroup<WallTime>) {
-    time(group, "Fresnel, from inside", &inputs(3, Stream::next), |cos| fresnel(cos, 1.0 / 1.3));
-    let above = inputs(4, |s| (square_to_cosine_hemisphere(s.next2()), s.next3()));
+    time(group, "Fresnel, from inside", &inputs(3, Stream::draw), |cos| fresnel(cos, 1.0 / 1.3));
+    let above = inputs(4, |s| (square_to_cosine_hemisphere(s.draw2()), s.draw3()));
     for (name, kind) in [("GGX", MicrofacetKind::Ggx), ("Beckmann", MicrofacetKind::Beckmann)] {
         let facets = Microfacets { kind, alpha: 0.2 };
         time(group, &format!("{name} visible normal"), &above, |(wo, [a, b, _])| {
@@ -100,7 +100,7 @@ fn boundaries(group: &mut BenchmarkGroup<WallTime>) {
     time(group, "rough sample, from outside", &above, |(wo, u)| rough.sample(wo, u));
     time(group, "rough sample, from inside", &inside, |(wo, u)| rough.sample(wo, u));
     let pairs = inputs(5, |s| {
-        let [wo, wi] = [s.next2(), s.next2()].map(square_to_cosine_hemisphere);
+        let [wo, wi] = [s.draw2(), s.draw2()].map(square_to_cosine_hemisphere);
         (wo, wi)
     });
     time(group, "rough eval, reflection", &pairs, |(wo, wi)| rough.eval(wo, wi));
@@ -109,9 +109,9 @@ fn boundaries(group: &mut BenchmarkGroup<WallTime>) {
 
 fn geometry(group: &mut BenchmarkGroup<WallTime>) {
     let inside = inputs(6, |s| {
-        let radius = 0.85 * cbrt(s.next());
-        let origin = square_to_cap(2.0, s.next2()) * radius;
-        Ray { origin, dir: square_to_cap(2.0, s.next2()) }
+        let radius = 0.85 * cbrt(s.draw());
+        let origin = square_to_cap(2.0, s.draw2()) * radius;
+        Ray { origin, dir: square_to_cap(2.0, s.draw2()) }
     });
     let sphere = Shape::Sphere { radius: 1.0 };
     time(group, "sphere, from inside", &inside, |ray| {
@@ -122,7 +122,7 @@ fn geometry(group: &mut BenchmarkGroup<WallTime>) {
     let mesh = Shape::Mesh(mesh);
     let flights: Vec<(Ray, f64)> = inside
         .iter()
-        .zip(inputs(7, Stream::next))
+        .zip(inputs(7, Stream::draw))
         .map(|(&r, u)| (r, sample_exponential(50.0, u)))
         .collect();
     time(group, "mesh of 82k triangles, flights of mean 0.02 R", &flights, |(ray, t)| {

@@ -65,6 +65,12 @@ pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> 
 
 fn lines(topic: Topic, registry: &Registry) -> String {
     let schema = |path: &[&str]| table(&schema_names(registry, path));
+    // Of an entry, what it can be and not what it can be called.
+    let kinds = |path: &[&str]| {
+        let mut names = schema_names(registry, path);
+        names.retain(|(name, _)| !["name", "expect"].contains(&name.as_str()));
+        table(&names)
+    };
     match topic {
         Topic::Estimators => estimators(registry),
         Topic::Materials => table(&materials::MATERIALS.map(|m| (m.name.to_string(), numbers(&m)))),
@@ -76,9 +82,9 @@ fn lines(topic: Topic, registry: &Registry) -> String {
         Topic::Boundaries => schema(&["object", "boundary"]),
         Topic::Media => schema(&["object", "medium"]),
         Topic::Sensors => schema(&["sensor"]),
-        Topic::Lights => schema(&["light", "0"]),
+        Topic::Lights => kinds(&["light", "0"]),
         Topic::Budgets => schema(&["budget"]),
-        Topic::Claims => schema(&["claim", "0"]),
+        Topic::Claims => kinds(&["claim", "0"]),
     }
 }
 

@@ -131,8 +131,8 @@ impl<'a> Walk<'a> {
     ) -> u64 {
         let scene = &*tracer.scene;
         let mut sensor_stream = key.stream(index as u64, Purpose::Sensor);
-        let [a, b] = sensor_stream.next2();
-        let [c, d] = sensor_stream.next2();
+        let [a, b] = sensor_stream.draw2();
+        let [c, d] = sensor_stream.draw2();
         let start = scene.sensor.ray(index, [a, b, c, d]);
         scores.count(Cost::Paths);
         scores.count(Cost::Rays);
@@ -158,11 +158,11 @@ impl<'a> Walk<'a> {
             light_stream: key.stream(index as u64, Purpose::Light),
             scores,
         };
-        walk.from_outside(hit)
+        walk.run(hit)
     }
 
     /// Runs from a first hit until the path ends.
-    fn from_outside(mut self, hit: Hit) -> u64 {
+    fn run(mut self, hit: Hit) -> u64 {
         let mut side = Side::Outside;
         let mut hit = hit;
         loop {
@@ -182,7 +182,7 @@ impl<'a> Walk<'a> {
     /// Flies and scatters in the medium until the path meets the boundary or ends.
     fn walk_inside(&mut self) -> Option<Hit> {
         loop {
-            let t = sample_exponential(self.medium.sigma_t, self.stream.next());
+            let t = sample_exponential(self.medium.sigma_t, self.stream.draw());
             self.scores.count(Cost::Rays);
             match self.scene.shape.intersect(&self.ray, Side::Inside, self.from, t) {
                 Some(hit) => {
@@ -222,7 +222,7 @@ impl<'a> Walk<'a> {
         if self.matched() {
             self.connect_from_medium();
         }
-        let dir = self.medium.phase.sample(self.ray.dir, self.stream.next2());
+        let dir = self.medium.phase.sample(self.ray.dir, self.stream.draw2());
         if self.matched() {
             let pdf = self.medium.phase.pdf(self.ray.dir.dot(dir));
             self.drawn = Drawn::Competing(pdf);
@@ -235,11 +235,11 @@ impl<'a> Walk<'a> {
     #[inline]
     fn survive(&mut self, factor: f64) -> Option<()> {
         match self.roulette {
-            Roulette::Analog => (self.stream.next() < factor).then_some(()),
+            Roulette::Analog => (self.stream.draw() < factor).then_some(()),
             Roulette::Below(threshold) => {
                 self.throughput *= factor;
                 self.survival *= factor;
-                let probability = roulette(self.survival, threshold, || self.stream.next())?;
+                let probability = roulette(self.survival, threshold, || self.stream.draw())?;
                 self.throughput /= probability;
                 self.survival /= probability;
                 Some(())
@@ -275,7 +275,7 @@ impl<'a> Walk<'a> {
         if !self.boundary.is_delta() {
             self.connect_from_surface(hit, &frame, local);
         }
-        let sample = self.boundary.sample(local, self.stream.next3())?;
+        let sample = self.boundary.sample(local, self.stream.draw3())?;
         let dir = frame.to_world(sample.wi);
         let next_side = if sample.event == Event::Refract { other(side) } else { side };
         if (dir.dot(hit.normal) > 0.0) != (next_side == Side::Outside) {
@@ -313,7 +313,7 @@ impl<'a> Walk<'a> {
 
     /// Samples a light from a rough surface vertex.
     fn connect_from_surface(&mut self, hit: &Hit, frame: &Frame, wo: DVec3) {
-        let u = self.light_stream.next3();
+        let u = self.light_stream.draw3();
         let Some((index, choice)) = self.choose_light(u[0]) else { return };
         let sample = self.scene.lights[index].sample(self.band, [u[1], u[2]]);
         let wi = frame.to_local(sample.wi);
@@ -343,7 +343,7 @@ impl<'a> Walk<'a> {
 
     /// Samples a light from a medium vertex, straight through a matched boundary.
     fn connect_from_medium(&mut self) {
-        let u = self.light_stream.next3();
+        let u = self.light_stream.draw3();
         let Some((index, choice)) = self.choose_light(u[0]) else { return };
         let sample = self.scene.lights[index].sample(self.band, [u[1], u[2]]);
         if sample.radiance == 0.0 {

@@ -49,7 +49,7 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
     let mut builder = Builder::new(experiment);
     let bands = builder.bands().to_vec();
     let inputs = build::inputs(experiment);
-    let claims: Vec<String> = experiment.file.claim.iter().map(|claim| hash_json(claim)).collect();
+    let claims: Vec<String> = experiment.file.claim.iter().map(hash_json).collect();
     let mut jobs = Vec::new();
     let mut observables = Vec::new();
     let mut kinds = Vec::new();

@@ -66,7 +66,7 @@ mod tests {
     use crate::sampling::stream::Purpose;
 
     fn first(name: &StreamName) -> f64 {
-        name.key().pass(0).stream(0, Purpose::Walk).next()
+        name.key().pass(0).stream(0, Purpose::Walk).draw()
     }
 
     /// Every part of the name changes the stream; equal names give equal streams.

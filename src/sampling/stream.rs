@@ -90,21 +90,21 @@ pub struct Stream {
 impl Stream {
     /// The next uniform number in [0, 1): the upper 53 bits, so every multiple of 2^-53.
     #[inline]
-    pub fn next(&mut self) -> f64 {
+    pub fn draw(&mut self) -> f64 {
         self.draws += 1;
         (self.generator.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
     /// The next two.
     #[inline]
-    pub fn next2(&mut self) -> [f64; 2] {
-        [self.next(), self.next()]
+    pub fn draw2(&mut self) -> [f64; 2] {
+        [self.draw(), self.draw()]
     }
 
     /// The next three.
     #[inline]
-    pub fn next3(&mut self) -> [f64; 3] {
-        [self.next(), self.next(), self.next()]
+    pub fn draw3(&mut self) -> [f64; 3] {
+        [self.draw(), self.draw(), self.draw()]
     }
 
     /// How many numbers were drawn so far.
@@ -125,7 +125,7 @@ mod tests {
     #[test]
     fn first_outputs_are_frozen() {
         let mut stream = key(1).pass(5).stream(7, Purpose::Walk);
-        let got: Vec<u64> = (0..4).map(|_| stream.next().to_bits()).collect();
+        let got: Vec<u64> = (0..4).map(|_| stream.draw().to_bits()).collect();
         assert_eq!(got, FROZEN, "{got:#x?}");
     }
 
@@ -152,7 +152,7 @@ mod tests {
             let draws: Vec<[f64; 16]> = (0..streams)
                 .map(|j| {
                     let mut stream = make(j);
-                    std::array::from_fn(|_| stream.next())
+                    std::array::from_fn(|_| stream.draw())
                 })
                 .collect();
             for lag in [1, 2, 8, 512] {
@@ -194,7 +194,7 @@ mod tests {
             .map(|j| {
                 let purpose = if j % 2 == 0 { Purpose::Walk } else { Purpose::Light };
                 let mut stream = key(1).pass(j / 4096).stream(j % 4096 / 2, purpose);
-                (stream.next().to_bits(), stream.next().to_bits())
+                (stream.draw().to_bits(), stream.draw().to_bits())
             })
             .collect();
         starts.sort_unstable();
@@ -205,8 +205,8 @@ mod tests {
     #[test]
     fn draws_are_counted() {
         let mut stream = key(1).pass(0).stream(0, Purpose::Sensor);
-        stream.next3();
-        stream.next2();
+        stream.draw3();
+        stream.draw2();
         assert_eq!(stream.draws(), 5);
     }
 }
