@@ -3,9 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
+use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
+
+use super::json::hash_hex;
 
 /// Raised by every change that alters a stored bit.
 pub const NUMERICAL_VERSION: u32 = 1;
@@ -27,6 +30,8 @@ pub struct Provenance {
     pub version: String,
     /// What fixes the bits.
     pub fingerprint: String,
+    /// blake3 of the program itself, hex: what another build has left is not gone on with.
+    pub build: String,
     /// Commit of the source tree the program was built from, as it stood when it ran.
     pub commit: Option<String>,
     /// True where that tree had uncommitted changes.
@@ -57,6 +62,7 @@ impl Provenance {
         Provenance {
             version: env!("CARGO_PKG_VERSION").into(),
             fingerprint: fingerprint(),
+            build: build().into(),
             commit,
             dirty,
             crates: NOTED_CRATES
@@ -72,6 +78,16 @@ impl Provenance {
             command: std::env::args().collect(),
         }
     }
+}
+
+/// blake3 of the running program, hex; `unknown` where it cannot be read. The fingerprint promises equal
+/// bits across builds, and is raised by hand; this changes with every build.
+pub fn build() -> &'static str {
+    static BUILD: OnceLock<String> = OnceLock::new();
+    BUILD.get_or_init(|| {
+        let bytes = std::env::current_exe().and_then(std::fs::read);
+        bytes.map_or_else(|_| "unknown".into(), |bytes| hash_hex(&bytes))
+    })
 }
 
 /// What fixes the bits, as one line; records of different fingerprints are not merged.

@@ -14,7 +14,7 @@ use crate::experiment::build::{self, Builder};
 use crate::experiment::registry::Registry;
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::json::hash_json;
-use crate::results::provenance::fingerprint;
+use crate::results::provenance;
 use crate::results::record::{Band, Comparison, Observable};
 
 /// What a run will do.
@@ -84,7 +84,7 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
                 cell => format!("{cell} / {}", entry.name),
             };
             let identity = json!({
-                "fingerprint": fingerprint(),
+                "build": provenance::build(),
                 "experiment": experiment.file.name,
                 "seed": experiment.file.seed,
                 "bands": bands,

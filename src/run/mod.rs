@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use crate::error::Result;
 use crate::experiment::Experiment;
 use crate::experiment::registry::Registry;
-use crate::results::provenance::Provenance;
+use crate::results::provenance::{self, Provenance};
 use crate::results::store::{RecordFolder, Stored};
 use interrupt::Interrupt;
 use progress::Progress;
@@ -89,13 +89,15 @@ pub fn run(
     Ok((folder, stored))
 }
 
-/// Whether the folder holds a record of exactly this experiment, its claims included.
+/// Whether the folder holds a record of exactly this experiment, its claims included, by this build.
 pub fn has_record(experiment: &Experiment, out: &Path) -> bool {
     let folder = RecordFolder::new(out.join(&experiment.file.name));
+    let same_build =
+        || matches!(folder.read_provenance(), Ok(Some(p)) if p.build == provenance::build());
     folder.exists()
+        && same_build()
         && folder.read().is_ok_and(|stored| {
             stored.record.experiment_hash == assemble::experiment_hash(experiment)
                 && stored.record.claims == serde_json::json!(experiment.file.claim)
-                && stored.record.fingerprint == crate::results::provenance::fingerprint()
         })
 }
