@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::experiment::build::Builder;
 use crate::experiment::{Experiment, LoadOptions, Registry, load};
 
 /// Validate experiment files and say everything that is wrong with them.
@@ -34,6 +35,9 @@ pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> 
             load(path, &LoadOptions { setting: Some(setting.clone()), ..options.clone() }, registry)
         };
         let checked = load(path, &options, registry).and_then(|experiment| {
+            // Meshes, maps and the sensor's place show only when they are built.
+            let mut builder = Builder::new(&experiment);
+            experiment.cells.iter().try_for_each(|cell| builder.scene(cell).map(|_| ()))?;
             let others: &[String] = if args.setting.is_some() { &[] } else { &experiment.settings };
             others.iter().try_for_each(|setting| load_setting(setting).map(|_| ()))?;
             Ok(experiment)

@@ -52,6 +52,12 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     }
     let records: Vec<&Stored> = stored.iter().collect();
     let verdicts = judge(&records, FAMILY_LEVEL);
+    if verdicts.is_empty() {
+        return Err(Error::input_help(
+            "nothing was judged: what was named makes no claims",
+            "add a [[claim]] to the experiment, or name one that has some",
+        ));
+    }
     tell(&verdicts, args.verbose);
     if let Some(path) = &args.junit {
         crate::results::atomic::write(
@@ -108,7 +114,7 @@ fn tell(verdicts: &[Verdict], verbose: bool) {
 /// A file itself, or the experiment files of a folder in the order of their names.
 fn experiment_files(path: &Path) -> Result<Vec<PathBuf>> {
     if !path.is_dir() {
-        return Ok(vec![path.to_path_buf()]);
+        return Ok(vec![path.to_path_buf()]); // `load` says what is wrong with it
     }
     let entries = std::fs::read_dir(path).map_err(Error::io(path, "read the folder"))?;
     let paths = entries.filter_map(|entry| entry.ok().map(|entry| entry.path()));

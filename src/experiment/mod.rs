@@ -127,7 +127,12 @@ pub struct LoadOptions {
 /// # Errors
 /// The file cannot be read, or everything that is wrong with it, at once.
 pub fn load(path: &Path, options: &LoadOptions, registry: &Registry) -> Result<Experiment> {
-    let text = std::fs::read_to_string(path).map_err(Error::io(path, "read the experiment"))?;
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        Error::input_help(
+            format!("could not read the experiment file {}: {error}", path.display()),
+            "name a TOML file; `scatterproof init` writes an example",
+        )
+    })?;
     load::load_text(path, &text, options, registry)
 }
 

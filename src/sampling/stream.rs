@@ -1,7 +1,7 @@
 //! Random streams by key. Door for `rand_pcg`.
 //!
 //! A key says *what* is sampled, never who runs it: experiment, cell, bands, estimator and stage are
-//! hashed into 256 bits ([`StreamKey::new`]); pass, index (pixel or path) and purpose are mixed in on
+//! hashed into 256 bits (`StreamKey::new`); pass, index (pixel or path) and purpose are mixed in on
 //! top. The result seeds both words of the generator, because consecutive raw seeds or streams of a
 //! PCG are measurably correlated. Number of threads, blocks, budgets and claims never enter.
 

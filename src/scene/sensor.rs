@@ -120,9 +120,9 @@ impl Sensor {
 
     /// Ray `index` of a pass for uniform numbers `u`.
     ///
-    /// Fluxes: over a face, M_bin = int L mu dw = pi (mu1^2 - mu0^2) <L> with mu drawn with density
+    /// Fluxes: over a face, M_bin = int L mu dw = pi (mu1^2 - mu0^2) mean(L) with mu drawn with density
     /// proportional to mu inside the bin. Over a body, Phi_bin = int dw int L dA_perp
-    /// = 2 pi dmu * pi R^2 <L>, directions uniform in the bin, positions uniform on the disc of the
+    /// = 2 pi dmu * pi R^2 mean(L), directions uniform in the bin, positions uniform on the disc of the
     /// bounding sphere's radius R across the direction.
     #[inline]
     pub fn ray(&self, index: usize, u: [f64; 4]) -> SensorRay {

@@ -67,6 +67,14 @@ fn a_claim_made_after_the_run_is_not_green() {
 }
 
 #[test]
+fn two_silences_agree_on_nothing() {
+    let mut s = with_claim(stored(0.1), "agree", None, other(false), None);
+    set_gates(&mut s, "mis", |_, _, _| 0.0);
+    set_gates(&mut s, "snee", |_, _, _| 0.0);
+    assert_invalid(&one(&s), "neither side scored anything");
+}
+
+#[test]
 fn a_stated_error_widens_the_test() {
     let wide = equals(stored(0.1), 1.06, 0.05, None);
     assert_eq!(wide.outcome, Outcome::Pass);

@@ -171,7 +171,10 @@ pub(super) fn trial(stored: &Stored, comparison: &Comparison) -> Trial {
     let objection = if missing {
         Some("the record does not hold this quantity".to_string())
     } else {
-        arms.iter().find_map(|arm| arm.objection()).or_else(|| bias_objection(&claim, &arms))
+        arms.iter()
+            .find_map(|arm| arm.objection())
+            .or_else(|| bias_objection(&claim, &arms))
+            .or_else(|| silence_objection(&arms))
     };
     let evidence = match (objection, &a) {
         (None, Some(a)) => weigh(a, b.as_ref().filter(|_| paired), &expected, &arms, &mut verdict),
@@ -249,6 +252,13 @@ fn bias_objection(claim: &Claim, arms: &[&Arm]) -> Option<String> {
         Bias::Biased(why) => Some(format!("{} is biased: {why}", arm.run.estimator)),
         Bias::Unbiased | Bias::Consistent => None,
     })
+}
+
+/// Two estimators that both scored nothing agree on nothing: they may share what keeps them dark.
+fn silence_objection(arms: &[&Arm]) -> Option<String> {
+    let silent = |arm: &&Arm| arm.all.mean == 0.0 && arm.all.variance() == 0.0;
+    let all = arms.len() > 1 && arms.iter().all(silent);
+    all.then(|| "neither side scored anything; claim `equals = { value = 0 }` if that is meant".into())
 }
 
 fn same_passes(a: &[Moments], b: &[Moments]) -> bool {
