@@ -133,9 +133,6 @@ const NOT_PORTABLE: [&str; 39] = [
     "rotate_z",
 ];
 
-/// Where a fused multiply-add is meant: the exact remainder of a product, which has one right answer.
-const FUSED: [&str; 1] = ["src/geometry/triangle.rs"];
-
 /// Files that may be longer than [`LONGEST`], and how long.
 const LONG: [(&str, usize); 1] = [("src/experiment/schema.rs", 800)];
 const LONGEST: usize = 700;
@@ -278,7 +275,6 @@ impl File<'_> {
                 found.push(self.at(i, rule));
             }
             let rule = match token.text {
-                "mul_add" if FUSED.contains(&self.path) => continue,
                 "mul_add" => "`mul_add` fuses what other code rounds twice",
                 "Vec3A" | "BVec3A" => "`Vec3A` rounds differently with and without SIMD",
                 "unsafe" => "`unsafe` is not needed here",

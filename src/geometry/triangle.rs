@@ -13,7 +13,7 @@
 //! with the wanted orientation cover whatever the ray leaves through.
 
 use super::{Ray, Side};
-use crate::math::DVec3;
+use crate::math::{DVec3, fma};
 
 /// A ray prepared for many triangles.
 pub struct Sheared {
@@ -95,7 +95,7 @@ fn edge(p: [f64; 3], q: [f64; 3]) -> f64 {
 /// The difference of two products that round to the same number, from their exact remainders.
 #[cold]
 fn edge_remainder(p: [f64; 3], q: [f64; 3], first: f64, second: f64) -> f64 {
-    p[0].mul_add(q[1], -first) - p[1].mul_add(q[0], -second)
+    fma(p[0], q[1], -first) - fma(p[1], q[0], -second)
 }
 
 /// The unit normal of a triangle whose corners turn counter-clockwise seen from its tip.

@@ -34,6 +34,11 @@ portable! {
     ln_gamma = lgamma: "Logarithm of |Gamma(x)|.";
 }
 
+/// x y + z rounded once, in software: the exact remainder of a product. Slow, and the same everywhere.
+pub fn fma(x: f64, y: f64, z: f64) -> f64 {
+    libm::fma(x, y, z)
+}
+
 mod frame;
 mod inverse;
 mod quadrature;

@@ -108,7 +108,10 @@ fn beckmann_visible(v: DVec3, u: [f64; 2]) -> DVec3 {
     let distribution = |x: f64| 0.5 * SQRT_PI * erfc(-x) + exp(-x * x) / (2.0 * c);
     let top = c.min(8.5);
     let target = u[0] * distribution(top);
-    let x = increasing_root(|x| (distribution(x) - target, (1.0 - x / c) * exp(-x * x)), -8.5, top);
+    // Without the factor 1 - t/c the root is Gaussian; it moves towards -v by about half its slope.
+    let start = erf_inv(2.0 * u[0] - 1.0).clamp(-8.5, 8.5) - 0.5 / (c + 1.0);
+    let root = |x: f64| (distribution(x) - target, (1.0 - x / c) * exp(-x * x));
+    let x = increasing_root(root, -8.5, top, start);
     let (cos_phi, sin_phi) = (v.x / sin, v.y / sin);
     DVec3::new(-(x * cos_phi - y * sin_phi), -(x * sin_phi + y * cos_phi), 1.0)
 }
