@@ -19,7 +19,7 @@ impl Progress {
         let shown = !quiet && std::io::stderr().is_terminal();
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(jobs as u64 * STEPS), target);
-        let style = "{wide_msg} [{bar:32}] {percent:>3}%  {elapsed} elapsed, {eta} left";
+        let style = "{wide_msg} [{bar:20}] {percent:>3}%  {elapsed}, {eta} left";
         if let Ok(style) = ProgressStyle::with_template(style) {
             bar.set_style(style.progress_chars("=> "));
         }
