@@ -1,16 +1,12 @@
 //! The estimators that come with the program: their options in a file, and how each is built.
 
-use std::sync::Arc;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
 use super::registry::{Registry, RegistryEntry};
 use crate::error::{Error, Result};
-use crate::estimators::Estimator;
 use crate::estimators::path::{PathTracer, Roulette};
-use crate::scene::Scene;
 
 /// Every estimator of this crate; a program of one's own may push its entries on top.
 pub fn builtin() -> Registry {
@@ -66,6 +62,3 @@ pub fn read<T: for<'a> Deserialize<'a>>(options: &Json) -> Result<T> {
     serde_json::from_value(options.clone())
         .map_err(|error| Error::input(format!("estimator options: {error}")))
 }
-
-/// How a registered estimator is built from its options and a scene.
-pub type Build = fn(&Json, Arc<Scene>) -> Result<Box<dyn Estimator>>;

@@ -1,10 +1,17 @@
 //! The estimators that a program knows by name.
 
+use std::sync::Arc;
+
 use schemars::Schema;
 use serde_json::Value as Json;
 
-use super::estimators::Build;
 use super::validate::grammar;
+use crate::error::Result;
+use crate::estimators::Estimator;
+use crate::scene::Scene;
+
+/// How a registered estimator is built from its options and a scene.
+pub type Build = fn(&Json, Arc<Scene>) -> Result<Box<dyn Estimator>>;
 
 /// The estimators that an experiment file may name.
 #[derive(Clone, Debug, Default)]

@@ -1,0 +1,285 @@
+//! Identities, closed forms and published numbers for the path tracer.
+
+use super::super::Layout;
+use super::*;
+use crate::geometry::{Shape, procedural};
+use crate::optics::boundary::BoundarySample;
+use crate::optics::microfacet::{MicrofacetKind, Microfacets};
+use crate::optics::phase::HenyeyGreenstein;
+use crate::sampling::stream::StreamKey;
+use crate::scene::{Emission, Light, Sensor};
+
+fn environment(radiance: f64, toward: DVec3, height: f64, name: &str) -> Light {
+    let frame = Frame::about(toward);
+    Light { name: name.into(), emission: Emission::Cap { frame, height, radiance: vec![radiance] } }
+}
+
+fn scene(shape: Shape, boundary: Boundary, medium: Medium, lights: Vec<Light>, ray: Ray) -> Scene {
+    let sensor = Sensor::Probe { ray, paths: 1000 };
+    Scene { shape: Arc::new(shape), boundary: vec![boundary], medium: vec![medium], lights, sensor }
+}
+
+fn medium(sigma_t: f64, albedo: f64, g: f64) -> Medium {
+    Medium { sigma_t, albedo, phase: HenyeyGreenstein { g } }
+}
+
+fn down() -> Ray {
+    Ray { origin: DVec3::new(0.0, 0.0, 3.0), dir: -DVec3::Z }
+}
+
+/// Mean and standard error of every observable over passes.
+fn measure(scene: Scene, roulette: Roulette, passes: u64, seed: u8) -> (Vec<(f64, f64)>, Scores) {
+    let layout = Layout::new(&scene);
+    let tracer = PathTracer::new(Arc::new(scene), roulette);
+    let mut scores = Scores::new(layout);
+    let key = StreamKey::new([seed; 32]);
+    let (mut sum, mut sum2) = (vec![0.0; scores.gates.len()], vec![0.0; scores.gates.len()]);
+    for pass in 0..passes {
+        scores.clear();
+        tracer.pass(&[0], &key.pass(pass), &mut scores);
+        for (i, x) in scores.gates.iter().enumerate() {
+            sum[i] += x;
+            sum2[i] += x * x;
+        }
+    }
+    let n = passes as f64;
+    let estimate = |(s, s2): (&f64, &f64)| {
+        let mean = s / n;
+        (mean, ((s2 / n - mean * mean).max(0.0) / (n - 1.0)).sqrt())
+    };
+    (sum.iter().zip(&sum2).map(estimate).collect(), scores)
+}
+
+const SPHERE: Shape = Shape::Sphere { radius: 1.0 };
+const ROULETTES: [Roulette; 2] = [Roulette::Analog, Roulette::Below(0.25)];
+
+fn off_axis() -> Ray {
+    Ray { origin: DVec3::new(0.3, -0.5, 3.0), dir: -DVec3::Z }
+}
+
+/// Without absorption, inside a constant environment of radiance 1, a smooth or matched body looks
+/// like radiance 1 from everywhere, path by path.
+#[test]
+fn white_furnace_has_no_variance() {
+    for boundary in [Boundary::Smooth { eta: 1.3 }, Boundary::Smooth { eta: 1.5 }] {
+        for roulette in ROULETTES {
+            let sky = environment(1.0, DVec3::Z, 2.0, "sky");
+            let scene = scene(SPHERE, boundary, medium(5.0, 1.0, 0.3), vec![sky], off_axis());
+            let (means, _) = measure(scene, roulette, 20, 1);
+            assert!((means[0].0 - 1.0).abs() < 1e-12 && means[0].1 < 1e-7, "{means:?}");
+        }
+    }
+}
+
+/// The matched body adds light samples to every vertex: the same mean, with variance.
+#[test]
+fn matched_furnace() {
+    let sky = environment(1.0, DVec3::Z, 2.0, "sky");
+    let scene = scene(SPHERE, Boundary::Matched, medium(5.0, 1.0, 0.3), vec![sky], off_axis());
+    let (means, _) = measure(scene, Roulette::Analog, 200, 2);
+    let (mean, error) = means[0];
+    assert!((mean - 1.0).abs() < 5.0 * error && error < 5e-3, "{mean} {error}");
+}
+
+/// Slabs lit on one face, seen along the normal: total reflectance and transmittance.
+/// Expected: adding-doubling (rows of experiments/verify/slab.csv), five standard errors.
+#[test]
+fn slab_reflectance_and_transmittance() {
+    // albedo, b, g, n, UR1, UT1
+    let rows = [
+        (0.8, 2.0, 0.0, 1.0, 0.265938894, 0.285949529),
+        (0.8, 1.0, 0.0, 1.3, 0.163574817, 0.486526072),
+        (0.95, 1.0, 0.0, 1.3, 0.274493619, 0.593504558),
+    ];
+    for (albedo, b, g, eta, reflected, transmitted) in rows {
+        for roulette in ROULETTES {
+            let lights = vec![
+                environment(1.0, DVec3::Z, 1.0, "above"),
+                environment(1.0, -DVec3::Z, 1.0, "below"),
+            ];
+            let slab = Shape::Slab { thickness: 1.0 };
+            let scene = scene(slab, Boundary::Smooth { eta }, medium(b, albedo, g), lights, down());
+            let (means, scores) = measure(scene, roulette, 100, 3);
+            for (expected, (mean, error)) in [reflected, transmitted].iter().zip(&means[6..8]) {
+                assert!((mean - expected).abs() < 5.0 * error && *error < 3e-3, "{means:?}");
+            }
+            let classes: f64 = means[1..6].iter().map(|m| m.0).sum();
+            assert!((classes - means[0].0).abs() < 1e-12);
+            assert_eq!(scores.anomalies, [0; 3]);
+        }
+    }
+}
+
+/// Matched half-space lit by parallel light: Chandrasekhar's exact radiance, w = 0.9, mu = mu0 = 1,
+/// f_r from the H function (rows of experiments/verify/chandrasekhar_brdf.csv).
+#[test]
+fn matched_half_space_under_parallel_light() {
+    let sun = Light {
+        name: "sun".into(),
+        emission: Emission::Directional { toward: DVec3::Z, irradiance: vec![1.0] },
+    };
+    let scene = scene(Shape::HalfSpace, Boundary::Matched, medium(1.0, 0.5, 0.0), vec![sun], down());
+    let (means, _) = measure(scene, Roulette::Below(0.25), 300, 4);
+    let (total, single) = (means[0], means[2]);
+    assert!((total.0 - 0.03114762692835).abs() < 5.0 * total.1 && total.1 < 1e-4, "{total:?}");
+    assert!((single.0 - 0.01989436788649).abs() < 5.0 * single.1, "{single:?}");
+}
+
+/// Rough boundary: MIS agrees with light sampling's complement, a cap grown to the whole sphere.
+#[test]
+fn rough_furnace_is_the_same_for_one_light_or_two_halves() {
+    let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.2 };
+    let boundary = Boundary::Rough { eta: 1.3, facets };
+    let whole = vec![environment(1.0, DVec3::Z, 2.0, "sky")];
+    let halves =
+        vec![environment(1.0, DVec3::X, 1.0, "right"), environment(1.0, -DVec3::X, 1.0, "left")];
+    let mut results = Vec::new();
+    for lights in [whole, halves] {
+        let scene = scene(SPHERE, boundary, medium(2.0, 0.9, 0.5), lights, off_axis());
+        results.push(measure(scene, Roulette::Below(0.25), 200, 5).0[0]);
+    }
+    let [(a, ea), (b, eb)] = results[..] else { unreachable!() };
+    assert!((a - b).abs() < 5.0 * (ea * ea + eb * eb).sqrt() && ea < 2e-3, "{results:?}");
+    assert!(a < 0.9, "absorption is seen: {a}");
+}
+
+/// D6: for directions of either technique, both reported densities agree with the ones asked of the
+/// other, and the two weights sum to 1.
+#[test]
+fn weights_of_both_techniques_sum_to_one() {
+    let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.3 };
+    let boundary = Boundary::Rough { eta: 1.4, facets };
+    let light = environment(2.0, DVec3::new(0.6, 0.0, 0.8), 0.4, "cap");
+    let choice = 0.7;
+    let wo = DVec3::new(0.3, 0.2, -0.9).normalize();
+    let (mut from_boundary, mut from_light) = (0, 0);
+    for i in 0..40_000u32 {
+        let u = [0.754_877_666, 0.569_840_291, 0.438_579_021].map(|a| (a * f64::from(i)).fract());
+        let drawn = boundary.sample(wo, u).filter(|s| s.wi.z > 0.0);
+        let (wi, own, pdf) = match (i % 2, drawn) {
+            (0, Some(BoundarySample { wi, density: Density::Finite(own), .. })) => {
+                (wi, own, light.eval(0, wi).1)
+            }
+            (1, _) => {
+                let sample = light.sample(0, [u[0], u[1]]);
+                let pdf = sample.pdf.unwrap_or(0.0);
+                assert!((light.eval(0, sample.wi).1 / pdf - 1.0).abs() < 1e-10);
+                (sample.wi, boundary.eval(wo, sample.wi).1, pdf)
+            }
+            _ => continue,
+        };
+        assert!((boundary.eval(wo, wi).1 - own).abs() <= 1e-10 * own);
+        if own > 0.0 && pdf > 0.0 {
+            let sum = balance(own, choice * pdf) + balance(choice * pdf, own);
+            assert!((sum - 1.0).abs() < 1e-10);
+            *[&mut from_boundary, &mut from_light][(i % 2) as usize] += 1;
+        }
+    }
+    assert!(from_boundary > 500 && from_light > 5000, "{from_boundary} {from_light}");
+}
+
+/// D3: roulette keeps its promise, by enumeration of u over 2^16 cells through the estimator's own
+/// arithmetic: survivors times their weight is the weight that came in.
+#[test]
+fn roulette_is_compensated() {
+    for (survival, factor, threshold) in [(0.2, 0.9, 0.25), (0.26, 0.5, 0.25), (1.0, 0.9, 0.25)] {
+        let after = survival * factor;
+        let n = 1u32 << 16;
+        let sum: f64 = (0..n)
+            .map(|k| {
+                let u = (f64::from(k) + 0.5) / f64::from(n);
+                roulette(after, threshold, || u).map_or(0.0, |divisor| after / divisor)
+            })
+            .sum();
+        assert!((sum / f64::from(n) - after).abs() < 1.0 / f64::from(n), "{survival} {factor}");
+    }
+}
+
+/// D10: a walk draws 1 number per flight, 1 per roulette, 2 per phase sample, 3 per surface event,
+/// whatever their outcome; so paired scenes stay in step event by event.
+#[test]
+fn draws_per_event() {
+    let sky = environment(1.0, DVec3::Z, 2.0, "sky");
+    let scene =
+        scene(SPHERE, Boundary::Smooth { eta: 1.3 }, medium(4.0, 0.8, 0.4), vec![sky], off_axis());
+    let layout = Layout::new(&scene);
+    let tracer = PathTracer::new(Arc::new(scene), Roulette::Analog);
+    let key = StreamKey::new([9; 32]).pass(0);
+    let (mut absorbed, mut escaped) = (0, 0);
+    for index in 0..1000 {
+        let mut scores = Scores::new(layout.clone());
+        let draws = Walk::play(&tracer, 0, index, &key, &mut scores);
+        let [_, rays, _, medium_events, boundary_events] = scores.cost;
+        let out = u64::from(scores.gates[0] > 0.0); // it flew to the sky, and scored
+        let survived = medium_events - (1 - out); // else the last event ended it
+        let flights = rays - 1 - out;
+        assert_eq!(draws, flights + medium_events + 2 * survived + 3 * boundary_events);
+        *[&mut absorbed, &mut escaped][out as usize] += 1;
+    }
+    assert!(absorbed > 100 && escaped > 100, "{absorbed} {escaped}");
+}
+
+/// D9: bands with equal coefficients, played on one key, are equal to the last bit; on keys of
+/// their own they are not.
+#[test]
+fn equal_bands_on_one_key_are_equal() {
+    let facets = Microfacets { kind: MicrofacetKind::Beckmann, alpha: 0.2 };
+    let boundary = Boundary::Rough { eta: 1.3, facets };
+    let light = |radiance| Light {
+        name: "cap".into(),
+        emission: Emission::Cap { frame: Frame::about(DVec3::Z), height: 0.5, radiance },
+    };
+    let one = scene(SPHERE, boundary, medium(3.0, 0.9, 0.5), vec![light(vec![1.0; 2])], off_axis());
+    let scene = Scene { boundary: vec![boundary; 2], medium: vec![one.medium[0]; 2], ..one };
+    let layout = Layout::new(&scene);
+    let tracer = PathTracer::new(Arc::new(scene), Roulette::Below(0.25));
+    let key = StreamKey::new([11; 32]);
+    let mut scores = Scores::new(layout);
+    tracer.pass(&[0, 1], &key.pass(0), &mut scores);
+    assert!(scores.gates[0] > 0.0);
+    assert!(scores.gates.chunks(2).all(|bands| bands[0].to_bits() == bands[1].to_bits()));
+    scores.clear();
+    tracer.pass(&[0], &key.pass(0), &mut scores);
+    tracer.pass(&[1], &key.pass(1), &mut scores);
+    assert_ne!(scores.gates[0], scores.gates[1]);
+}
+
+/// A scene scaled by a power of two, with coefficients scaled to match, gives the same bits: no
+/// absolute length hides anywhere.
+#[test]
+fn scaled_scenes_give_the_same_bits() {
+    type MakeShape = fn(f64) -> Shape;
+    let shapes: [MakeShape; 4] = [
+        |s| Shape::Sphere { radius: s },
+        |s| Shape::Slab { thickness: s },
+        |s| Shape::Box { half: DVec3::new(s, 0.7 * s, 0.9 * s) },
+        |s| Shape::Mesh(procedural::bumpy_sphere(s, 3, 0.1, 7.0, true).expect("a mesh")),
+    ];
+    let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.2 };
+    let boundaries = [Boundary::Rough { eta: 1.3, facets }, Boundary::Matched];
+    let played = |make: MakeShape, boundary, scale: f64| {
+        let sun = Light {
+            name: "sun".into(),
+            emission: Emission::Directional { toward: DVec3::Z, irradiance: vec![1.0] },
+        };
+        let lights = vec![sun, environment(0.3, DVec3::X, 1.0, "half")];
+        let ray = Ray { origin: scale * DVec3::new(0.25, 0.5, 3.0), dir: -DVec3::Z };
+        let scene = scene(make(scale), boundary, medium(4.0 / scale, 0.9, 0.5), lights, ray);
+        measure(scene, Roulette::Below(0.25), 1, 6)
+    };
+    for make in shapes {
+        for boundary in boundaries {
+            let (unit, unit_scores) = played(make, boundary, 1.0);
+            assert!(unit[0].0 > 0.0);
+            for k in [-30, -3, 7, 40] {
+                let (scaled, scores) = played(make, boundary, (f64::from(k)).exp2());
+                assert_eq!(
+                    scaled.iter().map(|m| m.0.to_bits()).collect::<Vec<_>>(),
+                    unit.iter().map(|m| m.0.to_bits()).collect::<Vec<_>>(),
+                    "2^{k} {boundary:?}"
+                );
+                assert_eq!(scores.cost, unit_scores.cost);
+            }
+        }
+    }
+}
