@@ -162,7 +162,7 @@ fn overrides() {
 fn files_that_are_not_there() {
     let work = Work::new();
     for command in ["run no.toml", "check no.toml", "plan no.toml", "verify no.toml"] {
-        work.run(command).exits(3).complains("could not read").complains("no.toml");
+        work.run(command).exits(2).complains("could not read").complains("no.toml").complains("init");
     }
     work.run("report nowhere").exits(3).complains("nowhere").complains("`scatterproof run` makes one");
     std::fs::create_dir(work.path("empty")).expect("a folder");

@@ -22,6 +22,8 @@ fn a_folder_that_cannot_be_written_is_named() {
     ran.exits(3).complains("could not create the results folder").complains("x.toml/below/x");
     let ran = work.run("verify x.toml --out x.toml/below");
     ran.exits(3).complains("x.toml/below/x");
+    let claim = "[[claim]]\nequals = { value = 1, source = \"none\" }\n";
+    let work = Work::with(&format!("{IMAGE}{claim}"));
     let ran = work.run("verify x.toml -q --junit x.toml/junit.xml --set budget.passes=2");
     ran.exits(3).complains("could not write the JUnit file: x.toml/junit.xml");
 }

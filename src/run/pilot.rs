@@ -45,14 +45,18 @@ fn for_seconds(job: &Job, seconds: f64, stop: &dyn Fn() -> bool) -> Option<u64> 
     }
 }
 
-/// Largest share of the run that a pilot may fall short of: it has at least 1/64 of the passes that it
-/// asks for, so that its variance rests on a part of the run and not on luck.
-const PILOT_SHARE: u64 = 64;
+/// A pilot has at least this part of the passes that it asks for, so that its variance rests on a good
+/// part of the run and not on luck.
+const PILOT_SHARE: u64 = 16;
+/// Standard deviations by which both estimates below are taken to err.
+const SURENESS: f64 = 2.5;
+/// Batches of a record's smallest standard error: it fluctuates by 1/sqrt(2 * 64) of itself, and the
+/// error that the record *shows* must keep the bound.
+const FEWEST_BATCHES: f64 = 64.0;
 /// A pilot longer than this would be the run.
 const LONGEST_PILOT: u64 = 1 << 17;
 
-/// Doubles the pilot until the passes that it predicts are at most [`PILOT_SHARE`] times its own. The
-/// prediction gets a tenth on top, because the pilot's variance is itself an estimate.
+/// Doubles the pilot until the passes that it predicts are at most [`PILOT_SHARE`] times its own.
 fn for_error(job: &Job, target: &RelativeError, stop: &dyn Fn() -> bool) -> Option<u64> {
     let mut pilot = Counter::new(0, Counter::<Vec<Moments>>::MERGE_ALL);
     let mut length = LEAST_PASSES;
@@ -66,14 +70,15 @@ fn for_error(job: &Job, target: &RelativeError, stop: &dyn Fn() -> bool) -> Opti
         let wanted = job.targets.iter().flat_map(|t| &moments[t * bands..(t + 1) * bands]);
         let needed = wanted.map(|m| needed_passes(m, target)).max().unwrap_or(0);
         if needed <= PILOT_SHARE * length || length >= LONGEST_PILOT {
-            return Some((needed + needed / 10).clamp(LEAST_PASSES, PILOT_SHARE * LONGEST_PILOT));
+            return Some(needed.clamp(LEAST_PASSES, PILOT_SHARE * LONGEST_PILOT));
         }
         length *= 2;
     }
 }
 
 /// Passes until standard error over |mean| is at most the target; as many as can be where nothing has
-/// been seen yet.
+/// been seen yet. The variance of n passes is known to sqrt((kurtosis - 1) / n) of itself, and the
+/// standard error of the run to 1 / sqrt(2 * batches): both get [`SURENESS`].
 fn needed_passes(moments: &Moments, target: &RelativeError) -> u64 {
     let (mean, variance) = (moments.mean.abs(), moments.variance());
     if variance == 0.0 && mean == 0.0 {
@@ -83,7 +88,9 @@ fn needed_passes(moments: &Moments, target: &RelativeError) -> u64 {
         Some(small) if mean < small.below => small.at_most,
         _ => target.at_most,
     };
-    let needed = variance / (mean * mean * bound * bound);
+    let pilot = 1.0 + SURENESS * ((moments.kurtosis() - 1.0).max(0.0) / moments.n as f64).sqrt();
+    let shown = 1.0 + SURENESS / (2.0 * FEWEST_BATCHES).sqrt();
+    let needed = variance * pilot / (mean * mean * bound * bound) * shown * shown;
     needed.min(9e18).ceil() as u64
 }
 
@@ -104,9 +111,10 @@ mod tests {
     fn error_targets_become_passes() {
         let small_values = Some(SmallValues { below: 0.05, at_most: 0.02 });
         let target = RelativeError { at_most: 0.01, small_values };
-        // (sd / (mean * target))^2
-        assert_eq!(needed_passes(&moments(1.0, 0.5), &target), 2503);
-        assert_eq!(needed_passes(&moments(0.04, 0.04), &target), 2503);
+        // Two values, kurtosis 1: the pilot's variance is exact. (sd / (mean * target))^2 = 2502.5, with
+        // the margin of the error shown (1 + 2.5 / sqrt(128))^2 = 1.4907.
+        assert_eq!(needed_passes(&moments(1.0, 0.5), &target), 3731);
+        assert_eq!(needed_passes(&moments(0.04, 0.04), &target), 3731);
         assert_eq!(needed_passes(&moments(2.0, 0.0), &target), 0);
         assert!(needed_passes(&moments(0.0, 0.0), &target) > 1 << 60);
     }
