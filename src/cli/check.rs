@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use super::counted;
 use crate::error::{Error, Result};
 use crate::experiment::build::Builder;
 use crate::experiment::{Experiment, LoadOptions, Registry, load};
@@ -63,10 +64,6 @@ fn summary(experiment: &Experiment) -> String {
         counted(file.claim.len(), "claim"),
     ]
     .join(", ")
-}
-
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 #[cfg(test)]

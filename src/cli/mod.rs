@@ -117,6 +117,11 @@ pub fn main(registry: &Registry) -> ExitCode {
     }
 }
 
+/// `1 cell`, `2 cells`.
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
 /// Signals, as the error that a user sees.
 fn listen() -> crate::error::Result<crate::run::interrupt::Interrupt> {
     crate::run::interrupt::Interrupt::listen().map_err(|source| Error::Io {

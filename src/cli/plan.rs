@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::Reading;
+use super::{Reading, counted};
 use crate::error::Result;
 use crate::experiment::load;
 use crate::experiment::registry::Registry;
@@ -48,7 +48,8 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
         Budget::CpuSeconds(s) => format!("{s} CPU seconds each"),
         Budget::RelativeError(e) => format!("relative error {}", e.at_most),
     };
-    println!("{} cells, {} measurements, budget: {budget}", experiment.cells.len(), plan.jobs.len());
+    let (cells, measurements) = (experiment.cells.len(), plan.jobs.len());
+    println!("{}, {}, budget: {budget}", counted(cells, "cell"), counted(measurements, "measurement"));
     let mut table = Table::new(&["cell", "estimator", "observables", "passes", "CPU time"]);
     let mut total = 0.0;
     for job in &plan.jobs {
