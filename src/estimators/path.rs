@@ -89,6 +89,9 @@ impl Estimator for PathTracer {
     }
 }
 
+/// Part of a body's size by which rounding may put a medium vertex outside its bounding sphere.
+const ROUNDING: f64 = 1e-9;
+
 /// How the path's current direction was drawn, as light sampling sees it.
 #[derive(Clone, Copy)]
 enum Drawn {
@@ -211,7 +214,8 @@ impl<'a> Walk<'a> {
         self.ray.origin = self.ray.at(t);
         self.from = None;
         if let Some(bounds) = self.bounds
-            && (self.ray.origin - bounds.center).length_squared() > bounds.radius * bounds.radius
+            && (self.ray.origin - bounds.center).length_squared()
+                > bounds.radius * bounds.radius * (1.0 + ROUNDING)
         {
             self.scores.note(Anomaly::LostRay);
             return None;
@@ -334,11 +338,7 @@ impl<'a> Walk<'a> {
         if self.scene.shape.occluded(&shadow, Some(hit.face)) {
             return;
         }
-        let mut history = self.history;
-        if wo.z < 0.0 && wi.z < 0.0 {
-            history.reflect_internally();
-        }
-        self.score_connection(history, index, choice, sample.pdf, value * sample.radiance, pdf);
+        self.score_connection(index, choice, sample.pdf, value * sample.radiance, pdf);
     }
 
     /// Samples a light from a medium vertex, straight through a matched boundary.
@@ -352,7 +352,7 @@ impl<'a> Walk<'a> {
         let phase = self.medium.phase.pdf(self.ray.dir.dot(sample.wi));
         let Some(through) = self.transmittance_out(sample.wi) else { return };
         let own = phase * through;
-        self.score_connection(self.history, index, choice, sample.pdf, own * sample.radiance, own);
+        self.score_connection(index, choice, sample.pdf, own * sample.radiance, own);
     }
 
     /// Transmittance from the path's medium vertex to infinity along `dir`, through every part of the
@@ -388,21 +388,13 @@ impl<'a> Walk<'a> {
 
     /// Adds a light sample: `value` is f |cos| (or phase times transmittance) times radiance, `own` the
     /// density with which the path's own sampling draws the direction. Parallel light has no competitor.
-    fn score_connection(
-        &mut self,
-        history: History,
-        light: usize,
-        choice: f64,
-        pdf: Option<f64>,
-        value: f64,
-        own: f64,
-    ) {
+    fn score_connection(&mut self, light: usize, choice: f64, pdf: Option<f64>, value: f64, own: f64) {
         let estimate = match pdf {
             Some(pdf) => value / (choice * pdf) * balance(choice * pdf, own),
             None => value / choice,
         };
         let score = self.throughput * estimate;
-        self.scores.add(self.slot, self.band, history.class(), light, score);
+        self.scores.add(self.slot, self.band, self.history.class(), light, score);
     }
 
     /// A light by its strength, and the probability of that choice.

@@ -23,7 +23,7 @@ pub struct Builder<'a> {
     experiment: &'a Experiment,
     bands: Vec<Band>,
     shapes: BTreeMap<String, Arc<Shape>>,
-    maps: BTreeMap<PathBuf, Arc<ExrImage>>,
+    maps: BTreeMap<(PathBuf, u64), Arc<LatLong>>,
 }
 
 impl<'a> Builder<'a> {
@@ -38,9 +38,10 @@ impl<'a> Builder<'a> {
         &self.bands
     }
 
-    /// Bytes that the shapes built so far hold.
-    pub fn shape_bytes(&self) -> usize {
-        self.shapes.values().map(|shape| shape.memory_bytes()).sum()
+    /// Bytes that the shapes and maps built so far hold.
+    pub fn memory_bytes(&self) -> usize {
+        let shapes: usize = self.shapes.values().map(|shape| shape.memory_bytes()).sum();
+        shapes + self.maps.values().map(|map| map.memory_bytes()).sum::<usize>()
     }
 
     /// The scene of one cell.
@@ -57,10 +58,10 @@ impl<'a> Builder<'a> {
         let lights = lights.map(|(i, entry)| self.light(i, entry)).collect::<Result<Vec<Light>>>()?;
         let sensor = sensor(&cell.sensor, &shape);
         if let Some(point) = sensor_position(&sensor)
-            && shape.contains(point)
+            && shape.covers(point)
         {
             return Err(Error::input_help(
-                format!("the sensor at {point} mm stands inside the body (cell `{}`)", cell.label),
+                format!("the sensor at {point} mm stands inside or on the body (cell `{}`)", cell.label),
                 "move it outside",
             ));
         }
@@ -135,15 +136,17 @@ impl<'a> Builder<'a> {
         Ok(Light { name, emission })
     }
 
-    fn map(&mut self, path: &Path, scale: f64) -> Result<LatLong> {
-        let image = match self.maps.get(path) {
-            Some(image) => Arc::clone(image),
-            None => {
-                let image = Arc::new(read_exr(path)?);
-                self.maps.insert(path.to_path_buf(), Arc::clone(&image));
-                image
-            }
-        };
+    fn map(&mut self, path: &Path, scale: f64) -> Result<Arc<LatLong>> {
+        let name = (path.to_path_buf(), scale.to_bits());
+        if let Some(map) = self.maps.get(&name) {
+            return Ok(Arc::clone(map));
+        }
+        let map = Arc::new(self.read_map(path, &read_exr(path)?, scale)?);
+        self.maps.insert(name, Arc::clone(&map));
+        Ok(map)
+    }
+
+    fn read_map(&self, path: &Path, image: &ExrImage, scale: f64) -> Result<LatLong> {
         let planes = self.bands.iter().map(|band| {
             let channels = &image.channels;
             let channel = channels.get(&band.name).or_else(|| channels.get("Y")).ok_or_else(|| {
@@ -249,7 +252,8 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Sensor {
     match words {
         schema::Sensor::Orthographic { resolution, center_mm, toward, up, width_mm } => {
             let pixel = width_mm / resolution[0] as f64;
-            Sensor::Orthographic(screen(resolution, *center_mm, toward.unit(), *up, pixel))
+            let view = toward.unit();
+            Sensor::Orthographic(before(shape, screen(resolution, *center_mm, view, *up, pixel)))
         }
         schema::Sensor::Perspective { resolution, position_mm, look_at_mm, up, fov_deg } => {
             let view = (DVec3::from(*look_at_mm) - DVec3::from(*position_mm)).normalize();
@@ -273,21 +277,45 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Sensor {
     }
 }
 
-fn faces(shape: &Shape) -> Vec<FluxFace> {
-    let top = FluxFace { name: "top", point: DVec3::ZERO, frame: Frame::about(DVec3::Z) };
-    match shape {
-        Shape::Slab { thickness } => {
-            let point = DVec3::new(0.0, 0.0, -thickness);
-            vec![top, FluxFace { name: "bottom", point, frame: Frame::about(-DVec3::Z) }]
+/// The same parallel rays from before the body: where they start does not change what they see, as long
+/// as none starts behind a part of the body. The plane is moved back along the view until the whole of
+/// it is beyond the bounding sphere, or on the viewer's side of a half-space or slab.
+fn before(shape: &Shape, screen: Screen) -> Screen {
+    let half_width = 0.5 * screen.width as f64 * screen.right;
+    let half_height = 0.5 * screen.height as f64 * screen.down;
+    let corners = [half_width + half_height, half_width - half_height];
+    let corners = corners.iter().flat_map(|c| [screen.origin + *c, screen.origin - *c]);
+    let back = match shape.bounds() {
+        // The plane is perpendicular to the view: one distance holds for all of it.
+        Some(bounds) => (screen.origin - bounds.center).dot(screen.view) + 2.0 * bounds.radius,
+        None => {
+            let thickness = if let Shape::Slab { thickness } = shape { *thickness } else { 0.0 };
+            let reach = half_width.length();
+            // Distance along the view to a height `reach` outside the face that is seen.
+            let needed = |corner: DVec3| match screen.view.z {
+                z if z < 0.0 => (reach - corner.z) / -z,
+                z if z > 0.0 => (reach + corner.z + thickness) / z,
+                _ => 0.0,
+            };
+            corners.map(needed).fold(0.0, f64::max)
         }
-        _ => vec![top],
-    }
+    };
+    Screen { origin: screen.origin - back.max(0.0) * screen.view, ..screen }
+}
+
+fn faces(shape: &Shape) -> Vec<FluxFace> {
+    let thickness = if let Shape::Slab { thickness } = shape { *thickness } else { 0.0 };
+    let reach = if thickness > 0.0 { thickness } else { 1.0 };
+    let top = FluxFace { name: "top", point: DVec3::ZERO, reach, frame: Frame::about(DVec3::Z) };
+    let point = DVec3::new(0.0, 0.0, -thickness);
+    let bottom = FluxFace { name: "bottom", point, reach, frame: Frame::about(-DVec3::Z) };
+    if thickness > 0.0 { vec![top, bottom] } else { vec![top] }
 }
 
 fn sensor_position(sensor: &Sensor) -> Option<DVec3> {
     match sensor {
-        Sensor::Orthographic(screen) | Sensor::Perspective(screen) => Some(screen.origin),
+        Sensor::Perspective(screen) => Some(screen.origin),
         Sensor::Probe { ray, .. } => Some(ray.origin),
-        Sensor::FaceFlux { .. } | Sensor::BodyFlux { .. } => None,
+        Sensor::Orthographic(_) | Sensor::FaceFlux { .. } | Sensor::BodyFlux { .. } => None,
     }
 }

@@ -373,7 +373,7 @@ pub enum Sensor {
         /// Columns and rows.
         #[schemars(inner(range(min = 1, max = 16384)))]
         resolution: [usize; 2],
-        /// Middle of the image plane, mm; outside the body.
+        /// A point in the middle of the image, mm; its place along the view does not matter.
         center_mm: [f64; 3],
         /// Direction of the rays.
         toward: Direction,

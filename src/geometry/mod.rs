@@ -163,6 +163,17 @@ impl Shape {
         }
     }
 
+    /// Whether the point is inside the body or on its surface (on a mesh, rounding decides).
+    pub fn covers(&self, point: DVec3) -> bool {
+        match *self {
+            Shape::HalfSpace => point.z <= 0.0,
+            Shape::Slab { thickness } => -thickness <= point.z && point.z <= 0.0,
+            Shape::Box { half } => point.abs().cmple(half).all(),
+            Shape::Sphere { radius } => point.length() <= radius,
+            Shape::Mesh(ref mesh) => mesh.contains(point),
+        }
+    }
+
     /// Number of triangles; 0 for analytic shapes.
     pub fn triangle_count(&self) -> usize {
         match self {

@@ -17,11 +17,11 @@ pub struct Fresnel {
 /// R = (r_s^2 + r_p^2) / 2.
 #[inline]
 pub fn fresnel(cos_i: f64, eta: f64) -> Fresnel {
-    let sin2 = (eta * eta - 1.0) + cos_i * cos_i;
-    if sin2 <= 0.0 || cos_i <= 0.0 {
+    let eta2_cos_t2 = (eta * eta - 1.0) + cos_i * cos_i;
+    if eta2_cos_t2 <= 0.0 || cos_i <= 0.0 {
         return Fresnel { reflectance: 1.0, cos_t: 0.0 };
     }
-    let cos_t = sin2.sqrt() / eta;
+    let cos_t = eta2_cos_t2.sqrt() / eta;
     let r_s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
     let r_p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     Fresnel { reflectance: 0.5 * (r_s * r_s + r_p * r_p), cos_t }

@@ -22,7 +22,8 @@ impl HenyeyGreenstein {
             return 0.25 * FRAC_1_PI;
         }
         let (g, mu) = if g > 0.0 { (g, mu) } else { (-g, -mu) };
-        let base = (1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - mu);
+        // A cosine of rounded vectors may exceed 1 by a last digit.
+        let base = (1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - mu).max(0.0);
         (1.0 - g) * (1.0 + g) / (4.0 * PI * base * base.sqrt())
     }
 
@@ -52,7 +53,12 @@ impl HenyeyGreenstein {
         // The smaller distance carries the digits of mu.
         let mu = if below < above { 1.0 - below } else { above - 1.0 };
         let local = DVec3::new(r * cos_phi, r * sin_phi, mu);
-        if self.g == 0.0 { local } else { Frame::about(dir).to_world(local) }
+        if self.g == 0.0 {
+            return local;
+        }
+        // One Newton step towards unit length, so that rounding does not add up along a walk.
+        let next = Frame::about(dir).to_world(local);
+        next * (1.5 - 0.5 * next.length_squared())
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-use super::job::{Block, Job};
+use super::job::{Finished, Job};
 use super::jobs::{Plan, named};
 use crate::error::Result;
 use crate::estimators::{self, Anomaly, Cost};
@@ -32,8 +32,8 @@ pub fn experiment_hash(experiment: &Experiment) -> String {
     hash_json(&json!({"resolved": experiment.resolved(), "inputs": inputs(experiment)}))
 }
 
-/// Puts the blocks of a plan's jobs into a record.
-pub fn assemble(experiment: &Experiment, plan: &Plan, blocks: Vec<Block>) -> Result<Assembled> {
+/// Puts what a plan's jobs measured into a record.
+pub fn assemble(experiment: &Experiment, plan: &Plan, finished: Vec<Finished>) -> Result<Assembled> {
     let mut arrays = Arrays::new();
     let mut timing = Timing::default();
     let empty = |cell: &crate::experiment::CellSpec| Cell {
@@ -44,8 +44,8 @@ pub fn assemble(experiment: &Experiment, plan: &Plan, blocks: Vec<Block>) -> Res
     };
     let mut cells: Vec<Cell> = experiment.cells.iter().map(empty).collect();
     let mut post_hoc = BTreeSet::new();
-    for (job, block) in plan.jobs.iter().zip(blocks) {
-        let late = (0..job.claims.len()).filter(|&i| !block.claims.contains(&job.claims[i]));
+    for (job, block) in plan.jobs.iter().zip(finished) {
+        let late = (0..job.claims.len()).filter(|&i| !block.origin.claims.contains(&job.claims[i]));
         post_hoc.extend(late);
         let name = &experiment.file.estimator[job.estimator_index].name;
         let cost = timing::Cost {
@@ -76,19 +76,24 @@ pub fn assemble(experiment: &Experiment, plan: &Plan, blocks: Vec<Block>) -> Res
     Ok(Assembled { record, arrays, timing })
 }
 
-fn estimator_run(job: &Job, name: &str, kind: &str, block: Block, arrays: &mut Arrays) -> EstimatorRun {
-    let passes = block.next_pass();
+fn estimator_run(
+    job: &Job,
+    name: &str,
+    kind: &str,
+    finished: Finished,
+    arrays: &mut Arrays,
+) -> EstimatorRun {
     let (observables, bands) = (job.layout.observables().len(), job.layout.bands());
-    let batches = block.gates.batches();
+    let batches = &finished.batches;
     let shape = vec![batches.len(), observables, bands, 5];
     let data = batches.iter().flatten().flat_map(|moments| moments.to_array()).collect();
     let gates = gates_path(job.cell, name);
     arrays.insert(gates.clone(), Array::new(shape, data));
 
     let image = job.layout.image().map(|(width, height)| {
-        let total = block.pixels.finish().unwrap_or_default();
-        let mut data = total.mean.clone();
-        data.extend(total.std_error());
+        let errors = finished.image.std_error();
+        let mut data = finished.image.mean;
+        data.extend(errors);
         let pixels = pixels_path(job.cell, name);
         arrays.insert(pixels.clone(), Array::new(vec![2, height, width, bands], data));
         Image { width, height, pixels }
@@ -105,11 +110,11 @@ fn estimator_run(job: &Job, name: &str, kind: &str, block: Block, arrays: &mut A
             estimators::Bias::Biased(why) => Bias::Biased(why),
         },
         notes: job.estimator.notes(),
-        passes,
+        passes: finished.passes,
         observables: named(&job.layout),
         gates,
         image,
-        cost: counts(Cost::ALL.map(Cost::name).into(), &block.tally.cost),
-        anomalies: counts(Anomaly::ALL.map(Anomaly::name).into(), &block.tally.anomalies),
+        cost: counts(Cost::ALL.map(Cost::name).into(), &finished.tally.cost),
+        anomalies: counts(Anomaly::ALL.map(Anomaly::name).into(), &finished.tally.anomalies),
     }
 }

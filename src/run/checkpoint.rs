@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::job::{Block, Tally};
+use super::job::{Block, Origin, Tally};
 use crate::error::Result;
 use crate::results::atomic;
 use crate::results::json::{canonical, hash_bytes};
@@ -17,7 +17,7 @@ use crate::stats::moments::{ImageMoments, Moments};
 #[serde(deny_unknown_fields)]
 struct Header {
     identity: String,
-    claims: Vec<String>,
+    origin: Origin,
     tally: Tally,
     /// Level and number of values of every gate node.
     gates: Vec<(u32, usize)>,
@@ -36,7 +36,7 @@ pub fn save(path: &Path, identity: &str, block: &Block) -> Result<()> {
     let pixels = block.pixels.nodes();
     let header = Header {
         identity: identity.into(),
-        claims: block.claims.clone(),
+        origin: block.origin.clone(),
         tally: block.tally,
         gates: gates.iter().map(|n| (n.level, n.value.len())).collect(),
         pixels: pixels.iter().map(|n| (n.level, n.value.n, n.value.mean.len())).collect(),
@@ -52,11 +52,11 @@ pub fn save(path: &Path, identity: &str, block: &Block) -> Result<()> {
     atomic::write(path, &bytes, "save the state of the run")
 }
 
-/// The claims that stood before the first passes of a job's state, whether or not [`load`] can go on
-/// from its passes: they were seen.
-pub fn claims(path: &Path, identity: &str) -> Option<Vec<String>> {
+/// What stood before the first passes of a job's state, whether or not [`load`] can go on from its
+/// passes: they were seen.
+pub fn origin(path: &Path, identity: &str) -> Option<Origin> {
     let bytes = std::fs::read(path).ok()?;
-    parts(&bytes, identity).map(|(header, _)| header.claims)
+    parts(&bytes, identity).map(|(header, _)| header.origin)
 }
 
 /// Header and numbers of an undamaged state of the job.
@@ -94,7 +94,7 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
         block.pixels.push_node(level, ImageMoments { n, mean, m2 });
     }
     block.tally = header.tally;
-    block.claims = header.claims;
+    block.origin = header.origin;
     (block.gates.next_pass() == block.pixels.next_pass()).then_some(block)
 }
 

@@ -52,9 +52,20 @@ pub struct Block {
     pub pixels: Counter<ImageMoments>,
     /// Work and time.
     pub tally: Tally,
-    /// Hashes of the claims as they stood before the first of these passes: what is claimed later is
-    /// claimed with the result in sight.
+    /// What stood before the first of these passes was played.
+    pub origin: Origin,
+}
+
+/// What was fixed before the first pass of a job.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Origin {
+    /// Hashes of the claims: what is claimed later is claimed with the result in sight.
     pub claims: Vec<String>,
+    /// Hash of the budget that was turned into passes.
+    pub budget: String,
+    /// Those passes: the same budget is not turned into others.
+    pub passes: u64,
 }
 
 /// Counts and time, which add up in any order.
@@ -98,7 +109,7 @@ impl Block {
             gates: Counter::new(start, keep_level),
             pixels: Counter::new(start, Counter::<ImageMoments>::MERGE_ALL),
             tally: Tally::default(),
-            claims: Vec::new(),
+            origin: Origin::default(),
         }
     }
 
@@ -115,8 +126,36 @@ impl Block {
     }
 }
 
+/// What a finished job has measured: its batches, and one image instead of the tree's many.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finished {
+    /// Number of passes.
+    pub passes: u64,
+    /// Moments of `[observable][band]` by batch.
+    pub batches: Vec<Vec<Moments>>,
+    /// Moments of `[pixel][band]` over all passes.
+    pub image: ImageMoments,
+    /// Work and time.
+    pub tally: Tally,
+    /// What stood before the first pass.
+    pub origin: Origin,
+}
+
+impl Block {
+    /// All passes are played: folds what the tree still holds apart.
+    pub fn finish(self) -> Finished {
+        Finished {
+            passes: self.next_pass(),
+            batches: self.gates.batches(),
+            image: self.pixels.finish().unwrap_or_default(),
+            tally: self.tally,
+            origin: self.origin,
+        }
+    }
+}
+
 impl Job {
-    /// Plays passes `start..end`. `stop` is asked between passes; a stopped block is dropped whole.
+    /// Plays passes `start..end`; a pilot keeps no image. `stop` is asked between passes; a stopped block is dropped whole.
     pub fn play(
         &self,
         stage: Stage,
@@ -144,7 +183,9 @@ impl Job {
             }
             cpu += thread_cpu_time().saturating_sub(before);
             block.gates.push(scores.gates.iter().map(|&x| Moments::of(x)).collect());
-            block.pixels.push(ImageMoments::of(scores.pixels.clone()));
+            if stage == Stage::Main {
+                block.pixels.push(ImageMoments::of(scores.pixels.clone()));
+            }
         }
         block.tally = Tally {
             cost: scores.cost,

@@ -1,5 +1,6 @@
 //! From an experiment to jobs: every cell's scene, every estimator on it, the streams of both.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde_json::json;
@@ -12,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::estimators::Layout;
 use crate::experiment::build::{self, Builder};
 use crate::experiment::registry::Registry;
+use crate::experiment::schema::Budget;
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::json::hash_json;
 use crate::results::provenance;
@@ -27,13 +29,15 @@ pub struct Plan {
     pub comparisons: Vec<Comparison>,
     /// Kind of each estimator.
     pub kinds: Vec<String>,
-    shape_bytes: usize,
+    scene_bytes: usize,
+    /// Passes per job, where the budget says them.
+    passes: Option<u64>,
 }
 
 impl Plan {
     /// Estimate of the memory it takes.
     pub fn memory(&self, threads: usize) -> Estimate {
-        Estimate::new(&self.jobs, self.shape_bytes, threads)
+        Estimate::new(&self.jobs, self.scene_bytes, threads, self.passes)
     }
 }
 
@@ -53,7 +57,14 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
     let mut jobs = Vec::new();
     let mut observables = Vec::new();
     let mut kinds = Vec::new();
+    let mut known: BTreeMap<String, &str> = BTreeMap::new();
     for (index, cell) in experiment.cells.iter().enumerate() {
+        if let Some(twin) = known.insert(hash_json(&cell.content()), &cell.label) {
+            return Err(Error::input_help(
+                format!("cells `{twin}` and `{}` are the same scene", cell.label),
+                "equal scenes are played on equal streams, so one says nothing about the other: drop one",
+            ));
+        }
         let scene = Arc::new(builder.scene(cell)?);
         let layout = Layout::new(&scene);
         observables.push(named(&layout));
@@ -106,11 +117,15 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
             });
         }
     }
+    let passes = match experiment.file.budget {
+        Budget::Passes(passes) => Some(passes),
+        Budget::CpuSeconds(_) | Budget::RelativeError(_) => None,
+    };
     let comparisons = comparisons::expand(experiment, &bands, &observables)?;
     for job in &mut jobs {
         job.targets = targets(experiment, job, &comparisons, &observables[job.cell]);
     }
-    Ok(Plan { bands, jobs, comparisons, kinds, shape_bytes: builder.shape_bytes() })
+    Ok(Plan { bands, jobs, comparisons, kinds, scene_bytes: builder.memory_bytes(), passes })
 }
 
 fn streams(

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 /// Estimate of a run's largest memory, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
-    /// Meshes.
+    /// Meshes and maps.
     pub shapes: usize,
     /// Moments of gate observables and images of everything measured, kept until the record is written.
     pub results: usize,
@@ -15,20 +15,22 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// For jobs on a number of threads.
+    /// For jobs on a number of threads, whose scenes hold `shapes` bytes.
     ///
-    /// An image keeps mean and M2, 16 bytes a pixel and band. A finished job holds at most two of its
-    /// images (the tree's nodes sum to less than twice the widest, by count of passes up to 2^40) and
-    /// 128 batches of 5 moments per gate observable. A worker holds a binary counter's worth of images,
-    /// log2 of the passes in its block, and so does the collector per job under way.
-    pub fn new(jobs: &[Job], shapes: usize, threads: usize) -> Estimate {
+    /// An image keeps mean and M2, 16 bytes a pixel and band. A finished job holds one, and the record's
+    /// array beside it; and 128 batches of 5 moments per gate observable, likewise twice. A job under way
+    /// holds one image per bit of its passes, and as much again while its state is written. Each thread
+    /// holds the images of its block (sized by time: large images have blocks of a few passes) and one
+    /// more waits to be collected.
+    pub fn new(jobs: &[Job], shapes: usize, threads: usize, passes: Option<u64>) -> Estimate {
         let image = |job: &Job| 16 * job.layout.pixels() * job.layout.bands();
         let gates = |job: &Job| 128 * 40 * job.layout.observables().len() * job.layout.bands();
         let largest = jobs.iter().map(image).max().unwrap_or(0);
+        let bits = passes.map_or(20, |passes| passes.max(1).ilog2() as usize + 1);
         Estimate {
             shapes,
-            results: jobs.iter().map(|job| 8 * image(job) + gates(job)).sum(),
-            working: threads * 12 * largest,
+            results: jobs.iter().map(|job| 2 * (image(job) + gates(job))).sum(),
+            working: (2 * bits + 5 * threads) * largest,
         }
     }
 

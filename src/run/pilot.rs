@@ -7,6 +7,9 @@ use crate::experiment::schema::{Budget, RelativeError};
 use crate::stats::moments::Moments;
 use crate::stats::tree::Counter;
 
+/// A pilot keeps no batches.
+const ALL: u32 = Counter::<Vec<Moments>>::MERGE_ALL;
+
 /// Fewest passes of a run: every batch of its record then holds at least one.
 pub const LEAST_PASSES: u64 = 128;
 
@@ -25,7 +28,7 @@ pub fn estimate_seconds(job: &Job, budget: &Budget) -> Option<(u64, f64)> {
     let passes = passes(job, budget, &|| false)?;
     let mut played = 1;
     loop {
-        let cpu = job.play(Stage::Pilot, 0, played, 0, &|| false)?.tally.cpu_seconds;
+        let cpu = job.play(Stage::Pilot, 0, played, ALL, &|| false)?.tally.cpu_seconds;
         if cpu > 0.02 || played >= passes {
             return Some((passes, cpu / played as f64 * passes as f64));
         }
@@ -37,7 +40,7 @@ pub fn estimate_seconds(job: &Job, budget: &Budget) -> Option<(u64, f64)> {
 fn for_seconds(job: &Job, seconds: f64, stop: &dyn Fn() -> bool) -> Option<u64> {
     let mut passes = 1;
     loop {
-        let cpu = job.play(Stage::Pilot, 0, passes, 0, stop)?.tally.cpu_seconds;
+        let cpu = job.play(Stage::Pilot, 0, passes, ALL, stop)?.tally.cpu_seconds;
         if cpu > seconds / 20.0 || passes >= 1 << 20 {
             return Some(((seconds * passes as f64 / cpu) as u64).max(2));
         }
@@ -58,10 +61,10 @@ const LONGEST_PILOT: u64 = 1 << 17;
 
 /// Doubles the pilot until the passes that it predicts are at most [`PILOT_SHARE`] times its own.
 fn for_error(job: &Job, target: &RelativeError, stop: &dyn Fn() -> bool) -> Option<u64> {
-    let mut pilot = Counter::new(0, Counter::<Vec<Moments>>::MERGE_ALL);
+    let mut pilot = Counter::new(0, ALL);
     let mut length = LEAST_PASSES;
     loop {
-        let more = job.play(Stage::Pilot, pilot.next_pass(), length, 0, stop)?;
+        let more = job.play(Stage::Pilot, pilot.next_pass(), length, ALL, stop)?;
         for node in more.gates.nodes() {
             pilot.push_node(node.level, node.value.clone());
         }

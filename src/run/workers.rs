@@ -11,12 +11,13 @@ use std::time::{Duration, Instant};
 
 use super::checkpoint;
 use super::interrupt::Interrupt;
-use super::job::{Block, Job};
+use super::job::{Block, Finished, Job, Origin};
 use super::keys::Stage;
 use super::pilot;
 use super::progress::Progress;
 use crate::error::{Error, Result};
 use crate::experiment::schema::Budget;
+use crate::results::json::hash_json;
 use crate::stats::tree::batch_level;
 
 /// How a run is carried out; nothing here changes a result.
@@ -73,17 +74,18 @@ struct Pool<'a> {
 
 /// Plays every job and returns their blocks in the order of the jobs. Where the run is interrupted, all
 /// states are saved first.
-pub fn play_all(jobs: &[Job], budget: &Budget, settings: &Settings) -> Result<Vec<Block>> {
+pub fn play_all(jobs: &[Job], budget: &Budget, settings: &Settings) -> Result<Vec<Finished>> {
     let source = Mutex::new(Source { next_job: 0, active: None });
     let pool = Pool { jobs, budget, settings, source };
-    let (sender, receiver) = mpsc::channel();
+    // Bounded: blocks with images wait with their workers, not in memory.
+    let (sender, receiver) = mpsc::sync_channel(settings.threads);
     std::thread::scope(|scope| {
         for _ in 0..settings.threads {
             let (pool, sender) = (&pool, sender.clone());
             scope.spawn(move || pool.work(&sender));
         }
         drop(sender);
-        let collected = Collector::new(jobs, settings).collect(&receiver);
+        let collected = Collector::new(jobs, settings).collect(receiver);
         if collected.is_err() {
             settings.interrupt.raise(); // workers stop; the error is what is told
         }
@@ -91,8 +93,20 @@ pub fn play_all(jobs: &[Job], budget: &Budget, settings: &Settings) -> Result<Ve
     })
 }
 
+/// Stops the other threads where one panics: the run is lost, and they should not play it to its end.
+struct StopOnPanic<'a>(&'a Interrupt);
+
+impl Drop for StopOnPanic<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.raise();
+        }
+    }
+}
+
 impl Pool<'_> {
-    fn work(&self, sender: &mpsc::Sender<Message>) {
+    fn work(&self, sender: &mpsc::SyncSender<Message>) {
+        let _guard = StopOnPanic(self.settings.interrupt);
         let stop = || self.settings.interrupt.raised();
         while let Some(work) = self.next(sender) {
             let begun = Instant::now();
@@ -101,11 +115,12 @@ impl Pool<'_> {
                 return;
             };
             let seconds = begun.elapsed().as_secs_f64() / (work.end - work.start) as f64;
-            if let Some(active) = self.lock().active.as_mut().filter(|a| a.job == work.job) {
-                active.seconds_per_pass = Some(seconds);
-            }
+            // Sent before the lock is asked for, which another worker's pilot may hold for long.
             if sender.send(Message::Played { job: work.job, block: Box::new(block) }).is_err() {
                 return;
+            }
+            if let Some(active) = self.lock().active.as_mut().filter(|a| a.job == work.job) {
+                active.seconds_per_pass = Some(seconds);
             }
         }
     }
@@ -115,7 +130,7 @@ impl Pool<'_> {
     }
 
     /// The next run of passes; begins the next job where the last one has none left.
-    fn next(&self, sender: &mpsc::Sender<Message>) -> Option<Work> {
+    fn next(&self, sender: &mpsc::SyncSender<Message>) -> Option<Work> {
         let mut source = self.lock();
         loop {
             if self.settings.interrupt.raised() {
@@ -147,17 +162,24 @@ impl Pool<'_> {
     }
 
     /// Fixes a job's passes and finds what is done of it. Other workers wait meanwhile.
-    fn begin(&self, index: usize, sender: &mpsc::Sender<Message>) -> Option<Active> {
+    fn begin(&self, index: usize, sender: &mpsc::SyncSender<Message>) -> Option<Active> {
         let job = &self.jobs[index];
-        let passes = pilot::passes(job, self.budget, &|| self.settings.interrupt.raised())?;
-        let keep_level = batch_level(passes);
         let path = checkpoint::path(self.settings.root, &job.identity);
+        let origin = checkpoint::origin(&path, &job.identity);
+        let budget = hash_json(&(self.budget, &job.targets));
+        // A pilot that times itself would find another number each time.
+        let passes = match &origin {
+            Some(origin) if origin.budget == budget => origin.passes,
+            _ => pilot::passes(job, self.budget, &|| self.settings.interrupt.raised())?,
+        };
         // Where a state goes too far or too coarsely, its passes are played again; they were seen all the
         // same, so what is claimed since then stays claimed too late.
-        let claims = || checkpoint::claims(&path, &job.identity).unwrap_or_else(|| job.claims.clone());
-        let done = checkpoint::load(&path, &job.identity, keep_level)
+        let claims = origin.map_or_else(|| job.claims.clone(), |origin| origin.claims);
+        let keep_level = batch_level(passes);
+        let mut done = checkpoint::load(&path, &job.identity, keep_level)
             .filter(|block| block.next_pass() <= passes)
-            .unwrap_or_else(|| Block { claims: claims(), ..Block::empty(0, keep_level) });
+            .unwrap_or_else(|| Block::empty(0, keep_level));
+        done.origin = Origin { claims, budget, passes };
         let next = done.next_pass();
         sender.send(Message::Begin { job: index, passes, done: Box::new(done) }).ok()?;
         Some(Active { job: index, passes, next, seconds_per_pass: None })
@@ -168,7 +190,7 @@ impl Pool<'_> {
 struct Collector<'a> {
     jobs: &'a [Job],
     settings: &'a Settings<'a>,
-    finished: BTreeMap<usize, Block>,
+    finished: BTreeMap<usize, Finished>,
     running: BTreeMap<usize, Running>,
 }
 
@@ -187,7 +209,8 @@ impl<'a> Collector<'a> {
         Collector { jobs, settings, finished: BTreeMap::new(), running: BTreeMap::new() }
     }
 
-    fn collect(mut self, receiver: &mpsc::Receiver<Message>) -> Result<Vec<Block>> {
+    fn collect(mut self, receiver: mpsc::Receiver<Message>) -> Result<Vec<Finished>> {
+        // Owned: where this returns early, senders that wait fail instead of waiting for ever.
         for message in receiver {
             let job = match message {
                 Message::Begin { job, passes, done } => {
@@ -240,7 +263,7 @@ impl<'a> Collector<'a> {
             if running.done.next_pass() > running.on_disk {
                 self.save(job, &running.done)?;
             }
-            self.finished.insert(job, running.done);
+            self.finished.insert(job, running.done.finish());
         }
         Ok(())
     }

@@ -90,6 +90,12 @@ impl LatLong {
         (radiance, if map.strength > 0.0 { radiance / map.strength } else { 0.0 })
     }
 
+    /// Memory that the map holds, bytes.
+    pub fn memory_bytes(&self) -> usize {
+        let texel = size_of::<f64>() + size_of::<(f64, u32)>();
+        self.bands.len() * self.width * self.height * texel
+    }
+
     /// Radiance integrated over directions.
     pub fn strength(&self, band: usize) -> f64 {
         self.bands[band].strength

@@ -1,6 +1,7 @@
 //! Lights at infinity: parallel light, a disc of directions, an environment.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use super::latlong::LatLong;
 use crate::math::{DVec3, Frame};
@@ -35,7 +36,7 @@ pub enum Emission {
         radiance: Vec<f64>,
     },
     /// A latitude-longitude map.
-    Map(LatLong),
+    Map(Arc<LatLong>),
 }
 
 /// A direction drawn from a light.

@@ -70,6 +70,8 @@ pub struct FluxFace {
     pub name: &'static str,
     /// A point of it.
     pub point: DVec3,
+    /// How far outside its rays start, mm.
+    pub reach: f64,
     /// Its outward normal and tangents.
     pub frame: Frame,
 }
@@ -146,7 +148,7 @@ impl Sensor {
                 let mu2 = edge(bin) + (edge(bin + 1) - edge(bin)) * (1.0 - u[0]);
                 let out = face.frame.to_world(square_to_cosine_hemisphere([1.0 - mu2, u[1]]));
                 let weight = PI * (edge(bin + 1) - edge(bin)) / *paths as f64;
-                SensorRay { ray: Ray { origin: face.point + out, dir: -out }, weight, slot }
+                SensorRay { ray: Ray { origin: face.point + face.reach * out, dir: -out }, weight, slot }
             }
             Sensor::BodyFlux { bounds, frame, bins, paths } => {
                 let slot = index / paths;
@@ -259,7 +261,8 @@ mod tests {
     /// The weights of a flux integrate a radiance of 1 to pi per face and 4 pi * pi R^2 per body.
     #[test]
     fn flux_of_constant_radiance() {
-        let face = |name| FluxFace { name, point: DVec3::ZERO, frame: Frame::about(DVec3::Z) };
+        let face =
+            |name| FluxFace { name, point: DVec3::ZERO, reach: 1.0, frame: Frame::about(DVec3::Z) };
         let slab = Sensor::FaceFlux { faces: vec![face("top"), face("bottom")], bins: 3, paths: 2 };
         let body = Sensor::BodyFlux {
             bounds: BoundingSphere { center: DVec3::X, radius: 2.0 },

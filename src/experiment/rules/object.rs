@@ -57,7 +57,15 @@ fn positive(at: At, values: &[f64]) {
 fn boundary(at: At, boundary: &Boundary, bands: &[Band]) {
     match boundary {
         Boundary::Smooth { eta: index } => eta(at.to("smooth").to("eta"), index, bands),
-        Boundary::Rough { eta: index, .. } => eta(at.to("rough").to("eta"), index, bands),
+        Boundary::Rough { eta: index, .. } => {
+            let at = at.to("rough").to("eta");
+            eta(at.clone(), index, bands);
+            // Without refraction no facet is told from another: the half-vector has no direction.
+            if index.per_band(bands).is_ok_and(|values| values.contains(&1.0)) {
+                let help = "use `object.boundary.matched`, or an index other than 1 in every band";
+                at.report_help("a rough boundary needs an index other than 1", help);
+            }
+        }
         Boundary::Matched {} => {}
     }
 }
