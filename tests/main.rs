@@ -2,6 +2,7 @@
 
 mod cli;
 mod damage;
+mod docs;
 mod interruption;
 mod layering;
 mod reproducibility;

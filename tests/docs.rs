@@ -1,0 +1,377 @@
+//! The pages for people: what they show is accepted, what they claim holds, what they point at exists.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use scatterproof::results::exr_file::write_exr;
+use scatterproof::results::image::Picture;
+use scatterproof::results::npy::Array;
+use scatterproof::results::record::Band;
+use toml::Table;
+
+use super::work::Work;
+
+/// Every page, from the package's folder.
+const PAGES: [&str; 7] = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "docs/experiment-file.md",
+    "docs/limits.md",
+    "results/README.md",
+    "scripts/README.md",
+];
+
+fn package() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn text(path: &str) -> String {
+    fs::read_to_string(package().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+/// A fenced block of a page.
+#[derive(Debug)]
+struct Block<'a> {
+    /// What stands behind the opening fence.
+    tag: &'a str,
+    /// The lines between the fences, numbered as in the page.
+    lines: Vec<(usize, &'a str)>,
+}
+
+impl Block<'_> {
+    fn text(&self) -> String {
+        self.lines.iter().map(|(_, line)| format!("{line}\n")).collect()
+    }
+
+    fn is(&self, language: &str) -> bool {
+        self.tag.split(' ').next() == Some(language)
+    }
+}
+
+/// The blocks of a page, and the page with empty lines in their place.
+fn split(page: &str) -> (Vec<Block<'_>>, String) {
+    let (mut blocks, mut prose, mut open) = (Vec::new(), String::new(), None);
+    for (line, number) in page.lines().zip(1..) {
+        match (line.strip_prefix("```"), &mut open) {
+            (Some(tag), None) => open = Some(Block { tag, lines: Vec::new() }),
+            (Some(_), Some(_)) => blocks.extend(open.take()),
+            (None, Some(block)) => block.lines.push((number, line)),
+            (None, None) => prose += line,
+        }
+        prose.push('\n');
+    }
+    assert!(open.is_none(), "a fence is not closed: {open:?}");
+    (blocks, prose)
+}
+
+/// The blocks of a language.
+fn blocks<'a>(page: &'a str, language: &str) -> Vec<Block<'a>> {
+    split(page).0.into_iter().filter(|block| block.is(language)).collect()
+}
+
+/// The only block of a language.
+fn only_block(page: &str, language: &str) -> String {
+    let found = blocks(page, language);
+    assert_eq!(found.len(), 1, "one block of {language}");
+    found[0].text()
+}
+
+/// A snippet in its place in the complete file: `object` part by part, every other key as a whole.
+fn merged(base: &Table, snippet: Table) -> Table {
+    let mut merged = base.clone();
+    for (key, value) in snippet {
+        match (merged.get_mut(&key), value) {
+            (Some(toml::Value::Table(old)), toml::Value::Table(new)) if key == "object" => {
+                old.extend(new)
+            }
+            (_, value) => drop(merged.insert(key, value)),
+        }
+    }
+    merged
+}
+
+/// The experiments that a page by example shows: line and file. The block `toml complete` is the base
+/// of all snippets; in `toml one-of` each line is one; `spectral` ones have bands with wavelengths.
+fn experiments(page: &str) -> Vec<(usize, Table)> {
+    let parse = |line: usize, text: &str| {
+        toml::from_str::<Table>(text)
+            .unwrap_or_else(|e| panic!("the snippet at line {line}: {e}\n{text}"))
+    };
+    let blocks = blocks(page, "toml");
+    let complete = blocks.iter().find(|block| block.tag == "toml complete").expect("a complete file");
+    let base = parse(complete.lines[0].0, &complete.text());
+    let spectral = parse(0, "bands = { spectral = { from_nm = 400, to_nm = 700, count = 3 } }");
+    let spectral = merged(&base, spectral);
+    let mut files = Vec::new();
+    for block in &blocks {
+        let first = block.lines[0].0;
+        match block.tag {
+            "toml complete" => files.push((first, base.clone())),
+            "toml" => files.push((first, merged(&base, parse(first, &block.text())))),
+            "toml one-of" | "toml one-of spectral" => {
+                for &(number, line) in &block.lines {
+                    // What was measured, was in R, G and B.
+                    let in_rgb = block.tag == "toml one-of" || line.contains("\"marble\"");
+                    let base = if in_rgb { &base } else { &spectral };
+                    files.push((number, merged(base, parse(number, line))));
+                }
+            }
+            tag => panic!("line {first}: nothing is known of blocks headed `{tag}`"),
+        }
+    }
+    files
+}
+
+/// A closed body.
+const OCTAHEDRON: &str = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n\
+    f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
+
+/// A grey sky.
+fn write_sky(path: &Path) {
+    let bands = [Band { name: "grey".into(), range_nm: None, display_rgb: [1.0; 3] }];
+    let pixels = Array::new(vec![2, 2, 4, 1], vec![0.5; 16]);
+    write_exr(path, &Picture::new(&bands, &pixels), &[]).expect("a sky");
+}
+
+/// What `check` says of a page's experiments: how many there are, and what is wrong.
+fn refused(page: &str) -> (usize, String) {
+    let work = Work::new();
+    work.write("body.obj", OCTAHEDRON);
+    write_sky(&work.path("sky.exr"));
+    for block in blocks(page, "csv") {
+        let name = block.tag.strip_prefix("csv ").expect("the name of the CSV file");
+        work.write(name, &block.text());
+    }
+    let files = experiments(page);
+    let mut names = Vec::new();
+    for (line, file) in &files {
+        names.push(format!("line-{line}.toml"));
+        work.write(&names[names.len() - 1], &toml::to_string(file).expect("a text"));
+    }
+    let ran = work.run(&format!("check {}", names.join(" ")));
+    let said = ran.stdout();
+    // Not every error says in which experiment it is.
+    names.retain(|name| !said.contains(&format!("{name}: ok, ")));
+    ran.check((ran.code() == Some(0)) == names.is_empty(), "the exit code says what the lines say");
+    let errors = format!("{}\n{}", names.join(" "), ran.stderr());
+    (files.len(), if names.is_empty() { String::new() } else { errors })
+}
+
+#[test]
+fn every_snippet_is_accepted() {
+    let (count, errors) = refused(&text("docs/experiment-file.md"));
+    assert!(errors.is_empty(), "snippets of docs/experiment-file.md, by their line: {errors}");
+    assert!(count > 40, "only {count} snippets were found");
+    let with_toml = PAGES.into_iter().filter(|page| !blocks(&text(page), "toml").is_empty());
+    let judged = ["README.md", "CONTRIBUTING.md", "docs/experiment-file.md"];
+    assert_eq!(with_toml.collect::<Vec<_>>(), judged, "each page with TOML needs a test of it");
+}
+
+#[test]
+fn planted_snippets_are_found() {
+    let page = text("docs/experiment-file.md");
+    let every = experiments(&page).len();
+    for (old, new, at_least, words) in [
+        ("\nseed = 1 ", "\nsead = 1 ", every, "unknown key `sead`"),
+        ("cavity_radius_mm = 0.4", "cavity_radius = 0.4", 1, "unknown key `cavity_radius`"),
+        ("one-of spectral", "one-of", 3, "wavelength"),
+        ("path = \"body.obj\"", "path = \"corpse.obj\"", 1, "corpse.obj"),
+        ("map = \"sky.exr\"", "map = \"ski.exr\"", 1, "ski.exr"),
+        ("radius,albedo,", "radios,albedo,", 1, "radius"),
+        ("{ albedo = \"1.0\" }", "{ albedo = \"1.5\" }", 1, "1.5"),
+    ] {
+        assert!(page.contains(old), "{old}");
+        let (_, errors) = refused(&page.replacen(old, new, 1));
+        let files = errors.lines().next().unwrap_or_default().split_whitespace().count();
+        // After a file that cannot be read nothing more is checked.
+        assert!(files >= at_least && errors.contains(words), "{new}:\n{errors}");
+    }
+}
+
+#[test]
+fn the_example_of_the_readme_verifies() {
+    let work = Work::new();
+    work.write("slab.toml", &only_block(&text("README.md"), "toml"));
+    // Fewer passes could miss what the claim wants to see: the verdict would be `underpowered`.
+    let less = "-q --set budget.passes=256";
+    work.run(&format!("run slab.toml {less}")).exits(0).says("results/slab/report.html");
+    work.run(&format!("verify slab.toml {less}")).exits(0).says("verdicts are green");
+}
+
+/// Prose and code of a page without its fences: pieces with their line.
+fn pieces(prose: &str) -> Vec<(usize, &str)> {
+    let mut line = 1;
+    let pieces = prose.split('`').map(|piece| {
+        let begins = line;
+        line += piece.matches('\n').count();
+        (begins, piece)
+    });
+    let pieces = pieces.collect::<Vec<_>>();
+    assert!(pieces.len() % 2 == 1, "a backtick without its twin");
+    pieces
+}
+
+/// Relative links that point nowhere.
+fn dead_links(path: &str, page: &str) -> (usize, Vec<String>) {
+    let folder = package().join(path).parent().expect("a folder").to_path_buf();
+    let prose = split(page).1;
+    let without_code: String = pieces(&prose).into_iter().step_by(2).map(|(_, piece)| piece).collect();
+    let targets =
+        without_code.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(to, _)| to);
+    let relative: Vec<&str> = targets.filter(|to| !to.contains("://")).collect();
+    let dead = relative.iter().filter(|to| {
+        let file = to.split('#').next().unwrap_or_default();
+        !folder.join(file).is_file()
+    });
+    (relative.len(), dead.map(|to| format!("{path}: {to}")).collect())
+}
+
+#[test]
+fn every_relative_link_points_to_a_file() {
+    let (counts, dead): (Vec<usize>, Vec<_>) =
+        PAGES.iter().map(|path| dead_links(path, &text(path))).unzip();
+    assert_eq!(dead.concat(), [""; 0], "links to no file");
+    assert!(counts.iter().sum::<usize>() > 10, "links per page: {counts:?}");
+
+    let planted =
+        "[a](limits.md), [`b`](../README.md#start) `[c](no)` [d](http://no/)\n```\n[e](no)\n```\n";
+    assert_eq!(dead_links("docs/x.md", planted), (2, vec![]));
+    let planted = "![a](README.md) and\n[`b`\nb](docs)";
+    assert_eq!(dead_links("docs/x.md", planted).1, ["docs/x.md: README.md", "docs/x.md: docs"]);
+}
+
+/// The commands of a page, from code in its prose and from blocks: line and what follows `scatterproof`.
+fn commands(page: &str) -> Vec<(usize, String)> {
+    let (blocks, prose) = split(page);
+    let spans = pieces(&prose).into_iter().skip(1).step_by(2);
+    let spans = spans.map(|(line, span)| (line, span.replace('\n', " ")));
+    let in_blocks = blocks.iter().filter(|block| !block.is("rust")).flat_map(|block| &block.lines);
+    let in_blocks = in_blocks.map(|(line, text)| (*line, text.to_string()));
+    let mut found = Vec::new();
+    for (line, code) in spans.chain(in_blocks) {
+        let code = code.trim_start_matches([' ', '#']);
+        let own = code.strip_prefix("scatterproof ");
+        let cargo = || code.strip_prefix("cargo run ")?.split_once("-- ").map(|(_, rest)| rest);
+        let comment = code.find("# scatterproof ").map(|at| &code[at + "# scatterproof ".len()..]);
+        let Some(command) = own.or_else(cargo).or(comment) else { continue };
+        let command = command.split(" #").next().unwrap_or_default();
+        found.push((line, command.trim().to_string()));
+    }
+    found
+}
+
+/// What is wrong with a command, where something is. Files in folders must be there; `example.toml` is
+/// the file of the page by example.
+fn wrong(work: &Work, command: &str) -> Option<String> {
+    let words: Vec<&str> = command.split_whitespace().collect();
+    let (name, rest) = words.split_first()?;
+    if !name.starts_with('-') && !work.run("--help").stdout().contains(&format!("\n  {name} ")) {
+        return Some(format!("no subcommand `{name}`"));
+    }
+    let is_flag = |word: &&&str| word.starts_with('-');
+    let help = work.run(&if name.starts_with('-') { "--help".into() } else { format!("help {name}") });
+    let help = help.stdout();
+    let known: Vec<&str> = help.split([' ', ',', '\n']).collect();
+    if let Some(flag) = words.iter().filter(is_flag).find(|flag| !known.contains(*flag)) {
+        return Some(format!("`{name}` has no `{flag}`"));
+    }
+    if *name == "list" {
+        let ran = work.run(command);
+        return (ran.code() != Some(0)).then(|| ran.stderr());
+    }
+    let file = rest.iter().find(|word| word.ends_with(".toml") && !is_flag(word))?;
+    let folder = match *file {
+        "example.toml" => work.path(""),
+        _ if file.contains('/') => package().to_path_buf(),
+        _ => return None,
+    };
+    if !folder.join(file).is_file() {
+        return Some(format!("no file {file}"));
+    }
+    // Of the ballistic example the program at hand knows nothing.
+    let overrides_only = rest.iter().filter(is_flag).all(|flag| ["--set", "--setting"].contains(flag));
+    if !overrides_only || file.starts_with("examples/") {
+        return None;
+    }
+    let arguments = command.split_once(' ').map_or("", |(_, rest)| rest);
+    let ran = work.shell(&format!("cd '{}' && exec \"$0\" check {arguments}", folder.display()));
+    (ran.code() != Some(0)).then(|| ran.stderr())
+}
+
+#[test]
+fn every_command_exists() {
+    let work = Work::new();
+    let page = text("docs/experiment-file.md");
+    let base = blocks(&page, "toml");
+    let base = base.iter().find(|block| block.tag == "toml complete").expect("a complete file");
+    work.write("example.toml", &base.text());
+    let (mut count, mut found) = (0, Vec::new());
+    for path in PAGES {
+        for (line, command) in commands(&text(path)) {
+            count += 1;
+            found.extend(wrong(&work, &command).map(|what| format!("{path}:{line}: {command}: {what}")));
+        }
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    assert!(count > 30, "only {count} commands were found");
+
+    let planted = "`scatterproof rum x` and `scatterproof\nlist glases`\n```\nscatterproof plan f --wet  # c\n\
+        cargo run --release -- run experiments/none.toml\nscatterproof run example.toml --set sead=1\n```\n\
+        ```toml\n[a]  # scatterproof chek\n```\n`scatterproof list glasses`, `scatterproof --help`\n";
+    let found = commands(planted).into_iter().filter_map(|(line, command)| {
+        let what = wrong(&work, &command)?;
+        Some(format!("{line} {}", what.lines().next().unwrap_or_default()))
+    });
+    let found = found.collect::<Vec<_>>().join("\n");
+    for words in [
+        "1 no subcommand `rum`",
+        "1 error: invalid value 'glases'",
+        "4 `plan` has no `--wet`",
+        "5 no file experiments/none.toml",
+        "6 error: unknown key `sead`",
+        "9 no subcommand `chek`",
+    ] {
+        assert!(found.contains(words), "not found: {words}\n{found}");
+    }
+    assert_eq!(found.lines().count(), 6, "{found}");
+}
+
+/// The program of `examples/ballistic.rs`, which `cargo test` builds beside the tests where it is asked
+/// for no test by name.
+fn ballistic() -> PathBuf {
+    let test = std::env::current_exe().expect("the test's own path");
+    let profile = test.ancestors().nth(2).expect("the profile's folder");
+    let program = profile.join("examples").join(format!("ballistic{}", std::env::consts::EXE_SUFFIX));
+    let changed = |path: &Path| fs::metadata(path).and_then(|about| about.modified()).ok();
+    let is_built = changed(&program) > changed(&package().join("examples/ballistic.rs"));
+    let help = "build it as the tests are, `cargo build --release --example ballistic`";
+    assert!(is_built, "{} is not there, or older than its source: {help}", program.display());
+    program
+}
+
+#[test]
+fn the_example_estimator_is_quoted_and_works() {
+    let page = text("CONTRIBUTING.md");
+    let source = text("examples/ballistic.rs");
+    let quoted = blocks(&page, "rust");
+    assert!(quoted.len() >= 2, "the estimator and its registry entry");
+    for block in quoted {
+        let line = block.lines[0].0;
+        assert!(source.contains(&block.text()), "CONTRIBUTING.md:{line}: not in examples/ballistic.rs");
+    }
+    let experiment = only_block(&page, "toml");
+    assert_eq!(experiment, text("examples/ballistic.toml"), "CONTRIBUTING.md, examples/ballistic.toml");
+
+    let work = Work::new();
+    work.write("ballistic.toml", &experiment);
+    let run = |arguments: &str| work.run_program(&ballistic(), arguments);
+    let ran = run("list estimators");
+    ran.exits(0).says("\nballistic  light straight through a matched body").says("path  ");
+    run("verify ballistic.toml -q").exits(0).says("1 of 1 verdicts are green");
+    let ran = run("check ballistic.toml --set estimator.1.ballistic.x=1");
+    ran.exits(2).complains("unknown key `x`");
+    let ran = run("plan ballistic.toml --dry --set object.boundary={smooth={eta=1.3}}");
+    ran.exits(2).complains("ballistic needs a matched boundary");
+    work.run("check ballistic.toml").exits(2).complains("unknown k").complains("`ballistic`");
+}
