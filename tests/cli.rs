@@ -121,8 +121,31 @@ fn meshes() {
 
 #[test]
 fn sensors_in_bodies_and_too_much_memory() {
-    let work = Work::with(&edit("center_mm = [0, 0, 3]", "center_mm = [0, 0, 0.5]"));
-    refused(&work, &["the sensor at [0, 0, 0.5] mm stands inside the body", "move it outside"]);
+    // Inside, and exactly on the surface.
+    for point in ["[0, 0, 0.5]", "[0, 0, 1]"] {
+        let probe = format!("sensor.probe = {{ point_mm = {point}, toward = [0, 0, -1] }}");
+        let work = Work::with(&edit(SENSOR, &probe));
+        refused(&work, &["the sensor at [0, 0,", "stands inside or on the body", "move it outside"]);
+    }
+    // Parallel rays start before the body wherever the image plane was put.
+    let works = ["[0, 0, 3]", "[0, 0, 0.5]", "[0, 0, -7]"]
+        .map(|center| Work::with(&edit("center_mm = [0, 0, 3]", &format!("center_mm = {center}"))));
+    let means = works.map(|work| {
+        work.run("run x.toml -q --set budget.passes=64").exits(0);
+        let summary = std::fs::read_to_string(work.path("results/x/summary.json")).expect("a summary");
+        let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+        summary["measurements"][0]["mean"].as_f64().expect("a number")
+    });
+    assert!(means.iter().all(|mean| *mean > 0.5 * means[0]), "{means:?}");
+
+    // A rough surface without refraction, and the same scene twice.
+    let rough = edit("alpha = 0.3, eta = 1.3", "alpha = 0.3, eta = [1.3, 1.0, 1.3]");
+    refused(&Work::with(&rough), &["an index other than 1", "object.boundary.matched"]);
+    let rows = "[[sweep]]\nkeys = [\"object.medium.coefficients.g\"]\n\
+                rows = [{ label = \"a\", values = [0.5] }, { label = \"b\", values = [0.5] }]\n";
+    let twice = edit("albedo = [0.9, 0.8, 0.7], g = 0.2", "albedo = [0.9, 0.8, 0.7]") + rows;
+    let ran = Work::with(&twice).run("plan x.toml --dry");
+    ran.exits(2).complains("cells `a` and `b` are the same scene");
 
     let explicit: Vec<String> = (0..1024).map(|i| format!("{{ name = \"b{i}\" }}")).collect();
     let bands = format!("bands = {{ explicit = [{}] }}", explicit.join(", "));
@@ -204,7 +227,7 @@ fn plan_check_list_schema_completions() {
     ran.exits(0).says("x.toml: ok, 1 cell, 2 estimators, 3 bands, 0 claims\n");
     let ran = work.run("plan x.toml --dry --set budget.passes=9");
     ran.exits(0).says("object.shape.sphere.radius_mm").says("9 passes").says("--set").says("memory: ");
-    ran.says("1 cells, 2 measurements").check(!work.path("results").exists(), "a plan writes nothing");
+    ran.says("1 cell, 2 measurements").check(!work.path("results").exists(), "a plan writes nothing");
     work.run("plan x.toml --threads 2").exits(0).says("100 ").says("s on 2 threads");
     work.run("list").exits(0).says("estimators\n").says("half_space").says("Everything below z = 0.");
     work.run("list estimators").exits(0).says("path").says("roulette");

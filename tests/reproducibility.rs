@@ -207,3 +207,16 @@ fn claims_made_after_the_run_are_not_green() {
     work.write("x.toml", &claimed.replace("detect = 0.05", "detect = 0.06"));
     is_post_hoc(&work, "--out claimed");
 }
+
+/// A budget in seconds is turned into passes once: the same command goes on with that number instead of
+/// timing itself again, and a complete run is not repeated.
+#[test]
+fn a_budget_in_seconds_is_fixed_once() {
+    let work = Work::with(&replaced(&probe(), "budget.passes = 100", "budget.cpu_seconds = 0.05"));
+    work.run("run x.toml -q").exits(0);
+    let first = work.record("results");
+    for _ in 0..3 {
+        work.run("run x.toml -q").exits(0);
+        assert_eq!(work.record("results"), first);
+    }
+}

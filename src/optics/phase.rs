@@ -123,6 +123,23 @@ mod tests {
         }
     }
 
+    /// Vectors whose product exceeds 1 by rounding have a density, and walks keep their length.
+    #[test]
+    fn rounding_beyond_the_poles() {
+        let mut dir = DVec3::new(0.48, -0.6, 0.64);
+        for g in [1.0 - 1e-9, -1.0 + 1e-9, 0.5] {
+            let phase = HenyeyGreenstein { g };
+            for mu in [1.0 + 4e-16, -1.0 - 4e-16] {
+                assert!(phase.pdf(mu).is_finite() && phase.pdf(mu) > 0.0);
+            }
+            for i in 0..100_000u32 {
+                let u = [f64::from(i % 997) / 997.0, f64::from(i % 101) / 101.0];
+                dir = phase.sample(dir, u);
+                assert!((dir.length() - 1.0).abs() < 1e-15);
+            }
+        }
+    }
+
     /// D2 and D5: density times the Jacobian of the map is 1, and the sampled vector has the cosine
     /// whose density is reported.
     #[test]

@@ -59,7 +59,7 @@ fn boundary(at: At, boundary: &Boundary, bands: &[Band]) {
         Boundary::Smooth { eta: index } => eta(at.to("smooth").to("eta"), index, bands),
         Boundary::Rough { eta: index, .. } => {
             let at = at.to("rough").to("eta");
-            eta(at.clone(), index, bands);
+            eta(at, index, bands);
             // Without refraction no facet is told from another: the half-vector has no direction.
             if index.per_band(bands).is_ok_and(|values| values.contains(&1.0)) {
                 let help = "use `object.boundary.matched`, or an index other than 1 in every band";
