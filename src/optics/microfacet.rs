@@ -1,7 +1,7 @@
 //! Distributions of microfacet normals, isotropic roughness, with separable Smith masking and
 //! sampling of the visible normals. Local frame: +z is the macroscopic normal on the side of `v`.
 
-use std::f64::consts::{FRAC_1_PI, PI};
+use std::f64::consts::FRAC_1_PI;
 
 use crate::math::{DVec3, erf_inv, erfc, exp, increasing_root, sin_cos_turns};
 
@@ -116,28 +116,29 @@ fn beckmann_visible(v: DVec3, u: [f64; 2]) -> DVec3 {
     DVec3::new(-(x * cos_phi - y * sin_phi), -(x * sin_phi + y * cos_phi), 1.0)
 }
 
-/// Mean projected area, `int D(h) h.z dh`: 1 for a valid distribution; for tests and documentation.
-pub fn projected_area(facets: &Microfacets) -> crate::math::Integral {
-    // tan theta = alpha s: d omega = 2 pi sin dtheta, dtheta = alpha ds cos^2.
-    crate::math::integrate(
-        |x| {
-            let s = x / (1.0 - x);
-            let tan = facets.alpha * s;
-            let cos2 = 1.0 / (1.0 + tan * tan);
-            let (sin, cos) = ((tan * tan * cos2).sqrt(), cos2.sqrt());
-            let dtheta = facets.alpha * cos2 / ((1.0 - x) * (1.0 - x));
-            2.0 * PI * sin * dtheta * cos * facets.d(DVec3::new(sin, 0.0, cos))
-        },
-        0.0,
-        1.0,
-        1e-10,
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::integrate;
+    use crate::math::{Integral, integrate};
+    use std::f64::consts::PI;
+
+    /// Mean projected area, `int D(h) h.z dh`: 1 for a valid distribution.
+    fn projected_area(facets: &Microfacets) -> Integral {
+        // tan theta = alpha s: d omega = 2 pi sin dtheta, dtheta = alpha ds cos^2.
+        integrate(
+            |x| {
+                let s = x / (1.0 - x);
+                let tan = facets.alpha * s;
+                let cos2 = 1.0 / (1.0 + tan * tan);
+                let (sin, cos) = ((tan * tan * cos2).sqrt(), cos2.sqrt());
+                let dtheta = facets.alpha * cos2 / ((1.0 - x) * (1.0 - x));
+                2.0 * PI * sin * dtheta * cos * facets.d(DVec3::new(sin, 0.0, cos))
+            },
+            0.0,
+            1.0,
+            1e-10,
+        )
+    }
 
     fn all() -> impl Iterator<Item = Microfacets> {
         [MicrofacetKind::Ggx, MicrofacetKind::Beckmann]
