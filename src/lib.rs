@@ -8,6 +8,7 @@
 //!
 //! ```text
 //! simulation   math -> sampling -> optics -> geometry -> scene -> estimators
+//!                                                        scene -> samplers     (the catalogue of samplers)
 //!              math -> optics -> reference          (closed forms; never sees the estimators)
 //! bridge       experiment -> run                    (the only modules that see both sides)
 //! evidence     math -> stats -> results -> verify -> report
@@ -68,6 +69,9 @@ pub mod geometry;
 
 /// The immutable scene: body, lights, sensors.
 pub mod scene;
+
+/// The catalogue of samplers: what each draws, and the density that it claims to draw from.
+pub mod samplers;
 
 /// The one open trait and the estimators, one file each.
 pub mod estimators;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::tokens::{Token, module_path, test_modules, tokens};
 
 /// What a module may use, besides itself and `error`.
-const LAYERS: [(&str, &[&str]); 17] = [
+const LAYERS: [(&str, &[&str]); 18] = [
     ("error", &[]),
     // Simulation.
     ("math", &[]),
@@ -17,6 +17,7 @@ const LAYERS: [(&str, &[&str]); 17] = [
     ("geometry", &["math"]),
     ("scene", &["math", "sampling", "optics", "geometry"]),
     ("estimators", &["math", "sampling", "optics", "geometry", "scene"]),
+    ("samplers", &["math", "sampling", "optics", "geometry", "scene"]),
     ("reference", &["math", "optics"]),
     // Evidence.
     ("stats", &["math"]),
@@ -31,26 +32,38 @@ const LAYERS: [(&str, &[&str]); 17] = [
     ("main", &["cli", "experiment"]),
     ("lib", &[]),
 ];
-const EXPERIMENT: [&str; 9] =
-    ["math", "sampling", "optics", "geometry", "scene", "estimators", "reference", "stats", "results"];
-const RUN: [&str; 10] = [
+const EXPERIMENT: [&str; 10] = [
     "math",
     "sampling",
     "optics",
     "geometry",
     "scene",
+    "samplers",
+    "estimators",
+    "reference",
+    "stats",
+    "results",
+];
+const RUN: [&str; 11] = [
+    "math",
+    "sampling",
+    "optics",
+    "geometry",
+    "scene",
+    "samplers",
     "estimators",
     "reference",
     "stats",
     "results",
     "experiment",
 ];
-const CLI: [&str; 13] = [
+const CLI: [&str; 14] = [
     "math",
     "sampling",
     "optics",
     "geometry",
     "scene",
+    "samplers",
     "estimators",
     "reference",
     "stats",

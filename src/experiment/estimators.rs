@@ -8,9 +8,10 @@ use super::registry::{Registry, RegistryEntry};
 use crate::error::{Error, Result};
 use crate::estimators::path::{PathTracer, Roulette};
 
-/// Every estimator of this crate; a program of one's own may push its entries on top.
+/// Every estimator and sampler of this crate; a program of one's own may push its entries on top.
 pub fn builtin() -> Registry {
     Registry {
+        samplers: super::samplers::builtin(),
         entries: vec![RegistryEntry {
             kind: "path",
             doc: "unidirectional path tracing with MIS between BSDF and light sampling; unbiased",

@@ -25,7 +25,7 @@ mod origins;
 /// Setting values by dotted key.
 mod overrides;
 
-/// The estimators that a program knows by name.
+/// The estimators and samplers that a program knows by name.
 pub mod registry;
 
 /// What entries mean: bands, unit directions, coefficients per band.
@@ -33,6 +33,9 @@ pub mod resolve;
 
 /// Canonical content of cells and experiments.
 mod resolved;
+
+/// The samplers that come with the program.
+pub mod samplers;
 
 /// Rules between values.
 mod rules;

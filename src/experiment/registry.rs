@@ -1,4 +1,4 @@
-//! The estimators that a program knows by name.
+//! The estimators and samplers that a program knows by name.
 
 use std::sync::Arc;
 
@@ -8,16 +8,32 @@ use serde_json::Value as Json;
 use super::validate::grammar;
 use crate::error::Result;
 use crate::estimators::Estimator;
+use crate::samplers::Sampler;
 use crate::scene::Scene;
 
 /// How a registered estimator is built from its options and a scene.
 pub type Build = fn(&Json, Arc<Scene>) -> Result<Box<dyn Estimator>>;
 
-/// The estimators that an experiment file may name.
+/// The estimators and samplers that an experiment file may name.
 #[derive(Clone, Debug, Default)]
 pub struct Registry {
-    /// One entry a kind, in the order in which they are listed.
+    /// One entry a kind of estimator, in the order in which they are listed.
     pub entries: Vec<RegistryEntry>,
+    /// One entry a kind of sampler, in the order in which they are listed.
+    pub samplers: Vec<SamplerEntry>,
+}
+
+/// One kind of sampler.
+#[derive(Clone, Copy, Debug)]
+pub struct SamplerEntry {
+    /// The name under which a `[[sampler]]` asks for it.
+    pub kind: &'static str,
+    /// What it draws, in one line.
+    pub doc: &'static str,
+    /// The schema of its options, as [`RegistryEntry::options_schema`].
+    pub options_schema: fn() -> Schema,
+    /// Builds it from its validated options.
+    pub build: fn(&Json) -> Result<Box<dyn Sampler>>,
 }
 
 /// One kind of estimator.

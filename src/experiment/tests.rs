@@ -40,7 +40,8 @@ pub fn registry() -> Registry {
         let build = |_: &_, _| Err(crate::error::Error::input("never built"));
         RegistryEntry { kind, doc, options_schema, build }
     };
-    Registry { entries: vec![entry("path", "Path tracing."), entry("snee", "Specular connections.")] }
+    let entries = vec![entry("path", "Path tracing."), entry("snee", "Specular connections.")];
+    Registry { entries, ..Registry::default() }
 }
 
 /// The parts of a good experiment; every test replaces one.

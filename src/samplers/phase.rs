@@ -1,0 +1,85 @@
+//! Phase functions.
+
+use std::f64::consts::TAU;
+
+use super::{Axis, Contrast, Draw, Piece, Sampler};
+use crate::math::{DVec3, Frame, atan2, exp_m1, ln_1p};
+use crate::optics::phase::HenyeyGreenstein;
+use crate::sampling::stream::Stream;
+
+/// Henyey-Greenstein about a direction of travel that is aligned with nothing.
+///
+/// Chart: x = ln(1 + (1 - mu)/s) / L with s = (1 - |g|)^2 and L = ln(1 + 2/s), so that the peak and the
+/// rest are both of size 1; the azimuth in turns. 1 - mu = s (e^(L x) - 1), d(1 - mu)/dx = L (s + 1 - mu),
+/// hence density = pdf * 2 pi * L (s + 1 - mu). For g < 0 the chart is mirrored: 1 + mu for 1 - mu.
+pub struct HenyeyGreensteinSampler {
+    phase: HenyeyGreenstein,
+    about: Frame,
+    dir: DVec3,
+    scale: f64,
+    length: f64,
+}
+
+impl HenyeyGreensteinSampler {
+    /// For this mean cosine.
+    pub fn new(g: f64) -> HenyeyGreensteinSampler {
+        let scale = (1.0 - g.abs()) * (1.0 - g.abs());
+        let dir = DVec3::new(0.48, -0.6, 0.64);
+        let phase = HenyeyGreenstein { g };
+        let length = ln_1p(2.0 / scale);
+        HenyeyGreensteinSampler { phase, about: Frame::about(dir), dir, scale, length }
+    }
+
+    /// Where the peak is.
+    fn pole(&self) -> DVec3 {
+        if self.phase.g < 0.0 { -self.dir } else { self.dir }
+    }
+
+    /// 1 - |cosine to the peak| at a chart coordinate.
+    fn from_pole(&self, x: f64) -> f64 {
+        (self.scale * exp_m1(self.length * x)).min(2.0)
+    }
+
+    fn mu(&self, x: f64) -> f64 {
+        let mu = 1.0 - self.from_pole(x);
+        if self.phase.g < 0.0 { -mu } else { mu }
+    }
+}
+
+impl Sampler for HenyeyGreensteinSampler {
+    fn draw(&self, stream: &mut Stream) -> Draw {
+        let next = self.phase.sample(self.dir, stream.draw2());
+        // |next - pole|^2 / 2 = 1 - cosine, with all its digits near the pole.
+        let from_pole = 0.5 * (next - self.pole()).length_squared();
+        let x = (ln_1p(from_pole / self.scale) / self.length).clamp(0.0, 1.0);
+        let local = self.about.to_local(next);
+        let turns = (atan2(local.y, local.x) / TAU).rem_euclid(1.0);
+        let pdf = self.phase.pdf(next.dot(self.dir));
+        let density = pdf * TAU * self.length * (self.scale + from_pole);
+        Draw::Point { piece: 0, at: [x, turns], density }
+    }
+
+    fn pieces(&self) -> Vec<Piece> {
+        vec![Piece::plane("directions", [Axis::over(0.0, 1.0), Axis::turns()])]
+    }
+
+    fn density(&self, _piece: usize, [x, _]: [f64; 2]) -> f64 {
+        self.phase.pdf(self.mu(x)) * TAU * self.length * (self.scale + self.from_pole(x))
+    }
+
+    fn contrasts(&self) -> Vec<Contrast> {
+        let g = self.phase.g;
+        let poles = HenyeyGreensteinSampler::new(g);
+        let mean_cosine = Contrast {
+            name: "mean cosine",
+            of: Box::new(move |_, [x, _]| poles.mu(x)),
+            expected: Some(g),
+        };
+        let cosine = Contrast {
+            name: "cos azimuth",
+            of: Box::new(|_, [_, turns]| crate::math::sin_cos_turns(turns).1),
+            expected: Some(0.0),
+        };
+        vec![mean_cosine, cosine]
+    }
+}
