@@ -30,7 +30,7 @@ const INPUTS: usize = 4096;
 const PATHS: usize = 256;
 
 fn pass() -> PassKey {
-    StreamKey::new([42; 32]).pass(0)
+    StreamKey::named("kernels").pass(0)
 }
 
 fn stream(index: u64) -> Stream {

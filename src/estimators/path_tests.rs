@@ -28,11 +28,11 @@ fn down() -> Ray {
 }
 
 /// Mean and standard error of every observable over passes.
-fn measure(scene: Scene, roulette: Roulette, passes: u64, seed: u8) -> (Vec<(f64, f64)>, Scores) {
+fn measure(scene: Scene, roulette: Roulette, passes: u64, test: &str) -> (Vec<(f64, f64)>, Scores) {
     let layout = Layout::new(&scene);
     let tracer = PathTracer::new(Arc::new(scene), roulette);
     let mut scores = Scores::new(layout);
-    let key = StreamKey::new([seed; 32]);
+    let key = StreamKey::named(test);
     let mut moments = vec![(0.0, 0.0); scores.gates.len()];
     for pass in 0..passes {
         scores.clear();
@@ -64,7 +64,7 @@ fn white_furnace_has_no_variance() {
         for roulette in ROULETTES {
             let sky = environment(1.0, DVec3::Z, 2.0, "sky");
             let scene = scene(SPHERE, boundary, medium(5.0, 1.0, 0.3), vec![sky], off_axis());
-            let (means, _) = measure(scene, roulette, 20, 1);
+            let (means, _) = measure(scene, roulette, 20, "white_furnace_has_no_variance");
             assert!((means[0].0 - 1.0).abs() < 1e-12 && means[0].1 < 1e-12, "{means:?}");
         }
     }
@@ -75,7 +75,7 @@ fn white_furnace_has_no_variance() {
 fn matched_furnace() {
     let sky = environment(1.0, DVec3::Z, 2.0, "sky");
     let scene = scene(SPHERE, Boundary::Matched, medium(5.0, 1.0, 0.3), vec![sky], off_axis());
-    let (means, _) = measure(scene, Roulette::Analog, 200, 2);
+    let (means, _) = measure(scene, Roulette::Analog, 200, "matched_furnace");
     let (mean, error) = means[0];
     assert!((mean - 1.0).abs() < 5.0 * error && error < 5e-3, "{mean} {error}");
 }
@@ -98,7 +98,7 @@ fn slab_reflectance_and_transmittance() {
             ];
             let slab = Shape::Slab { thickness: 1.0 };
             let scene = scene(slab, Boundary::Smooth { eta }, medium(b, albedo, g), lights, down());
-            let (means, scores) = measure(scene, roulette, 100, 3);
+            let (means, scores) = measure(scene, roulette, 100, "slab_reflectance_and_transmittance");
             for (expected, (mean, error)) in [reflected, transmitted].iter().zip(&means[6..8]) {
                 assert!((mean - expected).abs() < 5.0 * error && *error < 3e-3, "{means:?}");
             }
@@ -118,7 +118,8 @@ fn matched_half_space_under_parallel_light() {
         emission: Emission::Directional { toward: DVec3::Z, irradiance: vec![1.0] },
     };
     let scene = scene(Shape::HalfSpace, Boundary::Matched, medium(1.0, 0.5, 0.0), vec![sun], down());
-    let (means, _) = measure(scene, Roulette::Below(0.25), 300, 4);
+    let (means, _) =
+        measure(scene, Roulette::Below(0.25), 300, "matched_half_space_under_parallel_light");
     let (total, single) = (means[0], means[2]);
     assert!((total.0 - 0.03114762692835).abs() < 5.0 * total.1 && total.1 < 1e-4, "{total:?}");
     assert!((single.0 - 0.01989436788649).abs() < 5.0 * single.1, "{single:?}");
@@ -135,7 +136,15 @@ fn rough_furnace_is_the_same_for_one_light_or_two_halves() {
     let mut results = Vec::new();
     for lights in [whole, halves] {
         let scene = scene(SPHERE, boundary, medium(2.0, 0.9, 0.5), lights, off_axis());
-        results.push(measure(scene, Roulette::Below(0.25), 200, 5).0[0]);
+        results.push(
+            measure(
+                scene,
+                Roulette::Below(0.25),
+                200,
+                "rough_furnace_is_the_same_for_one_light_or_two_halves",
+            )
+            .0[0],
+        );
     }
     let [(a, ea), (b, eb)] = results[..] else { unreachable!() };
     assert!((a - b).abs() < 5.0 * (ea * ea + eb * eb).sqrt() && ea < 2e-3, "{results:?}");
@@ -203,7 +212,7 @@ fn draws_per_event() {
         scene(SPHERE, Boundary::Smooth { eta: 1.3 }, medium(4.0, 0.8, 0.4), vec![sky], off_axis());
     let layout = Layout::new(&scene);
     let tracer = PathTracer::new(Arc::new(scene), Roulette::Analog);
-    let key = StreamKey::new([9; 32]).pass(0);
+    let key = StreamKey::named("draws_per_event").pass(0);
     let (mut absorbed, mut escaped) = (0, 0);
     for index in 0..1000 {
         let mut scores = Scores::new(layout.clone());
@@ -232,7 +241,7 @@ fn equal_bands_on_one_key_are_equal() {
     let scene = Scene { boundary: vec![boundary; 2], medium: vec![one.medium[0]; 2], ..one };
     let layout = Layout::new(&scene);
     let tracer = PathTracer::new(Arc::new(scene), Roulette::Below(0.25));
-    let key = StreamKey::new([11; 32]);
+    let key = StreamKey::named("equal_bands_on_one_key_are_equal");
     let mut scores = Scores::new(layout);
     tracer.pass(&[0, 1], &key.pass(0), &mut scores);
     assert!(scores.gates[0] > 0.0);
@@ -264,7 +273,7 @@ fn scaled_scenes_give_the_same_bits() {
         let lights = vec![sun, environment(0.3, DVec3::X, 1.0, "half")];
         let ray = Ray { origin: scale * DVec3::new(0.25, 0.5, 3.0), dir: -DVec3::Z };
         let scene = scene(make(scale), boundary, medium(4.0 / scale, 0.9, 0.5), lights, ray);
-        measure(scene, Roulette::Below(0.25), 1, 6)
+        measure(scene, Roulette::Below(0.25), 1, "scaled_scenes_give_the_same_bits")
     };
     for make in shapes {
         for boundary in boundaries {

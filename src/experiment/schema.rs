@@ -621,7 +621,7 @@ pub struct SmallValues {
 /// One claim: exactly one kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{ "required": ["equals"] }, { "required": ["agree"] }]))]
+#[schemars(extend("oneOf" = [{ "required": ["equals"] }, { "required": ["agree"] }, { "required": ["differs"] }, { "required": ["reproduces"] }]))]
 pub struct ClaimEntry {
     /// Label in verdict tables.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -635,6 +635,12 @@ pub struct ClaimEntry {
     /// Two measurements of one integral agree.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub agree: Option<Agree>,
+    /// Two measurements do not agree (a control): the difference must be found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub differs: Option<Differs>,
+    /// The record comes out again, bit for bit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reproduces: Option<Reproduces>,
 }
 
 /// Outcomes that controls expect.
@@ -686,6 +692,41 @@ pub struct Equals {
     pub only: BTreeMap<String, String>,
 }
 
+/// Estimators differ in every cell, or cells that differ only `across` one axis do, and the test finds it:
+/// a negative control.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Differs {
+    /// The estimators: two or more, or one with `across`.
+    #[schemars(length(min = 1))]
+    pub estimators: Vec<String>,
+    /// Axis of the sweep whose cells must differ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub across: Option<String>,
+    /// The observable; the sensor's first one without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observable: Option<String>,
+    /// The transport class; `all` without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<String>,
+    /// Only cells with these labels: axis -> label.
+    #[serde(default, rename = "where", skip_serializing_if = "BTreeMap::is_empty")]
+    pub only: BTreeMap<String, String>,
+}
+
+/// The first passes of every measurement, played again by one thread in blocks of another size, give the
+/// same bits; and, where a checksum is stated, the record's numbers are those.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Reproduces {
+    /// Passes that are played again, rounded up to whole batches.
+    #[schemars(range(min = 1, max = 1099511627776u64))]
+    pub passes: u64,
+    /// blake3 over the record's arrays, hex, as `summary.json` states it (`numbers`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub numbers: Option<String>,
+}
+
 /// Estimators agree in every cell, or cells that differ only `across` one axis agree.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -696,10 +737,10 @@ pub struct Agree {
     /// Axis of the sweep whose cells must agree.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub across: Option<String>,
-    /// The observable; the sensor's first one without it.
+    /// The observable, or `each`; the sensor's first one without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
-    /// The transport class; `all` without it.
+    /// The transport class, or `each` (all of them and their sum); `all` without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
     /// The largest relative difference that may go unseen.

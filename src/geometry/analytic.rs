@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn inside_rays_always_leave_and_hits_lie_on_the_surface() {
-        let mut u = Uniform::new(1);
+        let mut u = Uniform::named("inside_rays_always_leave_and_hits_lie_on_the_surface");
         for shape in shapes() {
             let mut ray = Ray { origin: DVec3::new(0.01, 0.02, -0.1), dir: DVec3::Z };
             let mut from = None;
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn outside_rays_never_meet_the_face_they_start_on() {
-        let mut u = Uniform::new(2);
+        let mut u = Uniform::named("outside_rays_never_meet_the_face_they_start_on");
         for shape in shapes() {
             for _ in 0..RAYS {
                 let origin = DVec3::new(0.0, 0.0, -0.1);
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn far_origins_hit_the_sphere_where_they_are_aimed() {
-        let mut u = Uniform::new(3);
+        let mut u = Uniform::named("far_origins_hit_the_sphere_where_they_are_aimed");
         let radius = 0.7;
         let shape = Shape::Sphere { radius };
         for _ in 0..RAYS {
@@ -264,7 +264,7 @@ mod tests {
 
     #[test]
     fn planar_faces_are_never_met_from_themselves() {
-        let mut u = Uniform::new(4);
+        let mut u = Uniform::named("planar_faces_are_never_met_from_themselves");
         for shape in &shapes()[..3] {
             for _ in 0..RAYS / 10 {
                 let origin = direction(&mut u) * 4.0;

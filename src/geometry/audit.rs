@@ -172,7 +172,7 @@ mod tests {
 
     fn aim(rays: u64) {
         for (name, shape) in bodies() {
-            let mut u = Uniform::new(1);
+            let mut u = Uniform::named("aim");
             let audit = audit_aim(&shape, rays, &mut || u.next());
             println!("{name}: {audit:?}");
             assert_eq!(audit, AimAudit { rays, lost: 0 }, "{name}");
@@ -187,7 +187,7 @@ mod tests {
             ("sphere", Shape::Sphere { radius: 2.5 }),
         ];
         for (name, shape) in bodies().into_iter().chain(analytic) {
-            let mut u = Uniform::new(2);
+            let mut u = Uniform::named("walk");
             let audit = audit_walk(&shape, segments, &mut || u.next());
             println!("{name}: {audit:?}");
             assert_eq!((audit.lost, audit.escaped, audit.wrong), (0, 0, 0), "{name} {audit:?}");

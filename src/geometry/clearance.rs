@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn bound_is_never_above_the_distance_to_what_any_ray_meets() {
-        let mut u = Uniform::new(1);
+        let mut u = Uniform::named("bound_is_never_above_the_distance_to_what_any_ray_meets");
         for (name, shape) in bodies() {
             let Shape::Mesh(mesh) = &shape else { unreachable!("bodies are meshes") };
             let sphere = mesh.bounds();
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn short_flights_end_as_they_do_without_the_grid() {
-        let mut u = Uniform::new(2);
+        let mut u = Uniform::named("short_flights_end_as_they_do_without_the_grid");
         for (name, shape) in bodies() {
             let Shape::Mesh(mesh) = &shape else { unreachable!("bodies are meshes") };
             let sphere = mesh.bounds();

@@ -16,7 +16,7 @@ fn throughput() {
         let mesh = procedural::bumpy_sphere(1.0, subdivisions, 0.1, 6.0, true).expect("closed");
         let (built, count) = (start.elapsed().as_secs_f64(), mesh.triangles().len());
         println!("{count} triangles: {built:.2} s, {} MB", mesh.heap_bytes() / 1_000_000);
-        let mut u = Uniform::new(6);
+        let mut u = Uniform::named("throughput");
         let rays: Vec<Ray> = (0..RAYS)
             .map(|_| {
                 let radius = 0.9 * cbrt(u.next());
@@ -41,7 +41,7 @@ fn throughput() {
         measure("closest, from inside", &mut inside(f64::INFINITY));
         measure("shadow, from the surface", &mut |i| mesh.occluded(&on_surface[i].0, on_surface[i].1));
         for mean in [0.3, 0.1, 0.03, 0.01] {
-            let mut u = Uniform::new(7);
+            let mut u = Uniform::named("throughput");
             let mut t_max = move || -mean * ln(1.0 - u.next());
             let mut again = t_max.clone();
             measure(&format!("flights of {mean} R, tree"), &mut |i| inside(t_max())(i));
@@ -52,7 +52,7 @@ fn throughput() {
         // The same along walks of isotropic scattering that start and end on the surface.
         for mean in [0.1, 0.03, 0.01] {
             let walk = |what: &str, grid: bool| {
-                let mut u = Uniform::new(8);
+                let mut u = Uniform::named("throughput");
                 let (mut ray, mut from) = on_surface[0];
                 ray.dir = -ray.dir;
                 measure(&format!("walk of mfp {mean} R, {what}"), &mut |_| {

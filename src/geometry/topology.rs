@@ -218,7 +218,7 @@ impl Surface<'_> {
         let crossings = |side| {
             let ray = Sheared::new(&ray, side);
             (0..self.triangles.len())
-                .filter(|&i| part_of[i] != part && ray.meet(&self.corners(i)).is_some())
+                .filter(|&i| part_of[i] != part && ray.meet(&self.corners(i), 0.0).is_some())
                 .count()
         };
         crossings(Side::Inside) > crossings(Side::Outside)

@@ -11,6 +11,11 @@
 //!
 //! So for the projected surface the test is exact and closed, and the triangles whose signs agree
 //! with the wanted orientation cover whatever the ray leaves through.
+//!
+//! Along the ray nothing is exact: a walk that starts on an edge starts from a rounded point, which may
+//! lie beyond the neighbouring face, and the crossing by which it leaves would then lie behind it. So a
+//! plane that the origin has passed by no more than the rounding of a point of the surface is crossed
+//! at once. Where the origin was not beyond it, the ray is cut short by that rounding.
 
 use super::{Ray, Side};
 use crate::math::{DVec3, fma};
@@ -54,9 +59,10 @@ impl Sheared {
         Sheared { origin: ray.origin, axes, shear, t_per_z, orientation }
     }
 
-    /// The crossing with t > 0, if the orientation is the wanted one.
+    /// The crossing with t > 0, if the orientation is the wanted one; at the smallest t > 0 where the
+    /// origin lies beyond the triangle's plane by `slack` or less.
     #[inline]
-    pub fn meet(&self, triangle: &[DVec3; 3]) -> Option<Crossing> {
+    pub fn meet(&self, triangle: &[DVec3; 3], slack: f64) -> Option<Crossing> {
         let [a, b, c] = triangle.map(|vertex| self.project(vertex));
         let u = edge(b, c) * self.orientation;
         let v = edge(c, a) * self.orientation;
@@ -70,7 +76,17 @@ impl Sheared {
         }
         let weights = [u / sum, v / sum, w / sum];
         let t = (weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) * self.t_per_z;
-        (t > 0.0).then_some(Crossing { t, weights })
+        if t > 0.0 {
+            return Some(Crossing { t, weights });
+        }
+        self.has_just_passed(triangle, slack).then_some(Crossing { t: f64::MIN_POSITIVE, weights })
+    }
+
+    /// The origin lies beyond the plane of a triangle of the wanted orientation, by `slack` or less.
+    #[cold]
+    fn has_just_passed(&self, triangle: &[DVec3; 3], slack: f64) -> bool {
+        let beyond = (self.origin - triangle[0]).dot(normal(triangle)) * self.orientation;
+        beyond <= slack
     }
 
     #[inline]
@@ -103,6 +119,39 @@ pub fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a).normalize()
 }
 
+/// Whether a point of a triangle's plane is within `margin` of one of its edges (or of their lines).
+#[inline]
+pub fn is_on_edge([a, b, c]: &[DVec3; 3], point: DVec3, margin: f64) -> bool {
+    let near = |p: DVec3, q: DVec3| {
+        let edge = q - p;
+        edge.cross(point - p).length_squared() <= margin * margin * edge.length_squared()
+    };
+    near(*a, *b) || near(*b, *c) || near(*c, *a)
+}
+
+/// Barycentric coordinates of the point of a triangle that is nearest to `point`: of its plane where
+/// that is inside, else of the nearest edge.
+pub fn nearest(corners: &[DVec3; 3], point: DVec3) -> [f64; 3] {
+    let [a, b, c] = *corners;
+    let n = (b - a).cross(c - a);
+    let part = |p: DVec3, q: DVec3| (q - p).cross(point - p).dot(n) / n.length_squared();
+    let weights = [part(b, c), part(c, a), part(a, b)];
+    if weights.iter().all(|w| *w >= 0.0) {
+        let sum = weights[0] + weights[1] + weights[2];
+        return weights.map(|w| w / sum);
+    }
+    let on_edge = |i: usize| {
+        let (p, q) = (corners[i], corners[(i + 1) % 3]);
+        let s = ((point - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
+        let mut weights = [0.0; 3];
+        (weights[i], weights[(i + 1) % 3]) = (1.0 - s, s);
+        ((p + (q - p) * s).distance_squared(point), weights)
+    };
+    let [x, y, z] = [on_edge(0), on_edge(1), on_edge(2)];
+    let nearer = |p: (f64, [f64; 3]), q: (f64, [f64; 3])| if q.0 < p.0 { q } else { p };
+    nearer(nearer(x, y), z).1
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::testing::{Uniform, direction};
@@ -110,7 +159,7 @@ mod tests {
 
     #[test]
     fn edge_is_antisymmetric_and_exact_in_sign() {
-        let mut u = Uniform::new(1);
+        let mut u = Uniform::named("edge_is_antisymmetric_and_exact_in_sign");
         for _ in 0..100_000 {
             let p = [u.next() - 0.5, u.next() - 0.5, 0.0];
             // q on the line through 0 and p up to one rounding: the products agree to a last digit.
@@ -126,7 +175,7 @@ mod tests {
 
     #[test]
     fn orientation_is_that_of_the_normal() {
-        let mut u = Uniform::new(2);
+        let mut u = Uniform::named("orientation_is_that_of_the_normal");
         for _ in 0..100_000 {
             let triangle = [(); 3].map(|()| direction(&mut u));
             let [a, b, c] = triangle;
@@ -140,12 +189,12 @@ mod tests {
             }
             let side = if cosine > 0.0 { Side::Inside } else { Side::Outside };
             let other = if cosine > 0.0 { Side::Outside } else { Side::Inside };
-            let crossing = Sheared::new(&ray, side).meet(&triangle).expect("aimed at it");
+            let crossing = Sheared::new(&ray, side).meet(&triangle, 0.0).expect("aimed at it");
             assert!((crossing.t - to.length()).abs() < 1e-8, "{} {}", crossing.t, to.length());
-            assert!(Sheared::new(&ray, other).meet(&triangle).is_none());
+            assert!(Sheared::new(&ray, other).meet(&triangle, 0.0).is_none());
             let away = Ray { origin, dir: -ray.dir };
-            assert!(Sheared::new(&away, side).meet(&triangle).is_none());
-            assert!(Sheared::new(&away, other).meet(&triangle).is_none());
+            assert!(Sheared::new(&away, side).meet(&triangle, 0.0).is_none());
+            assert!(Sheared::new(&away, other).meet(&triangle, 0.0).is_none());
         }
     }
 }

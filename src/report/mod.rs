@@ -99,6 +99,7 @@ fn summary(material: &Material) -> Value {
         "experiment_hash": record.experiment_hash,
         "claims_hash": record.claims_hash,
         "fingerprint": record.fingerprint,
+        "numbers": material.stored.numbers(),
         "exit_code": verdict::exit_code(&material.verdicts),
         "verdicts": {
             "pass": count("pass"),

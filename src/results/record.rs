@@ -33,12 +33,30 @@ pub struct Record {
     pub post_hoc: Vec<usize>,
     /// The claims expanded over cells, bands and tables, with the values they are held against.
     pub comparisons: Vec<Comparison>,
+    /// What `reproduces` claims had played again.
+    pub replays: Vec<Replay>,
     /// The bands, in the order of every array's band axis.
     pub bands: Vec<Band>,
     /// The cells in the order of the sweep.
     pub cells: Vec<Cell>,
     /// blake3 of every array file, hex, by its path relative to the record's folder.
     pub checksums: BTreeMap<String, String>,
+}
+
+/// The first passes of one measurement, played again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Replay {
+    /// Index into [`Record::cells`].
+    pub cell: usize,
+    /// Estimator name.
+    pub estimator: String,
+    /// Passes that were played again.
+    pub passes: u64,
+    /// blake3 of their moments as recorded, hex.
+    pub recorded: String,
+    /// blake3 of their moments as replayed, hex.
+    pub replayed: String,
 }
 
 /// One wavelength interval.

@@ -37,6 +37,7 @@ pub fn stored(noise: f64) -> Stored {
         claims: json!([]),
         post_hoc: vec![],
         comparisons: vec![],
+        replays: vec![],
         bands: vec![band("R", [1.0, 0.0, 0.0]), band("G", [0.0, 1.0, 0.0])],
         cells: vec![cell],
         checksums: BTreeMap::new(),

@@ -51,6 +51,11 @@ impl Stored {
         cell.runs.iter().find(|run| run.estimator == quantity.estimator)
     }
 
+    /// blake3 over the checksums of all arrays, hex: equal where all numbers are.
+    pub fn numbers(&self) -> String {
+        hash_hex(canonical(&self.record.checksums).as_bytes())
+    }
+
     /// The moments of every batch of a quantity; nothing where the record does not hold it.
     pub fn batches(&self, quantity: &Quantity) -> Option<Vec<Moments>> {
         let run = self.run(quantity)?;

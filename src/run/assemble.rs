@@ -14,7 +14,7 @@ use crate::experiment::build::inputs;
 use crate::results::json::hash_json;
 use crate::results::npy::Array;
 use crate::results::provenance::fingerprint;
-use crate::results::record::{Bias, Cell, EstimatorRun, Image, Record, SCHEMA_VERSION};
+use crate::results::record::{Bias, Cell, EstimatorRun, Image, Record, Replay, SCHEMA_VERSION};
 use crate::results::store::{Arrays, gates_path, pixels_path};
 use crate::results::timing::{self, Timing};
 
@@ -34,7 +34,12 @@ pub fn experiment_hash(experiment: &Experiment) -> String {
 }
 
 /// Puts what a plan's jobs measured into a record.
-pub fn assemble(experiment: &Experiment, plan: &Plan, finished: Vec<Finished>) -> Result<Assembled> {
+pub fn assemble(
+    experiment: &Experiment,
+    plan: &Plan,
+    finished: Vec<Finished>,
+    replays: Vec<Replay>,
+) -> Result<Assembled> {
     let mut arrays = Arrays::new();
     let mut timing = Timing::default();
     let empty = |cell: &crate::experiment::CellSpec| Cell {
@@ -71,6 +76,7 @@ pub fn assemble(experiment: &Experiment, plan: &Plan, finished: Vec<Finished>) -
         claims,
         post_hoc: post_hoc.into_iter().collect(),
         comparisons: plan.comparisons.clone(),
+        replays,
         bands: plan.bands.clone(),
         cells,
         checksums: BTreeMap::new(),

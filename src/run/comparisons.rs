@@ -4,9 +4,12 @@
 use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
-use crate::experiment::schema::{Agree, ClaimEntry, Equals};
+use crate::experiment::schema::{Agree, ClaimEntry, Differs, Equals};
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::record::{Against, Band, Comparison, Observable, Quantity};
+
+/// Names every observable, or every class.
+const EACH: &str = "each";
 
 /// All comparisons of an experiment, in the order of its claims, cells, estimators and bands.
 /// `observables` are those of each cell.
@@ -24,6 +27,42 @@ pub fn expand(
     Ok(lists.into_iter().flatten().collect())
 }
 
+/// What `agree` and `differs` have in common.
+struct Pairs<'a> {
+    estimators: &'a [String],
+    across: Option<&'a String>,
+    observable: &'a Option<String>,
+    class: &'a Option<String>,
+    only: &'a BTreeMap<String, String>,
+    detect: Option<f64>,
+}
+
+impl<'a> From<&'a Agree> for Pairs<'a> {
+    fn from(words: &'a Agree) -> Pairs<'a> {
+        Pairs {
+            estimators: &words.estimators,
+            across: words.across.as_ref(),
+            observable: &words.observable,
+            class: &words.class,
+            only: &words.only,
+            detect: Some(words.detect),
+        }
+    }
+}
+
+impl<'a> From<&'a Differs> for Pairs<'a> {
+    fn from(words: &'a Differs) -> Pairs<'a> {
+        Pairs {
+            estimators: &words.estimators,
+            across: words.across.as_ref(),
+            observable: &words.observable,
+            class: &words.class,
+            only: &words.only,
+            detect: None,
+        }
+    }
+}
+
 struct Scope<'a> {
     experiment: &'a Experiment,
     bands: &'a [Band],
@@ -32,9 +71,12 @@ struct Scope<'a> {
 
 impl Scope<'_> {
     fn claim(&self, index: usize, claim: &ClaimEntry) -> Result<Vec<Comparison>> {
-        match (&claim.equals, &claim.agree) {
-            (Some(equals), _) => self.equals(index, equals),
-            (_, Some(agree)) => self.agree(index, agree),
+        if let Some(equals) = &claim.equals {
+            return self.equals(index, equals);
+        }
+        match (&claim.agree, &claim.differs) {
+            (Some(agree), _) => self.pairs(index, &Pairs::from(agree)),
+            (_, Some(differs)) => self.pairs(index, &Pairs::from(differs)),
             _ => Ok(Vec::new()),
         }
     }
@@ -70,22 +112,24 @@ impl Scope<'_> {
         Ok(comparisons)
     }
 
-    fn agree(&self, claim: usize, words: &Agree) -> Result<Vec<Comparison>> {
+    fn pairs(&self, claim: usize, words: &Pairs) -> Result<Vec<Comparison>> {
         let mut comparisons = Vec::new();
         let mut push = |a: (usize, &str), b: (usize, &str), paired: bool| -> Result<()> {
-            let observable = self.observable(claim, a.0, &words.observable, &words.class)?;
-            for band in 0..self.bands.len() {
-                comparisons.push(Comparison {
-                    claim,
-                    quantity: quantity(a.0, a.1, &observable, band),
-                    against: Against::Quantity { other: quantity(b.0, b.1, &observable, band), paired },
-                    detect: Some(words.detect),
-                });
+            for observable in self.observables(claim, a.0, words.observable, words.class)? {
+                for band in 0..self.bands.len() {
+                    let other = quantity(b.0, b.1, &observable, band);
+                    comparisons.push(Comparison {
+                        claim,
+                        quantity: quantity(a.0, a.1, &observable, band),
+                        against: Against::Quantity { other, paired },
+                        detect: words.detect,
+                    });
+                }
             }
             Ok(())
         };
-        let cells = self.cells(&words.only);
-        match &words.across {
+        let cells = self.cells(words.only);
+        match words.across {
             None => {
                 for &cell in &cells {
                     for (i, first) in words.estimators.iter().enumerate() {
@@ -105,7 +149,7 @@ impl Scope<'_> {
                         .push(cell);
                 }
                 for group in groups.values() {
-                    for name in &words.estimators {
+                    for name in words.estimators {
                         for &other in &group[1..] {
                             push((group[0], name), (other, name), self.is_paired(group[0], other))?;
                         }
@@ -127,6 +171,36 @@ impl Scope<'_> {
         let chosen =
             |spec: &CellSpec| only.iter().all(|(axis, label)| spec.axes.get(axis) == Some(label));
         (0..self.experiment.cells.len()).filter(|&i| chosen(&self.experiment.cells[i])).collect()
+    }
+
+    /// The observables that the names choose; `each` is all that the cell has.
+    fn observables(
+        &self,
+        claim: usize,
+        cell: usize,
+        name: &Option<String>,
+        class: &Option<String>,
+    ) -> Result<Vec<Observable>> {
+        let each = |word: &Option<String>| word.as_deref() == Some(EACH);
+        let known = &self.observables[cell];
+        let first = name.as_ref().unwrap_or(&known[0].name);
+        let fits = |o: &&Observable| {
+            (each(name) || o.name == *first)
+                && (each(class) || o.class == class.as_deref().unwrap_or("all"))
+        };
+        if !each(name) && !each(class) {
+            return Ok(vec![self.observable(claim, cell, name, class)?]);
+        }
+        let chosen: Vec<Observable> = known.iter().filter(fits).cloned().collect();
+        if chosen.is_empty() {
+            self.observable(
+                claim,
+                cell,
+                &name.clone().filter(|n| n != EACH),
+                &class.clone().filter(|c| c != EACH),
+            )?;
+        }
+        Ok(chosen)
     }
 
     fn observable(

@@ -16,16 +16,19 @@ pub mod workers;
 
 mod assemble;
 mod jobs;
+mod replay;
 mod retest;
 
 use std::path::{Path, PathBuf};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::experiment::registry::Registry;
 use crate::results::provenance::{self, Provenance};
+use crate::results::record::Replay;
 use crate::results::store::{RecordFolder, Stored};
 use interrupt::Interrupt;
+use job::{Finished, Job};
 use progress::Progress;
 
 pub use jobs::{Plan, plan};
@@ -93,12 +96,33 @@ fn play(
     };
     let played = workers::play_all(&plan.jobs, &experiment.file.budget, &settings);
     progress.finish();
-    let assembled = assemble::assemble(experiment, plan, played?)?;
+    let played = played?;
+    let replays = replays(experiment, plan, &played, interrupt)?;
+    let assembled = assemble::assemble(experiment, plan, played, replays)?;
     let folder = RecordFolder::new(root);
     let stored = folder.write(assembled.record, assembled.arrays)?;
     folder.write_timing(&assembled.timing)?;
     folder.write_provenance(&Provenance::collect(options.threads))?;
     Ok((folder, stored))
+}
+
+/// What `reproduces` claims want played again.
+fn replays(
+    experiment: &Experiment,
+    plan: &Plan,
+    played: &[Finished],
+    interrupt: &Interrupt,
+) -> Result<Vec<Replay>> {
+    let claims = experiment.file.claim.iter().filter_map(|claim| claim.reproduces.as_ref());
+    let Some(passes) = claims.map(|claim| claim.passes).max() else { return Ok(Vec::new()) };
+    let again = |(job, finished): (&Job, &Finished)| {
+        let name = &experiment.file.estimator[job.estimator_index].name;
+        replay::replay(job, name, finished, passes, &|| interrupt.raised())
+    };
+    let replays: Option<Vec<Replay>> = plan.jobs.iter().zip(played).map(again).collect();
+    replays.ok_or_else(|| {
+        Error::Interrupted("all passes are played and kept; the same command goes on from there".into())
+    })
 }
 
 /// Whether the folder holds a record of exactly this experiment, its claims included, by this build.

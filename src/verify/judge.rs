@@ -58,7 +58,8 @@ pub fn judge(cases: &[Case], looks: Looks) -> Judgement {
         // Cells that an experiment pairs share their streams: their deviations are not independent.
         let paired = !main.record.resolved["pair"].is_null();
         let tables = if paired { vec![] } else { table_trials(&own) };
-        trials.extend(own.into_iter().chain(tables).map(|trial| (case, trial)));
+        let reproduced = super::reproduction::trials(main);
+        trials.extend(own.into_iter().chain(tables).chain(reproduced).map(|trial| (case, trial)));
     }
     conclude(cases, trials, looks)
 }
@@ -94,7 +95,15 @@ fn sum_of_squares(rows: &[&Trial]) -> Trial {
         ..rows[0].verdict.clone()
     };
     let evidence = Evidence::Sum { test };
-    Trial { item: Item::Table, evidence, detect: None, one_look: true, verdict, ..rows[0].clone() }
+    Trial {
+        item: Item::Table,
+        evidence,
+        detect: None,
+        one_look: true,
+        reference: None,
+        verdict,
+        ..rows[0].clone()
+    }
 }
 
 /// The |z| whose normal p-value is the test's; the statistic itself where that p-value underflows.
@@ -136,6 +145,7 @@ fn conclude(cases: &[Case], trials: Vec<(usize, Trial)>, looks: Looks) -> Judgem
             }
             Some(Evidence::None(reason)) => SecondLook::Invalid(reason),
             Some(Evidence::Identity { holds }) => SecondLook::Taken(if holds { 1.0 } else { 0.0 }),
+            Some(Evidence::Bits(_)) => SecondLook::Invalid("a question of bits".into()),
             Some(Evidence::Test { test, .. } | Evidence::Sum { test }) if test.p_value.is_nan() => {
                 SecondLook::Invalid("the test has no p-value".into())
             }
@@ -206,7 +216,7 @@ fn state(
     looks: Looks,
     tests: f64,
 ) -> Verdict {
-    let Trial { claim, evidence, detect, one_look, mut verdict, .. } = trial;
+    let Trial { claim, evidence, detect, one_look, reference, mut verdict, .. } = trial;
     if let Evidence::Test { test, .. } | Evidence::Sum { test } = &evidence {
         (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
         verdict.adjusted_p = adjusted_p;
@@ -214,7 +224,8 @@ fn state(
     if let Evidence::Test { difference, .. } = &evidence {
         // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
         let own_level = looks.first(one_look || claim.expect != Expect::Pass) / tests;
-        let reference = if verdict.expected == 0.0 { 1.0 } else { verdict.expected.abs() };
+        let reference = reference.unwrap_or(verdict.expected.abs());
+        let reference = if reference == 0.0 { 1.0 } else { reference };
         verdict.detectable = difference.detectable(own_level, POWER) / reference;
     }
     if let Some(SecondLook::Taken(p)) = second {
@@ -222,8 +233,8 @@ fn state(
     }
     let found = match (&evidence, second) {
         (Evidence::None(reason), _) => Outcome::Invalid(reason.clone()),
-        (Evidence::Identity { holds: true }, _) => Outcome::Pass,
-        (Evidence::Identity { holds: false }, _) => Outcome::Fail,
+        (Evidence::Identity { holds: true } | Evidence::Bits(None), _) => Outcome::Pass,
+        (Evidence::Identity { holds: false } | Evidence::Bits(Some(_)), _) => Outcome::Fail,
         (_, Some(SecondLook::Missing)) => Outcome::Fail,
         (_, Some(SecondLook::Invalid(reason))) => Outcome::Invalid(format!("second look: {reason}")),
         (_, Some(SecondLook::Taken(p))) if *p < SECOND_LOOK => Outcome::Fail,
@@ -263,6 +274,8 @@ fn note(found: &Outcome, evidence: &Evidence, detect: Option<f64>, verdict: &Ver
         (Outcome::Fail, Evidence::Identity { .. }) => {
             format!("no sampling error, and a relative deviation of {:.1e}", verdict.statistic)
         }
+        (Outcome::Fail, Evidence::Bits(Some(why))) => why.clone(),
+        (Outcome::Pass, Evidence::Bits(_)) => "the same bits".into(),
         (Outcome::Fail, Evidence::Sum { .. }) => "the table as a whole deviates".into(),
         (Outcome::Fail, _) => {
             let difference = verdict.value - verdict.expected;
@@ -306,7 +319,7 @@ impl Evidence {
             Evidence::Test { test, .. } | Evidence::Sum { test } => {
                 Some(test.p_value).filter(|p| !p.is_nan())
             }
-            Evidence::None(_) | Evidence::Identity { .. } => None,
+            Evidence::None(_) | Evidence::Identity { .. } | Evidence::Bits(_) => None,
         }
     }
 }

@@ -11,5 +11,8 @@ pub mod junit;
 /// What verification says.
 pub mod verdict;
 
+/// Claims that a record comes out again.
+mod reproduction;
+
 /// What one comparison shows by itself.
 mod trial;

@@ -2,7 +2,7 @@
 
 use super::levels::SHARED_ERROR;
 use super::verdict::{Outcome, Verdict};
-use crate::results::record::{Against, Bias, Comparison, EstimatorRun, Quantity, Record};
+use crate::results::record::{Against, Bias, Comparison, EstimatorRun, Observable, Quantity, Record};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::{Estimate, Spread, Test};
 use crate::stats::moments::Moments;
@@ -32,12 +32,14 @@ const STATED: [&str; 1] = ["wrong_side"];
 pub(super) struct Claim {
     /// Its name, or its kind and place in the file.
     pub label: String,
-    /// `equals` or `agree`.
+    /// `equals`, `agree` or `differs`.
     pub kind: String,
     /// The outcome that makes it green.
     pub expect: Expect,
     /// It was made when passes had already been played.
     pub post_hoc: bool,
+    /// It speaks of each class or observable that there is: some may be dark.
+    pub each: bool,
 }
 
 /// The outcome that makes a claim green.
@@ -53,15 +55,18 @@ impl Claim {
     pub fn of(record: &Record, index: usize) -> Claim {
         let entry = &record.claims[index];
         let text = |key: &str| entry[key].as_str();
-        let kind = ["equals", "agree"].iter().find(|kind| !entry[**kind].is_null());
+        let kind =
+            ["equals", "agree", "differs", "reproduces"].iter().find(|kind| !entry[**kind].is_null());
         let kind = kind.map_or("claim", |kind| *kind).to_string();
         let expect = match text("expect") {
             Some("differs") => Expect::Differs,
             Some("invalid") => Expect::Invalid,
+            _ if kind == "differs" => Expect::Differs,
             _ => Expect::Pass,
         };
+        let each = ["class", "observable"].iter().any(|key| entry[&kind][key] == "each");
         let label = text("name").map_or_else(|| format!("{kind} #{}", index + 1), String::from);
-        Claim { label, kind, expect, post_hoc: record.post_hoc.contains(&index) }
+        Claim { label, kind, expect, post_hoc: record.post_hoc.contains(&index), each }
     }
 }
 
@@ -76,6 +81,8 @@ pub(super) enum Evidence {
     Test { difference: Estimate, test: Test },
     /// A test of many comparisons at once.
     Sum { test: Test },
+    /// Bits that had to be the same, and why they are not.
+    Bits(Option<String>),
 }
 
 /// What a trial is about, the same in the record of a second look.
@@ -100,6 +107,8 @@ pub(super) struct Trial {
     pub detect: Option<f64>,
     /// A second look would share this one's errors: there is none.
     pub one_look: bool,
+    /// What `detectable` is relative to, where that is not the expected value.
+    pub reference: Option<f64>,
     /// Filled in but for adjusted p-value, detectable, outcome and note.
     pub verdict: Verdict,
 }
@@ -188,12 +197,13 @@ pub(super) fn trial(stored: &Stored, index: usize, comparison: &Comparison) -> T
         arms.iter()
             .find_map(|arm| arm.objection())
             .or_else(|| bias_objection(&claim, &arms))
-            .or_else(|| silence_objection(&arms))
+            .or_else(|| silence_objection(&claim, &comparison.quantity, &arms))
     };
     let evidence = match (objection, &a) {
         (None, Some(a)) => weigh(a, b.as_ref().filter(|_| paired), &expected, &arms, &mut verdict),
         (objection, _) => Evidence::None(objection.unwrap_or_default()),
     };
+    let claim_reference = claim.each.then(|| whole(stored, &comparison.quantity)).flatten();
     let sampling = a.as_ref().map_or(f64::NAN, |a| a.mean.std_error);
     let one_look = stated_error(&expected, &arms) > SHARED_ERROR * sampling;
     Trial {
@@ -203,6 +213,7 @@ pub(super) fn trial(stored: &Stored, index: usize, comparison: &Comparison) -> T
         evidence,
         detect: comparison.detect,
         one_look,
+        reference: claim_reference,
         verdict,
     }
 }
@@ -278,15 +289,52 @@ fn bias_objection(claim: &Claim, arms: &[&Arm]) -> Option<String> {
     })
 }
 
-/// Two estimators that both scored nothing agree on nothing: they may share what keeps them dark.
-fn silence_objection(arms: &[&Arm]) -> Option<String> {
+/// Two estimators that both scored nothing agree on nothing: they may share what keeps them dark. A
+/// claim on each class is not void by one that does not occur, as long as their sum is not dark.
+fn silence_objection(claim: &Claim, quantity: &Quantity, arms: &[&Arm]) -> Option<String> {
+    if claim.each && quantity.observable.class != "all" {
+        return None;
+    }
     let silent = |arm: &&Arm| arm.all.mean == 0.0 && arm.all.variance() == 0.0;
     let all = arms.len() > 1 && arms.iter().all(silent);
     all.then(|| "neither side scored anything; claim `equals = { value = 0 }` if that is meant".into())
 }
 
+/// The mean of the sum over all classes: what a claim on each class measures its power by.
+fn whole(stored: &Stored, quantity: &Quantity) -> Option<f64> {
+    let observable = Observable { class: "all".into(), ..quantity.observable.clone() };
+    let batches = stored.batches(&Quantity { observable, ..quantity.clone() })?;
+    Some(total(batches)?.mean.abs())
+}
+
 fn same_passes(a: &[Moments], b: &[Moments]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.n == b.n)
+}
+
+/// A verdict on a claim of which nothing is said yet.
+pub(super) fn blank(record: &Record, claim: &Claim) -> Verdict {
+    Verdict {
+        experiment: record.experiment.clone(),
+        cell: String::new(),
+        band: String::new(),
+        class: String::new(),
+        estimators: String::new(),
+        claim: claim.label.clone(),
+        test: String::new(),
+        statistic: f64::NAN,
+        p_value: f64::NAN,
+        adjusted_p: f64::NAN,
+        detectable: f64::NAN,
+        outcome: Outcome::Invalid("not judged".into()),
+        observable: String::new(),
+        value: f64::NAN,
+        std_error: f64::NAN,
+        expected: f64::NAN,
+        expected_error: f64::NAN,
+        dof: f64::NAN,
+        second_p: f64::NAN,
+        note: String::new(),
+    }
 }
 
 fn blank_verdict(stored: &Stored, comparison: &Comparison, claim: &Claim) -> Verdict {
@@ -302,25 +350,11 @@ fn blank_verdict(stored: &Stored, comparison: &Comparison, claim: &Claim) -> Ver
         if a == b { a } else { format!("{a} vs {b}") }
     };
     Verdict {
-        experiment: record.experiment.clone(),
         cell: both(&cell),
         band: both(&band),
         class: both(&|q| q.observable.class.clone()),
         estimators: both(&|q| q.estimator.clone()),
-        claim: claim.label.clone(),
-        test: String::new(),
-        statistic: f64::NAN,
-        p_value: f64::NAN,
-        adjusted_p: f64::NAN,
-        detectable: f64::NAN,
-        outcome: Outcome::Invalid("not judged".into()),
         observable: both(&|q| q.observable.name.clone()),
-        value: f64::NAN,
-        std_error: f64::NAN,
-        expected: f64::NAN,
-        expected_error: f64::NAN,
-        dof: f64::NAN,
-        second_p: f64::NAN,
-        note: String::new(),
+        ..blank(record, claim)
     }
 }

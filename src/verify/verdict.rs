@@ -52,7 +52,7 @@ pub struct Verdict {
     /// Holm's adjusted p-value over the whole verification.
     pub adjusted_p: f64,
     /// The smallest true difference that would have been rejected with 99 % probability, relative to
-    /// the expected value, or absolute where that is 0.
+    /// the expected value (for claims on `each` class, to the sum of all), or absolute where that is 0.
     pub detectable: f64,
     /// The outcome; what a control expects has been taken into account.
     pub outcome: Outcome,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::At;
-use crate::experiment::schema::{Agree, ClaimEntry, Equals};
+use crate::experiment::schema::{ClaimEntry, Equals};
 use crate::experiment::suggest;
 use crate::experiment::sweep::SweepAxis;
 
@@ -21,7 +21,15 @@ pub fn claim(at: At, claim: &ClaimEntry, known: &Known) {
         expected(at.to("equals"), equals, known);
     }
     if let Some(agree) = &claim.agree {
-        agreement(at.to("agree"), agree, known);
+        let (names, across, only) = (&agree.estimators, &agree.across, &agree.only);
+        pairs(at.to("agree"), names, across.as_deref(), only, known);
+    }
+    if let Some(differs) = &claim.differs {
+        let (names, across, only) = (&differs.estimators, &differs.across, &differs.only);
+        pairs(at.to("differs"), names, across.as_deref(), only, known);
+        if claim.expect.is_some() {
+            at.to("expect").report("`differs` says what is expected already");
+        }
     }
 }
 
@@ -46,29 +54,35 @@ fn expected(at: At, claim: &Equals, known: &Known) {
     }
 }
 
-fn agreement(at: At, claim: &Agree, known: &Known) {
+fn pairs(
+    at: At,
+    estimators: &[String],
+    across: Option<&str>,
+    only: &BTreeMap<String, String>,
+    known: &Known,
+) {
     let names = at.to("estimators");
-    for (i, name) in claim.estimators.iter().enumerate() {
+    for (i, name) in estimators.iter().enumerate() {
         estimator(names.item(i), name, known);
-        if claim.estimators[..i].contains(name) {
+        if estimators[..i].contains(name) {
             names.item(i).report(format!("`{name}` stands twice"));
         }
     }
-    if claim.estimators.len() == 1 && claim.across.is_none() {
+    if estimators.len() == 1 && across.is_none() {
         names.report_help(
             "one estimator agrees with itself",
-            "name two or more, or the axis `across` which its cells must agree",
+            "name two or more, or the axis `across` which its cells are compared",
         );
     }
     let Some(axes) = known.axes else { return };
-    if let Some(name) = &claim.across {
+    if let Some(name) = across {
         axis(at.to("across"), name, axes);
-        if claim.only.contains_key(name) {
+        if only.contains_key(name) {
             let rule = format!("`{name}` is compared across, `where` cannot fix it");
             at.to("where").to(name).key().report(rule);
         }
     }
-    filter(at, &claim.only, axes);
+    filter(at, only, axes);
 }
 
 fn estimator(at: At, name: &str, known: &Known) {
