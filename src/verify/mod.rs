@@ -11,6 +11,9 @@ pub mod junit;
 /// What verification says.
 pub mod verdict;
 
+/// Evidence that adds up over nights.
+pub mod nights;
+
 /// Claims that a record comes out again.
 mod reproduction;
 

@@ -334,6 +334,7 @@ pub(super) fn blank(record: &Record, claim: &Claim) -> Verdict {
         dof: f64::NAN,
         second_p: f64::NAN,
         note: String::new(),
+        control: claim.expect != Expect::Pass,
     }
 }
 

@@ -72,6 +72,8 @@ pub struct Verdict {
     pub second_p: f64,
     /// The reason for the outcome, as a sentence.
     pub note: String,
+    /// It expects something else than agreement.
+    pub control: bool,
 }
 
 /// Columns of `verdicts.csv`.
