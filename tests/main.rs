@@ -5,6 +5,7 @@ mod damage;
 mod docs;
 mod interruption;
 mod layering;
+mod looks;
 mod reproducibility;
 mod tokens;
 mod work;

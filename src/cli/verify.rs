@@ -147,8 +147,7 @@ impl Court<'_> {
             of.map_or_else(String::new, |r| format!("{} {}", r.fingerprint, r.claims_hash))
         };
         if nights.add(token, verdicts, code) {
-            let text = serde_json::to_string_pretty(&nights).unwrap_or_default();
-            atomic::write(&path, text.as_bytes(), "write the evidence of the nights")?;
+            atomic::write(&path, nights.to_json().as_bytes(), "write the evidence of the nights")?;
         } else {
             println!("these streams are counted already; the evidence stays as it is");
         }
@@ -222,7 +221,7 @@ fn read_nights(path: &Path) -> Result<Nights> {
     }
     let text =
         std::fs::read_to_string(path).map_err(Error::io(path, "read the evidence of the nights"))?;
-    serde_json::from_str(&text).map_err(|e| {
+    Nights::from_json(&text).map_err(|e| {
         Error::record(path, format!("not a state of nights: {e}; move it away to begin again"))
     })
 }

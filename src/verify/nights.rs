@@ -62,6 +62,19 @@ impl Nights {
         true
     }
 
+    /// As the state file holds it.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).unwrap_or_else(|e| panic!("a state without JSON: {e}"))
+    }
+
+    /// From the text of a state file, or why it is none.
+    ///
+    /// # Errors
+    /// A text that is not such a state.
+    pub fn from_json(text: &str) -> Result<Nights, String> {
+        serde_json::from_str(text).map_err(|error| error.to_string())
+    }
+
     /// The logarithm that raises an alarm.
     pub fn threshold(&self) -> f64 {
         ln(self.tests.len().max(1) as f64 / LIFE_LEVEL)
