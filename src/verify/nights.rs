@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::verdict::Verdict;
 use crate::math::ln;
+use crate::stats::evidence::calibrated;
 
 /// The probability of any false alarm of the accumulated evidence, over all tests and nights.
 pub const LIFE_LEVEL: f64 = 1e-3;
@@ -39,6 +40,8 @@ pub struct Evidence {
     pub nights: u64,
     /// Natural logarithm of the product of e-values.
     pub log_e: f64,
+    /// The largest that it has been: what alarms look at.
+    pub peak: f64,
 }
 
 impl Nights {
@@ -51,13 +54,15 @@ impl Nights {
         self.tokens.push(token.into());
         for v in verdicts.iter().filter(|v| !v.p_value.is_nan() && !v.control) {
             let code = code(&v.experiment);
-            let fresh = Evidence { code: code.clone(), nights: 0, log_e: 0.0 };
+            let fresh = Evidence { code: code.clone(), nights: 0, log_e: 0.0, peak: 0.0 };
             let evidence = self.tests.entry(name(v)).or_insert_with(|| fresh.clone());
             if evidence.code != code {
                 *evidence = fresh;
             }
             evidence.nights += 1;
-            evidence.log_e += log_calibrated(v.p_value);
+            // A p-value that underflows counts as the smallest number.
+            evidence.log_e += calibrated(v.p_value.max(f64::MIN_POSITIVE));
+            evidence.peak = evidence.peak.max(evidence.log_e);
         }
         true
     }
@@ -83,14 +88,9 @@ impl Nights {
     /// The tests whose evidence has reached the threshold, with it.
     pub fn alarms(&self) -> Vec<(&str, &Evidence)> {
         let threshold = self.threshold();
-        let over = self.tests.iter().filter(|(_, evidence)| evidence.log_e >= threshold);
+        let over = self.tests.iter().filter(|(_, evidence)| evidence.peak >= threshold);
         over.map(|(name, evidence)| (name.as_str(), evidence)).collect()
     }
-}
-
-/// ln(1 / (2 sqrt(p))); a p-value that underflows counts as the smallest number.
-fn log_calibrated(p: f64) -> f64 {
-    ln(0.5) - 0.5 * ln(p.max(f64::MIN_POSITIVE))
 }
 
 /// What names a test from night to night.
