@@ -9,13 +9,16 @@
 //! cargo test --release --test integration -- --ignored the_calibration_is_published
 //! ```
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 use scatterproof::stats::acceptance::Bin;
+use scatterproof::stats::continuous::Sorted;
 use scatterproof::stats::efficiency::{Block, compare};
 use scatterproof::stats::evidence::{TwoSided, Upward};
 use scatterproof::stats::goodness::{Cell, contrast, independence, pearson, proportion};
@@ -94,7 +97,7 @@ struct Kind {
     p_value: fn(&mut Draws) -> f64,
 }
 
-const KINDS: [Kind; 13] = [
+const KINDS: [Kind; 15] = [
     Kind {
         name: "t",
         null: "64 batches of 64 exponential values, mean 1",
@@ -185,10 +188,19 @@ const KINDS: [Kind; 13] = [
         name: "kolmogorov-smirnov",
         null: "200 uniform values",
         promise: Promise::Uniform,
-        p_value: |d| {
-            let mut values: Vec<f64> = (0..200).map(|_| d.uniform()).collect();
-            uniformity(&mut values).1
-        },
+        p_value: |d| uniforms(d, 200).kolmogorov_smirnov().p_value,
+    },
+    Kind {
+        name: "kuiper",
+        null: "1000 uniform values",
+        promise: Promise::Uniform,
+        p_value: |d| uniforms(d, 1000).kuiper().p_value,
+    },
+    Kind {
+        name: "anderson-darling",
+        null: "1000 uniform values",
+        promise: Promise::Uniform,
+        p_value: |d| uniforms(d, 1000).anderson_darling().p_value,
     },
     Kind {
         name: "efficiency",
@@ -255,13 +267,8 @@ fn truncated((tau, weight): (f64, f64)) -> f64 {
     if tau < 2.0 { weight } else { 0.0 }
 }
 
-/// The Kolmogorov-Smirnov distance of values from the uniform distribution, and its p-value.
-fn uniformity(values: &mut [f64]) -> (f64, f64) {
-    values.sort_by(f64::total_cmp);
-    let n = values.len() as f64;
-    let gap = |(i, x): (usize, &f64)| (x - i as f64 / n).max((i + 1) as f64 / n - x);
-    let distance = values.iter().enumerate().map(gap).fold(0.0, f64::max);
-    (distance, kolmogorov_smirnov(distance, values.len() as u64))
+fn uniforms(d: &mut Draws, n: usize) -> Sorted {
+    Sorted::new((0..n).map(|_| d.uniform()).collect()).expect("values")
 }
 
 /// The levels whose rejections are counted: a distance between distributions says nothing of their tails.
@@ -281,7 +288,7 @@ struct Calibration {
 }
 
 impl Calibration {
-    fn of(mut p_values: Vec<f64>, promise: Promise) -> Calibration {
+    fn of(p_values: Vec<f64>, promise: Promise) -> Calibration {
         let runs = p_values.len() as u64;
         assert!(p_values.iter().all(|p| (0.0..=1.0).contains(p)), "p-values");
         let rejected = LEVELS.map(|level| p_values.iter().filter(|p| **p <= level).count() as u64);
@@ -289,8 +296,15 @@ impl Calibration {
             Promise::Uniform => binomial_two_sided(rejected[i], runs, LEVELS[i]),
             Promise::Conservative => binomial_upper(rejected[i], runs, LEVELS[i]),
         });
-        let (distance, distance_p) = uniformity(&mut p_values);
-        Calibration { runs, distance, distance_p, rejected, rejected_p, promise }
+        let test = Sorted::new(p_values).expect("enough runs").kolmogorov_smirnov();
+        Calibration {
+            runs,
+            distance: test.statistic,
+            distance_p: test.p_value,
+            rejected,
+            rejected_p,
+            promise,
+        }
     }
 
     fn is_kept(&self) -> bool {
@@ -303,6 +317,10 @@ fn null_p_values(kind: &Kind, runs: u64) -> Vec<f64> {
     let mut draws = Draws::of(kind.name);
     (0..runs).map(|_| (kind.p_value)(&mut draws)).collect()
 }
+
+/// The p-values of 600 runs of every kind, shared by two tests.
+static SHORT: LazyLock<BTreeMap<&str, Vec<f64>>> =
+    LazyLock::new(|| KINDS.iter().map(|kind| (kind.name, null_p_values(kind, 600))).collect());
 
 /// The smallest number of p-values below 1e-2, and the smallest distance, that alarm over `runs`.
 fn alarming(runs: u64) -> (u64, f64) {
@@ -318,7 +336,7 @@ fn every_kind_of_test_keeps_its_level() {
     let (count, distance) = alarming(600);
     assert!(distance <= 0.092 && binomial_upper(count, 600, 0.05) > 0.98, "{distance} {count}");
     for kind in &KINDS {
-        let c = Calibration::of(null_p_values(kind, 600), kind.promise);
+        let c = Calibration::of(SHORT[kind.name].clone(), kind.promise);
         println!(
             "{}: {:.4} {:.4} {:?} {:?}",
             kind.name, c.distance, c.distance_p, c.rejected, c.rejected_p
@@ -335,7 +353,7 @@ fn planted_p_values_are_caught() {
         assert!(!c.is_kept(), "{name}: distance {}, rejected {:?}", c.distance, c.rejected);
     };
     for kind in KINDS.iter().filter(|kind| kind.promise == Promise::Uniform) {
-        let halved = null_p_values(kind, 600).iter().map(|p| 0.5 * p).collect();
+        let halved = SHORT[kind.name].iter().map(|p| 0.5 * p).collect();
         caught(kind.name, halved, Promise::Uniform);
     }
     // The normal's tail for Student's, over 4 batches: P(|t| > 2.58) is 8 % at 3 degrees of freedom.
