@@ -50,12 +50,16 @@ impl TwoStage {
     /// nothing passes unseen.
     pub fn suspects(&self, p: &[f64]) -> Vec<usize> {
         let adjusted = holm(p);
-        (0..p.len()).filter(|&i| !(adjusted[i] >= self.level)).collect()
+        (0..p.len()).filter(|&i| self.is_failure(adjusted[i])).collect()
     }
 
     /// Of the repeated tests' p-values, which fail again.
     pub fn confirmed(&self, repeated: &[f64]) -> Vec<bool> {
-        holm(repeated).iter().map(|p| !(*p >= self.level)).collect()
+        holm(repeated).into_iter().map(|p| self.is_failure(p)).collect()
+    }
+
+    fn is_failure(&self, adjusted: f64) -> bool {
+        adjusted.is_nan() || adjusted < self.level
     }
 
     /// The true difference, in standard errors of the first stage, that fails both stages with probability
