@@ -2,6 +2,8 @@
 
 /// Tests of acceptance by optical depth, and enumeration of discrete choices.
 pub mod acceptance;
+/// Tests of values against a continuous distribution.
+pub mod continuous;
 /// Two estimators at equal cost.
 pub mod efficiency;
 /// E-values: evidence that accumulates.
