@@ -4,6 +4,7 @@ mod cli;
 mod damage;
 mod docs;
 mod interruption;
+mod judging;
 mod layering;
 mod reproducibility;
 mod tokens;

@@ -6,5 +6,9 @@ pub mod hypothesis;
 pub mod moments;
 /// Many tests under one error rate.
 pub mod multiplicity;
+/// Ratios of positive estimates.
+pub mod ratio;
+/// Sums of symmetric terms.
+pub mod signs;
 /// The fixed dyadic reduction over passes.
 pub mod tree;
