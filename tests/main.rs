@@ -5,6 +5,7 @@ mod cli;
 mod damage;
 mod docs;
 mod interruption;
+mod judging;
 mod layering;
 mod looks;
 mod reproducibility;

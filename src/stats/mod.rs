@@ -16,6 +16,10 @@ pub mod hypothesis;
 pub mod moments;
 /// Many tests under one error rate.
 pub mod multiplicity;
+/// Ratios of positive estimates.
+pub mod ratio;
+/// Sums of symmetric terms.
+pub mod signs;
 /// Survival functions and their inverses.
 pub mod tails;
 /// The fixed dyadic reduction over passes.

@@ -1,6 +1,10 @@
 //! Claims and records in, verdicts out, and a list of what wants a second look. Pure: a verdict is a
 //! function of records and levels.
 
+/// Two records of one experiment: what changed.
+pub mod difference;
+/// Images rendered elsewhere against a record.
+pub mod foreign;
 /// From comparisons to verdicts.
 pub mod judge;
 /// The error rates of a whole verification.
@@ -17,5 +21,7 @@ pub mod nights;
 /// Claims that a record comes out again.
 mod reproduction;
 
+/// Tests under one family-wise level.
+mod family;
 /// What one comparison shows by itself.
 mod trial;
