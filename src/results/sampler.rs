@@ -41,6 +41,8 @@ pub struct SamplerRun {
     pub total_bound: f64,
     /// Evaluations of the density that the masses took.
     pub evaluations: u64,
+    /// Evaluations of densities and contrasts that were negative or not finite; they count as 0.
+    pub senseless: u64,
     /// Whether the budget of evaluations ended before the masses were as exact as was wanted.
     pub exhausted: bool,
     /// Directed contrasts.
