@@ -214,7 +214,8 @@ fn state(
     tests: f64,
 ) -> Verdict {
     let Trial { claim, evidence, detect, one_look, mut verdict, .. } = trial;
-    if let Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. } = &evidence {
+    if let Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. } = &evidence
+    {
         (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
         verdict.adjusted_p = adjusted_p;
     }
@@ -238,14 +239,14 @@ fn state(
         (_, Some(SecondLook::Invalid(reason))) => Outcome::Invalid(format!("second look: {reason}")),
         (_, Some(SecondLook::Taken(p))) if *p < SECOND_LOOK => Outcome::Fail,
         // Not `adjusted_p < level`: a NaN must not pass.
-        (Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }, _) => match verdict
-            .adjusted_p
-        {
-            p if p.is_nan() => Outcome::Invalid("the test has no p-value".into()),
-            p if p < looks.at_once() => Outcome::Fail,
-            _ if detect.is_some_and(|d| verdict.detectable > d) => Outcome::Underpowered,
-            _ => Outcome::Pass,
-        },
+        (Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }, _) => {
+            match verdict.adjusted_p {
+                p if p.is_nan() => Outcome::Invalid("the test has no p-value".into()),
+                p if p < looks.at_once() => Outcome::Fail,
+                _ if detect.is_some_and(|d| verdict.detectable > d) => Outcome::Underpowered,
+                _ => Outcome::Pass,
+            }
+        }
     };
     verdict.note = note(&found, &evidence, detect, &verdict);
     match second {

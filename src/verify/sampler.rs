@@ -180,7 +180,8 @@ impl<'a> Rows<'a> {
     fn delta(&mut self, delta: &Delta) {
         let test = format!("delta {}", delta.name);
         if delta.inexact > 0 {
-            let said = format!("{} of {} values are not what they have to be", delta.inexact, delta.observed);
+            let said =
+                format!("{} of {} values are not what they have to be", delta.inexact, delta.observed);
             self.push(&test, Evidence::Exact { holds: false, said });
         } else {
             self.share(&test, delta.observed, delta.mass);
@@ -216,7 +217,8 @@ impl<'a> Rows<'a> {
 
     fn own_density(&mut self) {
         let (n, largest) = (self.run.own_density_differs, self.run.own_density_largest);
-        let said = format!("{n} draws whose own density is another; largest relative difference {largest:.1e}");
+        let said =
+            format!("{n} draws whose own density is another; largest relative difference {largest:.1e}");
         self.push("identity D5", Evidence::Exact { holds: n == 0, said }).verdict.statistic = largest;
     }
 
