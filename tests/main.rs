@@ -6,5 +6,6 @@ mod docs;
 mod interruption;
 mod layering;
 mod reproducibility;
+mod samplers;
 mod tokens;
 mod work;
