@@ -510,3 +510,104 @@ fn cut(order: &[usize], masses: &[Mass], parts: usize) -> Vec<Vec<usize>> {
 pub fn centre(area: &Area, axes: &[Axis; 2]) -> [f64; 2] {
     [0, 1].map(|k| wrap(&axes[k], 0.5 * (area.low[k] + area.high[k])))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samplers::phase::HenyeyGreensteinSampler;
+    use crate::samplers::{Draw, Piece, Sampler};
+    use crate::sampling::stream::Stream;
+
+    /// A peak in a corner of a plane, and a line.
+    struct Two;
+
+    impl Sampler for Two {
+        fn draw(&self, _: &mut Stream) -> Draw {
+            Draw::Null
+        }
+
+        fn pieces(&self) -> Vec<Piece> {
+            let axes = [Axis::over(0.0, 1.0), Axis::over(-1.0, 1.0)];
+            vec![Piece::plane("plane", axes), Piece::line("line", Axis::over(0.0, 2.0))]
+        }
+
+        /// 0.72 in [0, 0.01] x [-1, -0.98], 0.08 in the rest of the plane, 0.2 on the line.
+        fn density(&self, piece: usize, [x, y]: [f64; 2]) -> f64 {
+            match piece {
+                0 if x < 0.01 && y < -0.98 => 0.72 / 2e-4,
+                0 => 0.08 / (2.0 - 2e-4),
+                _ => 0.1 * x,
+            }
+        }
+    }
+
+    fn check(sampler: &dyn Sampler, samples: u64, extras: &[(Extra, f64)]) -> Partition {
+        let mut quadrature = Quadrature::new(sampler);
+        let partition = Partition::new(&mut quadrature, samples, extras);
+        quadrature.refine();
+        let mut masses: Vec<f64> =
+            quadrature.masses(partition.leaves.len()).iter().map(|mass| mass.value).collect();
+        masses.extend(extras.iter().map(|(_, mass)| *mass));
+        assert!((masses.iter().sum::<f64>() - 1.0).abs() < 1e-6);
+        for (cell_of, count) in
+            [(&partition.coarse, partition.coarse_count), (&partition.fine, partition.fine_count)]
+        {
+            let mut sums = vec![0.0; count];
+            cell_of.iter().zip(&masses).for_each(|(&cell, mass)| sums[cell] += mass);
+            let least = sums.iter().copied().fold(f64::INFINITY, f64::min);
+            assert!(least * samples as f64 > 24.9 || count == 1, "{least}");
+        }
+        // Fine cells are parts of coarse ones.
+        let mut of_fine = vec![None; partition.fine_count];
+        for (&fine, &coarse) in partition.fine.iter().zip(&partition.coarse) {
+            assert_eq!(*of_fine[fine].get_or_insert(coarse), coarse);
+        }
+        // Points are in the leaves that are theirs.
+        for (leaf, area) in partition.leaves.iter().enumerate() {
+            let axes = &sampler.pieces()[area.piece].axes;
+            assert_eq!(partition.leaf(area.piece, centre(area, axes)), Some(leaf));
+        }
+        partition
+    }
+
+    #[test]
+    fn cells_are_thick_and_points_find_them() {
+        let hg = check(&HenyeyGreensteinSampler::new(0.9), 1_000_000, &[]);
+        assert!((200..450).contains(&hg.coarse_count), "{}", hg.coarse_count);
+        assert!((2000..8000).contains(&hg.fine_count), "{}", hg.fine_count);
+        let few = check(&HenyeyGreensteinSampler::new(0.9), 1_000, &[]);
+        assert!((4..=20).contains(&few.coarse_count), "{}", few.coarse_count);
+        let corner = check(&Two, 1_000_000, &[]);
+        // The peak is one box of 100 x 100: cells within it are far smaller than the grid's.
+        let inside =
+            corner.leaves.iter().filter(|a| a.piece == 0 && a.high[0] <= 0.0101 && a.high[1] <= -0.979);
+        assert!(inside.count() > 16);
+        assert!(corner.leaf(0, [1.0, 1.0]).is_some() && corner.leaf(1, [2.0, 0.5]).is_some());
+        for (piece, at) in [
+            (0, [1.01, 0.0]),
+            (0, [0.5, f64::NAN]),
+            (1, [-1e-9, 0.5]),
+            (1, [f64::NAN, 0.5]),
+            (2, [0.5; 2]),
+        ] {
+            assert_eq!(corner.leaf(piece, at), None);
+        }
+    }
+
+    #[test]
+    fn groups_are_thick() {
+        let masses: Vec<Mass> =
+            (0..100).map(|i| Mass { value: f64::from(i + 1) / 5050.0, bound: 0.0 }).collect();
+        let centres: Vec<(usize, [f64; 2])> =
+            (0..100).map(|i| (0, [f64::from(i / 10), f64::from(i % 10)])).collect();
+        let (groups, count) = groups(&centres, &masses, 500_000.0);
+        assert_eq!(count, 16);
+        let of = |g: usize| (0..100).filter(|&i| groups[i] == g).map(|i| masses[i].value).sum::<f64>();
+        assert!((0..16).all(|g| (0.02..0.15).contains(&of(g))));
+        for (pairs, most) in [(500.0, 4), (40.0, 1)] {
+            let (groups, count) = super::groups(&centres, &masses, pairs);
+            assert!(count <= most, "{count} groups for {pairs} pairs");
+            assert!(groups.iter().all(|&g| g < count.max(1)));
+        }
+    }
+}

@@ -6,6 +6,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::cells::{Extra, Partition};
+use super::clock::thread_cpu_time;
 use super::interrupt::Interrupt;
 use crate::results::sampler::OWN_DENSITY;
 use crate::samplers::{Contrast, Draw, Sampler};
@@ -61,6 +62,8 @@ pub struct Counts {
     pub senseless: u64,
     /// Pairs by group of the first, then of the second.
     pub pairs: Vec<u64>,
+    /// CPU time of the threads that counted, seconds; no count.
+    pub cpu_seconds: f64,
 }
 
 impl Counts {
@@ -85,6 +88,7 @@ impl Counts {
         self.differs += other.differs;
         self.senseless += other.senseless;
         self.largest = self.largest.max(other.largest);
+        self.cpu_seconds += other.cpu_seconds;
     }
 }
 
@@ -107,9 +111,11 @@ impl Counting<'_> {
             let next = AtomicU64::new(start);
             let worker = || {
                 let (mut own, mut moments) = (Counts::new(self, deltas), Vec::new());
+                let before = thread_cpu_time();
                 loop {
                     let chunk = next.fetch_add(1, Ordering::Relaxed);
                     if chunk >= end || interrupt.raised() {
+                        own.cpu_seconds = thread_cpu_time().saturating_sub(before).as_secs_f64();
                         return (own, moments);
                     }
                     let draws = CHUNK.min(samples - chunk * CHUNK);

@@ -244,3 +244,75 @@ fn cuts(axis: &Axis, low: f64, high: f64) -> Vec<f64> {
     cuts.dedup();
     cuts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samplers::Draw;
+    use crate::sampling::stream::Stream;
+
+    /// Density of a plane: 1 + sin(2 pi y)/2 where x is below the kink at 0.3, twice that above; y is
+    /// periodic.
+    struct Step;
+
+    impl Sampler for Step {
+        fn draw(&self, _: &mut Stream) -> Draw {
+            Draw::Null
+        }
+
+        fn pieces(&self) -> Vec<Piece> {
+            let x = Axis { range: [0.0, 1.0], kinks: vec![0.3], periodic: false };
+            vec![Piece::plane("plane", [x, Axis::turns()])]
+        }
+
+        fn density(&self, _: usize, [x, y]: [f64; 2]) -> f64 {
+            let wave = 1.0 + 0.5 * crate::math::sin_cos_turns(y).0;
+            if x < 0.3 { wave } else { 2.0 * wave }
+        }
+    }
+
+    fn area(low: [f64; 2], high: [f64; 2]) -> Area {
+        Area { piece: 0, low, high }
+    }
+
+    /// Over [0, 1] x [y, y + 1] for any y: 0.3 + 2 * 0.7. Over half a turn: 1/2 + 1/(2 pi) of that.
+    #[test]
+    fn kinks_are_edges_and_seams_are_crossed() {
+        let mut quadrature = Quadrature::new(&Step);
+        for y in [0.0, 0.38, 0.9] {
+            let mass = quadrature.add(0, area([0.0, y], [1.0, y + 1.0]));
+            assert!((mass.value - 1.7).abs() < 1e-12 && mass.bound < 1e-3, "{mass:?}");
+        }
+        let half = quadrature.add(1, area([0.0, 1.0], [1.0, 1.5]));
+        assert!((half.value - 1.7 * (0.5 + 0.5 / std::f64::consts::PI)).abs() < 1e-12, "{half:?}");
+        quadrature.forget_owner(0);
+        assert!(!quadrature.refine());
+        let masses = quadrature.masses(2);
+        assert_eq!(masses[0], Mass::default());
+        assert!(masses[1].bound < 3e-9 && (masses[1].value - half.value).abs() < 1e-12);
+    }
+
+    /// A kink that is not stated is found by refinement, and the bound covers what is left.
+    #[test]
+    fn bounds_cover_errors() {
+        struct Hidden;
+        impl Sampler for Hidden {
+            fn draw(&self, _: &mut Stream) -> Draw {
+                Draw::Null
+            }
+            fn pieces(&self) -> Vec<Piece> {
+                vec![Piece::line("line", Axis::over(0.0, 1.0))]
+            }
+            fn density(&self, _: usize, [x, _]: [f64; 2]) -> f64 {
+                if x < 1.0 / 3.0 { 1.0 } else { f64::from(u8::from(x < 0.9)) * 2.0 }
+            }
+        }
+        let truth = 1.0 / 3.0 + 2.0 * (0.9 - 1.0 / 3.0);
+        let mut quadrature = Quadrature::new(&Hidden);
+        let rough = quadrature.add(0, area([0.0, 0.0], [1.0, 1.0]));
+        assert!((rough.value - truth).abs() < rough.bound, "{rough:?}");
+        assert!(!quadrature.refine());
+        let mass = quadrature.masses(1)[0];
+        assert!((mass.value - truth).abs() < mass.bound && mass.bound < 1e-8, "{mass:?}");
+    }
+}

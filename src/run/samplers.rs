@@ -338,12 +338,14 @@ fn draw(job: &Job, threads: usize, claims: &[String], interrupt: &Interrupt) -> 
         group_count,
         key: job.key,
     };
+    let before_counting = thread_cpu_time().saturating_sub(cpu).as_secs_f64();
     let (counts, moments) = counting.count(job.samples, threads, interrupt)?;
+    let cpu_seconds = before_counting + counts.cpu_seconds;
     let contrasts = contrasts(&counting, &mut quadrature, &moments);
     let (run, arrays) = Assembly { job, partition: &partition, masses: &masses, counts: &counts, total }
         .record(&counting, contrasts, &quadrature, exhausted);
     let cost = Cost {
-        cpu_seconds: thread_cpu_time().saturating_sub(cpu).as_secs_f64(),
+        cpu_seconds,
         wall_seconds: wall.elapsed().as_secs_f64(),
         passes: job.samples,
         paths: job.samples,
@@ -516,7 +518,3 @@ fn load(path: &Path, identity: &str) -> Option<Drawn> {
     let arrays = arrays.collect::<Option<Arrays>>()?;
     Some(Drawn { run: state.run, arrays, cost: None, claims: state.claims })
 }
-
-#[cfg(test)]
-#[path = "samplers_tests.rs"]
-mod tests;

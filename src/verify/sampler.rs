@@ -272,7 +272,3 @@ fn fit(cells: &Cells) -> Evidence {
         Err(refusal) => Evidence::None(refusal.to_string()),
     }
 }
-
-#[cfg(test)]
-#[path = "sampler_tests.rs"]
-mod tests;

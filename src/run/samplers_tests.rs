@@ -1,1 +1,0 @@
-//! What experiments on samplers find.

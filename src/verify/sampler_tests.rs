@@ -1,1 +1,0 @@
-//! What the records of samplers show.
