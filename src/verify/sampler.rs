@@ -12,19 +12,20 @@
 //! | `outside` | no draw where the density is 0, or outside the chart | there is none |
 //!
 //! Masses come with bounds of their quadrature errors. Where those could shift a test by more than
-//! `stats::goodness` allows, or D7 by more than 1e-6, the quadrature is unresolved: the test is invalid.
+//! `stats::goodness` allows, or D7 by more than 1e-4, the quadrature is unresolved: the test is invalid.
 
 use super::trial::{Claim, Evidence, Fit, Item, Trial};
 use super::verdict::{Outcome, Verdict};
 use crate::results::record::Record;
-use crate::results::sampler::{Cells, ContrastRun, Delta, NullMass, SamplerRun};
+use crate::results::sampler::{Cells, ContrastRun, Delta, NullMass, OWN_DENSITY, SamplerRun};
 use crate::results::store::Stored;
 use crate::stats::goodness::{Cell, contrast, pearson, proportion};
 use crate::stats::hypothesis::Test;
 use crate::stats::moments::Moments;
 
-/// Largest bound of the error of the total mass with which its being 1 means anything.
-const TOTAL_BOUND: f64 = 1e-6;
+/// Largest bound of the error of the total mass with which its being 1 says more than counts do: those of
+/// 1e6 draws see relative errors of 1e-2. The bound itself is the row's `detectable`.
+const TOTAL_BOUND: f64 = 1e-4;
 
 /// All that the claims of a record say of samplers.
 pub(super) fn trials(stored: &Stored) -> Vec<Trial> {
@@ -219,7 +220,8 @@ impl<'a> Rows<'a> {
         let (n, largest) = (self.run.own_density_differs, self.run.own_density_largest);
         let said =
             format!("{n} draws whose own density is another; largest relative difference {largest:.1e}");
-        self.push("identity D5", Evidence::Exact { holds: n == 0, said }).verdict.statistic = largest;
+        let verdict = &mut self.push("identity D5", Evidence::Exact { holds: n == 0, said }).verdict;
+        (verdict.statistic, verdict.detectable) = (largest, OWN_DENSITY);
     }
 
     fn total(&mut self) {
@@ -236,7 +238,7 @@ impl<'a> Rows<'a> {
         };
         let verdict = &mut self.push("identity D7", evidence).verdict;
         (verdict.value, verdict.std_error, verdict.expected) = (total, bound, 1.0);
-        verdict.statistic = total - 1.0;
+        (verdict.statistic, verdict.detectable) = (total - 1.0, bound);
     }
 
     fn outside(&mut self) {
