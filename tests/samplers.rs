@@ -27,6 +27,7 @@ use super::work::Work;
 /// integral; with `flip`, both draw and density belong to -g.
 struct Phase {
     inner: HenyeyGreensteinSampler,
+    cosine: Contrast,
     g: f64,
     error: f64,
     flip: bool,
@@ -34,8 +35,7 @@ struct Phase {
 
 impl Phase {
     fn factor(&self, at: [f64; 2]) -> f64 {
-        let mu = (self.inner.contrasts()[0].of)(0, at);
-        1.0 + self.error * (mu - self.g)
+        if self.error == 0.0 { 1.0 } else { 1.0 + self.error * ((self.cosine.of)(0, at) - self.g) }
     }
 }
 
@@ -159,8 +159,10 @@ fn registry() -> Registry {
         build: |options| {
             let number = |key: &str| options[key].as_f64().unwrap_or(0.0);
             let (g, flip) = (number("g"), options["flip"] == true);
-            let inner = HenyeyGreensteinSampler::new(if flip { -g } else { g });
-            Ok(Box::new(Phase { inner, g: if flip { -g } else { g }, error: number("error"), flip }))
+            let g = if flip { -g } else { g };
+            let inner = HenyeyGreensteinSampler::new(g);
+            let cosine = inner.contrasts().remove(0);
+            Ok(Box::new(Phase { inner, cosine, g, error: number("error"), flip }))
         },
     };
     let mixture = Entry {
