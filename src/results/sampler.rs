@@ -41,8 +41,10 @@ pub struct SamplerRun {
     pub total_bound: f64,
     /// Evaluations of the density that the masses took.
     pub evaluations: u64,
-    /// Evaluations of densities and contrasts that were negative or not finite; they count as 0.
+    /// Evaluations of the density that were negative or not finite; they count as 0.
     pub senseless: u64,
+    /// Values of contrasts of draws that were not finite; they are not in the moments.
+    pub senseless_contrasts: u64,
     /// Whether the budget of evaluations ended before the masses were as exact as was wanted.
     pub exhausted: bool,
     /// Directed contrasts.

@@ -442,7 +442,8 @@ impl Assembly<'_> {
             total: self.total.value,
             total_bound: self.total.bound,
             evaluations: quadrature.evaluations,
-            senseless: quadrature.senseless + counts.senseless,
+            senseless: quadrature.senseless,
+            senseless_contrasts: counts.senseless,
             exhausted,
             contrasts,
         };

@@ -27,6 +27,9 @@ use crate::stats::moments::Moments;
 /// 1e6 draws see relative errors of 1e-2. The bound itself is the row's `detectable`.
 const TOTAL_BOUND: f64 = 1e-4;
 
+/// Sampling errors and deviations of contrasts below this, relative to the value, are rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// All that the claims of a record say of samplers.
 pub(super) fn trials(stored: &Stored) -> Vec<Trial> {
     let record = &stored.record;
@@ -119,8 +122,13 @@ impl<'a> Rows<'a> {
 
     /// Why nothing that is said of this sampler is worth anything.
     fn objection(&self) -> Option<String> {
-        let n = self.run.senseless;
-        (n > 0).then(|| format!("{n} values of the density or a contrast are negative or not finite"))
+        let (n, values) = (self.run.senseless, self.run.senseless_contrasts);
+        if n > 0 {
+            return Some(format!(
+                "the density is negative or not finite at {n} nodes of the quadrature"
+            ));
+        }
+        (values > 0).then(|| format!("{values} values of contrasts are not finite"))
     }
 
     fn all(mut self) -> Vec<Trial> {
@@ -161,21 +169,24 @@ impl<'a> Rows<'a> {
 
     fn contrast(&mut self, run: &ContrastRun) {
         let moments = Moments::from_array(run.moments);
+        // What quadrature cannot tell from 0 is 0, and differences from it are absolute.
+        let expected = if run.expected.abs() <= run.bound { 0.0 } else { run.expected };
+        let rounding = ROUNDING * moments.mean.abs().max(expected.abs());
         let evidence = if moments.n != self.run.samples {
             Evidence::None(format!("{} values for {} draws", moments.n, self.run.samples))
-        } else if moments.variance() == 0.0 {
-            let holds = (moments.mean - run.expected).abs() <= run.bound + 1e-12 * run.expected.abs();
-            let said = format!("all values are {:e}, expected {:e}", moments.mean, run.expected);
+        } else if moments.std_error() <= rounding {
+            let holds = (moments.mean - expected).abs() <= run.bound + rounding;
+            let said = format!("no sampling error: {:e}, expected {expected:e}", moments.mean);
             Evidence::Exact { holds, said }
         } else {
-            match contrast(&moments, run.expected, run.bound) {
+            match contrast(&moments, expected, run.bound) {
                 Ok(found) => Evidence::Test { difference: found.estimate, test: found.test },
                 Err(refusal) => Evidence::None(refusal.to_string()),
             }
         };
         let verdict = &mut self.push(&format!("contrast {}", run.name), evidence).verdict;
         (verdict.value, verdict.std_error) = (moments.mean, moments.std_error());
-        (verdict.expected, verdict.expected_error) = (run.expected, run.bound);
+        (verdict.expected, verdict.expected_error) = (expected, run.bound);
     }
 
     fn delta(&mut self, delta: &Delta) {
