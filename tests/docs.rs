@@ -95,7 +95,7 @@ fn merged(base: &Table, snippet: Table) -> Table {
 }
 
 /// The experiments that a page by example shows: line and file. The block `toml complete` is the base
-/// of all snippets; in `toml one-of` each line is one; `spectral` ones have bands with wavelengths.
+/// of all snippets; `toml samplers` is a file of its own; in `toml one-of` each line is one; `spectral` ones have bands with wavelengths.
 fn experiments(page: &str) -> Vec<(usize, Table)> {
     let parse = |line: usize, text: &str| {
         toml::from_str::<Table>(text)
@@ -111,6 +111,7 @@ fn experiments(page: &str) -> Vec<(usize, Table)> {
         let first = block.lines[0].0;
         match block.tag {
             "toml complete" => files.push((first, base.clone())),
+            "toml samplers" => files.push((first, parse(first, &block.text()))),
             "toml" => files.push((first, merged(&base, parse(first, &block.text())))),
             "toml one-of" | "toml one-of spectral" => {
                 for &(number, line) in &block.lines {

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::{Axis, Contrast, Draw, Piece, Sampler};
-use crate::math::{DVec3, Frame, atan2, exp_m1, ln_1p};
+use super::{Axis, Contrast, Draw, Piece, Sampler, turns};
+use crate::math::{DVec3, Frame, exp_m1, ln_1p};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::Stream;
 
@@ -53,10 +53,9 @@ impl Sampler for HenyeyGreensteinSampler {
         let from_pole = 0.5 * (next - self.pole()).length_squared();
         let x = (ln_1p(from_pole / self.scale) / self.length).clamp(0.0, 1.0);
         let local = self.about.to_local(next);
-        let turns = (atan2(local.y, local.x) / TAU).rem_euclid(1.0);
         let pdf = self.phase.pdf(next.dot(self.dir));
         let density = pdf * TAU * self.length * (self.scale + from_pole);
-        Draw::Point { piece: 0, at: [x, turns], density }
+        Draw::Point { piece: 0, at: [x, turns(local.x, local.y)], density }
     }
 
     fn pieces(&self) -> Vec<Piece> {
@@ -70,16 +69,7 @@ impl Sampler for HenyeyGreensteinSampler {
     fn contrasts(&self) -> Vec<Contrast> {
         let g = self.phase.g;
         let poles = HenyeyGreensteinSampler::new(g);
-        let mean_cosine = Contrast {
-            name: "mean cosine",
-            of: Box::new(move |_, [x, _]| poles.mu(x)),
-            expected: Some(g),
-        };
-        let cosine = Contrast {
-            name: "cos azimuth",
-            of: Box::new(|_, [_, turns]| crate::math::sin_cos_turns(turns).1),
-            expected: Some(0.0),
-        };
-        vec![mean_cosine, cosine]
+        let mean_cosine = Contrast::of("mean cosine", Some(g), move |[x, _]| poles.mu(x));
+        vec![mean_cosine, Contrast::azimuth()]
     }
 }
