@@ -175,7 +175,8 @@ fn every_snippet_is_accepted() {
 #[test]
 fn planted_snippets_are_found() {
     let page = text("docs/experiment-file.md");
-    let every = experiments(&page).len();
+    // Those with a seed: experiments on samplers have none.
+    let every = experiments(&page).iter().filter(|(_, file)| file.contains_key("seed")).count();
     for (old, new, at_least, words) in [
         ("\nseed = 1 ", "\nsead = 1 ", every, "unknown key `sead`"),
         ("cavity_radius_mm = 0.4", "cavity_radius = 0.4", 1, "unknown key `cavity_radius`"),

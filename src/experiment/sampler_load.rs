@@ -21,7 +21,7 @@ const OF_SCENES: [&str; 6] = ["bands", "object", "sensor", "light", "estimator",
 pub fn is_on_samplers(path: &Path, text: &str) -> bool {
     let Ok(root) = document::parse(&path.display().to_string(), text) else { return false };
     let has = |key: &&str| root.get(key).is_some();
-    has(&"sampler") && !OF_SCENES.iter().any(|key| has(key))
+    has(&"sampler") && !OF_SCENES.iter().any(has)
 }
 
 /// Reads, overrides and validates the experiment in `text`, which stands at `path`.

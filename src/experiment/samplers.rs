@@ -259,7 +259,7 @@ impl Distribution {
 pub struct Facets {
     /// Shape of the distribution.
     pub distribution: Distribution,
-    /// Roughness.
+    /// Roughness of the facets.
     #[schemars(range(min = 0.001, max = 1.0))]
     pub alpha: f64,
 }
@@ -276,7 +276,7 @@ impl Facets {
 pub struct SeenFacets {
     /// Shape of the distribution.
     pub distribution: Distribution,
-    /// Roughness.
+    /// Roughness of the facets.
     #[schemars(range(min = 0.001, max = 1.0))]
     pub alpha: f64,
     /// Cosine of the view.
@@ -312,7 +312,7 @@ impl ViewSide {
 pub struct Rough {
     /// Shape of the distribution.
     pub distribution: Distribution,
-    /// Roughness.
+    /// Roughness of the facets.
     #[schemars(range(min = 0.001, max = 1.0))]
     pub alpha: f64,
     /// Index inside over outside, not 1.

@@ -204,10 +204,8 @@ impl Counting<'_> {
         let leaf = self.partition.leaf(piece, at)?;
         let density = self.sampler.density(piece, at);
         let difference = (own - density).abs();
-        // Written so that a NaN differs.
-        if !(difference <= OWN_DENSITY * density.abs()) {
-            counts.differs += 1;
-        }
+        let agrees = difference <= OWN_DENSITY * density.abs(); // a NaN does not
+        counts.differs += u64::from(!agrees);
         let relative = if difference == 0.0 { 0.0 } else { difference / density.abs() };
         counts.largest = if relative <= 1e300 { counts.largest.max(relative) } else { 1e300 };
         (density > 0.0 && density.is_finite()).then_some(leaf)
