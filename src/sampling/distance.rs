@@ -63,7 +63,7 @@ pub fn pdf_distance_truncated_exponential(sigma_t: f64, t_max: f64, t: f64) -> f
 ///   t = L sin(u span) / sin(near + u span) = L sin(u span) / sin(rest + (1 - u) span).
 /// A sine is that of what is left to half a turn; of the two arguments the smaller is a sum of positive
 /// terms below a quarter turn. So there is no difference of near numbers at either end, nor close to a point
-/// on the line, for t_max infinite (rest = 0) as for a short segment far away. rest = atan2(D, t_max - delta); span = atan2(t_max D, L^2 - delta t_max), or
+/// on the line, for t_max infinite (rest = 0) as for a short segment far away. rest = atan2(D, t_max - delta); span = atan2(t_max D, D^2 - delta (t_max - delta)), or
 /// atan2(D, -delta) for the infinite ray.
 ///
 /// A point on the line would leave no density anywhere else: D is never below [`Equiangular::CLAMP`] L,
@@ -102,7 +102,8 @@ impl Equiangular {
         let (span, rest) = if t_max == f64::INFINITY {
             (atan2(distance, -delta), 0.0)
         } else {
-            (atan2(t_max * distance, far2 - delta * t_max), atan2(distance, t_max - delta))
+            let beyond = t_max - delta;
+            (atan2(t_max * distance, distance * distance - delta * beyond), atan2(distance, beyond))
         };
         let (far, near) = (far2.sqrt(), atan2(distance, delta));
         let is_seen = far2 > 0.0 && span > f64::MIN_POSITIVE;
