@@ -70,9 +70,9 @@ pub fn builtin() -> Vec<SamplerEntry> {
         entry!("rough_dielectric", "the rough dielectric as a whole: reflection, refraction, total reflection",
             Rough => |o| o.sampler()),
         entry!("smooth_dielectric", "which lobe of the smooth dielectric, with exact directions",
-            Smooth => |o| Ok(SmoothSampler::smooth(o.eta, o.view.cos(o.cos)))),
+            Smooth => |o| Ok(SmoothSampler::smooth(o.eta, o.view.signed(o.cos)))),
         entry!("matched_boundary", "the boundary that is none: straight through",
-            View => |o| Ok(SmoothSampler::matched(o.view.cos(o.cos)))),
+            View => |o| Ok(SmoothSampler::matched(o.view.signed(o.cos)))),
         entry!("solid_angle_light", "directions to a cap of uniform radiance, up to the whole sphere",
             Cap => |o| Ok(CapSampler::new(o.solid_angle_sr))),
         entry!("lat_long_light", "directions to a latitude-longitude map with a bright spot and a black part",
@@ -301,7 +301,7 @@ pub enum ViewSide {
 }
 
 impl ViewSide {
-    fn cos(self, cos: f64) -> f64 {
+    fn signed(self, cos: f64) -> f64 {
         if self == ViewSide::Outside { cos } else { -cos }
     }
 }
@@ -333,7 +333,7 @@ impl Rough {
             ));
         }
         let facets = self.distribution.facets(self.alpha);
-        Ok(RoughSampler::new(self.eta, facets, self.view.cos(self.cos)))
+        Ok(RoughSampler::new(self.eta, facets, self.view.signed(self.cos)))
     }
 }
 

@@ -33,9 +33,10 @@ impl Sampler for CapSampler {
         // |wi - n|^2 / 2 = 1 - cos, with all its digits in a small cap.
         let below = 0.5 * (sample.wi - self.frame.n).length_squared();
         let local = self.frame.to_local(sample.wi);
-        let at = [(below / self.height).min(1.0 + 1e-9), turns(local.x, local.y)];
-        // A direction within rounding of the rim is inside.
-        let at = [if at[0] < 1.0 + 1e-11 { at[0].min(1.0) } else { at[0] }, at[1]];
+        let x = below / self.height;
+        // A direction within rounding of the rim is inside, one farther out is not.
+        let x = if x < 1.0 + 1e-11 { x.min(1.0) } else { x };
+        let at = [x, turns(local.x, local.y)];
         let density = sample.pdf.unwrap_or(0.0) * TAU * self.height;
         Draw::Point { piece: 0, at, density }
     }
@@ -73,10 +74,11 @@ impl LatLongSampler {
         let texel = |row: usize, column: usize| {
             let is_black = row >= height / 2 && column >= width / 2 && row + 1 < height;
             let is_spot = row == 1 && column == width - 1;
+            let is_polar = row == 0 || row + 1 == height;
             match () {
                 _ if is_spot => 1000.0,
                 _ if is_black => 0.0,
-                _ => 1.0 + (row + column % 3) as f64 + if row % (height - 1) == 0 { 20.0 } else { 0.0 },
+                _ => 1.0 + (row + column % 3) as f64 + if is_polar { 20.0 } else { 0.0 },
             }
         };
         let plane = (0..width * height).map(|k| texel(k / width, k % width)).collect();

@@ -36,12 +36,12 @@ impl HenyeyGreensteinSampler {
     }
 
     /// 1 - |cosine to the peak| at a chart coordinate.
-    fn distance_to_pole(&self, x: f64) -> f64 {
+    fn below_pole(&self, x: f64) -> f64 {
         (self.scale * exp_m1(self.length * x)).min(2.0)
     }
 
     fn mu(&self, x: f64) -> f64 {
-        let mu = 1.0 - self.distance_to_pole(x);
+        let mu = 1.0 - self.below_pole(x);
         if self.phase.g < 0.0 { -mu } else { mu }
     }
 }
@@ -63,13 +63,25 @@ impl Sampler for HenyeyGreensteinSampler {
     }
 
     fn density(&self, _piece: usize, [x, _]: [f64; 2]) -> f64 {
-        self.phase.pdf(self.mu(x)) * TAU * self.length * (self.scale + self.distance_to_pole(x))
+        self.phase.pdf(self.mu(x)) * TAU * self.length * (self.scale + self.below_pole(x))
     }
 
     fn contrasts(&self) -> Vec<Contrast> {
         let g = self.phase.g;
         let poles = HenyeyGreensteinSampler::new(g);
         let mean_cosine = Contrast::of("mean cosine", Some(g), move |[x, _]| poles.mu(x));
-        vec![mean_cosine, Contrast::azimuth()]
+        let poles = HenyeyGreensteinSampler::new(g);
+        let is_forward = move |[x, _]: [f64; 2]| if poles.mu(x) > 0.0 { 1.0 } else { 0.0 };
+        let forward = Contrast::of("forward share", Some(forward_share(g)), is_forward);
+        vec![mean_cosine, forward, Contrast::azimuth()]
     }
+}
+
+/// The probability of mu > 0: int_0^1 (1 - g^2) / (2 (1 + g^2 - 2 g mu)^(3/2)) dmu
+/// = (1 - g^2) / (2g) (1 / (1 - g) - 1 / sqrt(1 + g^2)), and 1/2 + 3g/4 + O(g^3) near 0.
+fn forward_share(g: f64) -> f64 {
+    if g.abs() < 1e-4 {
+        return 0.5 + 0.75 * g;
+    }
+    (1.0 - g * g) / (2.0 * g) * (1.0 / (1.0 - g) - 1.0 / (1.0 + g * g).sqrt())
 }

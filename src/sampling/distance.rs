@@ -61,9 +61,9 @@ pub fn pdf_distance_truncated_exponential(sigma_t: f64, t_max: f64, t: f64) -> f
 /// what lies beyond it under `rest`, in all half a turn. A sample divides the span in the ratio u, and by
 /// the law of sines
 ///   t = L sin(u span) / sin(near + u span) = L sin(u span) / sin(rest + (1 - u) span).
-/// Of the two arguments the smaller is a sum of positive terms below a quarter turn: no difference of near
-/// numbers at either end, nor close to a point on the line, for t_max infinite (rest = 0) as for a short
-/// segment far away. rest = atan2(D, t_max - delta); span = atan2(t_max D, L^2 - delta t_max), or
+/// A sine is that of what is left to half a turn; of the two arguments the smaller is a sum of positive
+/// terms below a quarter turn. So there is no difference of near numbers at either end, nor close to a point
+/// on the line, for t_max infinite (rest = 0) as for a short segment far away. rest = atan2(D, t_max - delta); span = atan2(t_max D, D^2 - delta (t_max - delta)), or
 /// atan2(D, -delta) for the infinite ray.
 ///
 /// A point on the line would leave no density anywhere else: D is never below [`Equiangular::CLAMP`] L,
@@ -102,7 +102,8 @@ impl Equiangular {
         let (span, rest) = if t_max == f64::INFINITY {
             (atan2(distance, -delta), 0.0)
         } else {
-            (atan2(t_max * distance, far2 - delta * t_max), atan2(distance, t_max - delta))
+            let beyond = t_max - delta;
+            (atan2(t_max * distance, distance * distance - delta * beyond), atan2(distance, beyond))
         };
         let (far, near) = (far2.sqrt(), atan2(distance, delta));
         let is_seen = far2 > 0.0 && span > f64::MIN_POSITIVE;
@@ -113,8 +114,9 @@ impl Equiangular {
     #[inline]
     pub fn sample(&self, u: f64) -> f64 {
         let seen = u * self.span;
-        let opposite = (self.near + seen).min(self.rest + (1.0 - u) * self.span);
-        (self.far * sin(seen) / sin(opposite)).min(self.t_max)
+        let beyond = self.rest + (1.0 - u) * self.span;
+        let opposite = (self.near + seen).min(beyond);
+        (self.far * sin(seen.min(self.near + beyond)) / sin(opposite)).min(self.t_max)
     }
 
     /// Density of [`Self::sample`] per mm, D / (span (D^2 + (t - delta)^2)); 0 outside [0, t_max].
@@ -264,14 +266,16 @@ mod tests {
         for [delta, distance, t_max] in EQUIANGULAR {
             let sampler = Equiangular::new(delta, distance, t_max).expect("seen");
             let d = distance.max(1e-9 * delta.hypot(distance));
-            let angle = |t: f64| atan2(t * d, delta * delta + d * d - delta * t);
+            // L^2 - delta t, in a form whose digits survive near the point.
+            let angle = |t: f64| atan2(t * d, d * d - delta * (t - delta));
             let span = if t_max.is_finite() { angle(t_max) } else { atan2(d, -delta) };
             for u in grid() {
                 let t = sampler.sample(u);
                 assert!((0.0..=t_max).contains(&t));
-                // Near the point F rises by `pdf` over one millimetre: t's own rounding, and that of the
-                // products in `angle`, are all that comes on top.
-                let rounding = 8.0 * f64::EPSILON * t * sampler.pdf_distance(t);
+                // F rises by `pdf` a millimetre, steeply near the point, where t's own rounding is what
+                // comes on top; a sine of an angle x passes the angle's rounding on by cot(x) < 1/x.
+                let opposite = atan2(d, (t - delta).abs());
+                let rounding = 4.0 * f64::EPSILON * t * (1.0 + 1.0 / opposite) * sampler.pdf_distance(t);
                 let error = (angle(t) / span - u).abs();
                 assert!(error < 1e-12 + rounding, "{delta} {distance} {t_max} {u}: {error}");
             }
