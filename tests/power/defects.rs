@@ -1,0 +1,289 @@
+//! The catalogue of planted defects: where each stands, and which tests are expected to see it.
+
+use std::sync::OnceLock;
+
+/// What may be wrong. Every place that can hold a defect asks for its own by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Defect {
+    /// Nothing: the sham, which must be green.
+    None,
+    CosineMissing,
+    EtaSquaredMissingInEval,
+    EtaSquaredMissingOnEntry,
+    EtaSquaredMissingBothWays,
+    EtaInvertedInHalfVector,
+    FresnelSideSwapped,
+    ReflectionJacobian,
+    SampleCountMissing,
+    LightChoiceMissing,
+    LightForgotten,
+    MisOmitsInterface,
+    MisSampleCountWrong,
+    FlightDensity,
+    RouletteUncompensated,
+    ContributionClamped,
+    PhaseFlipped,
+    PhaseNormalisation,
+    FailuresRedrawn,
+    TotalReflectionDropped,
+    DepthCutOff,
+    ShadingNormal,
+    ShadowIgnored,
+    AbsoluteEpsilon,
+    SinglePrecision,
+    PathDropped,
+    PathTwice,
+    PassesShareStream,
+    PurposesShareStream,
+    OtherBand,
+    BandMissing,
+    SineMissing,
+    EnvironmentScaled,
+    NotANumber,
+    ClassesSwapped,
+}
+
+/// One row of the catalogue.
+#[derive(Clone, Copy, Debug)]
+pub struct Planted {
+    /// Its name on the command line and in tables.
+    pub name: &'static str,
+    /// The defect.
+    pub defect: Defect,
+    /// What is wrong, in one line.
+    pub what: &'static str,
+    /// The tests, `experiment.claim` or `identity NAME`, of which each is expected to see it.
+    pub expected: &'static [&'static str],
+}
+
+const fn row(
+    name: &'static str,
+    defect: Defect,
+    what: &'static str,
+    expected: &'static [&'static str],
+) -> Planted {
+    Planted { name, defect, what, expected }
+}
+
+/// Every defect of the path tracer.
+pub const TRACER: &[Planted] = &[
+    row(
+        "cosine-missing",
+        Defect::CosineMissing,
+        "light samples at a rough surface lack the cosine",
+        &["rough.sun", "identity sample-weight"],
+    ),
+    row(
+        "eta2-missing-in-eval",
+        Defect::EtaSquaredMissingInEval,
+        "the value of rough refraction lacks radiance's eta^2, its sampling has it",
+        &["rough.sun", "identity reciprocity", "identity sample-weight"],
+    ),
+    row(
+        "eta2-missing-on-entry",
+        Defect::EtaSquaredMissingOnEntry,
+        "refraction into the body lacks radiance's eta^2, refraction out of it has it",
+        &["furnace.smooth", "slab.UR1", "slab.UT1", "rough.sun", "identity reciprocity"],
+    ),
+    row(
+        "eta2-missing-both-ways",
+        Defect::EtaSquaredMissingBothWays,
+        "radiance's eta^2 is missing at every refraction: it cancels for a sensor and a light outside",
+        &["identity reciprocity"],
+    ),
+    row(
+        "eta-inverted",
+        Defect::EtaInvertedInHalfVector,
+        "the half vector of rough refraction is made with 1/eta",
+        &["rough.sun", "identity sample-density"],
+    ),
+    row(
+        "fresnel-side-swapped",
+        Defect::FresnelSideSwapped,
+        "reflectance is computed with the index of the other side",
+        &["slab.UR1", "slab.UT1", "rough.sun", "identity fresnel"],
+    ),
+    row(
+        "reflection-jacobian",
+        Defect::ReflectionJacobian,
+        "the density of rough refraction has reflection's Jacobian 1 / (4 |w.h|)",
+        &["rough.sun", "identity normalisation"],
+    ),
+    row(
+        "sample-count-missing",
+        Defect::SampleCountMissing,
+        "two light samples a vertex are added up, not averaged",
+        &["rough.sun", "matched.sun"],
+    ),
+    row(
+        "light-choice-missing",
+        Defect::LightChoiceMissing,
+        "light samples are not divided by the probability of the light",
+        &["rough.sun", "rough.lamp", "matched.sun"],
+    ),
+    row(
+        "light-forgotten",
+        Defect::LightForgotten,
+        "the last light is never chosen",
+        &["rough.lamp", "matched.sky"],
+    ),
+    row(
+        "mis-omits-interface",
+        Defect::MisOmitsInterface,
+        "the MIS denominator of light samples lacks the interface's (the phase function's) density",
+        &["rough.lamp", "matched.sky", "furnace.matched"],
+    ),
+    row(
+        "mis-sample-count",
+        Defect::MisSampleCountWrong,
+        "MIS weighs interface samples as if one light sample were drawn, not two",
+        &["rough.lamp", "matched.sky", "furnace.matched"],
+    ),
+    row(
+        "flight-density",
+        Defect::FlightDensity,
+        "a flight to the boundary has the density sigma_t T in MIS, not the probability T",
+        &["furnace.matched"],
+    ),
+    row(
+        "roulette-uncompensated",
+        Defect::RouletteUncompensated,
+        "survivors of roulette are not divided by their probability",
+        &["slab.UR1", "rough.multiple"],
+    ),
+    row(
+        "contribution-clamped",
+        Defect::ContributionClamped,
+        "no contribution is above a third of the light's strength",
+        &["rough.sun"],
+    ),
+    row(
+        "phase-flipped",
+        Defect::PhaseFlipped,
+        "the phase function scatters about -g",
+        &["slab.UR1", "matched.single"],
+    ),
+    row(
+        "phase-normalisation",
+        Defect::PhaseNormalisation,
+        "the phase function's density has 1/(2 pi) for 1/(4 pi)",
+        &["matched.sun", "furnace.matched"],
+    ),
+    row(
+        "failures-redrawn",
+        Defect::FailuresRedrawn,
+        "microfacet samples that fail are drawn again",
+        &["rough.multiple"],
+    ),
+    row(
+        "tir-dropped",
+        Defect::TotalReflectionDropped,
+        "totally reflected paths end",
+        &["furnace.smooth", "slab.UR1"],
+    ),
+    row(
+        "depth-cut-off",
+        Defect::DepthCutOff,
+        "paths end after 32 scattering events",
+        &["slab.UT1"],
+    ),
+    row(
+        "shading-normal",
+        Defect::ShadingNormal,
+        "the side of a direction is asked of the shading normal alone",
+        &["mesh.sun"],
+    ),
+    row(
+        "shadow-ignored",
+        Defect::ShadowIgnored,
+        "light samples are not tested for occlusion by the body",
+        &["mesh.sun"],
+    ),
+    row(
+        "absolute-epsilon",
+        Defect::AbsoluteEpsilon,
+        "rays start 1e-4 mm off their surface",
+        &["scale.same"],
+    ),
+    row(
+        "single-precision",
+        Defect::SinglePrecision,
+        "scores add up in f32",
+        &["furnace.smooth"],
+    ),
+    row("path-dropped", Defect::PathDropped, "one path a pass is not scored", &["furnace.smooth"]),
+    row("path-twice", Defect::PathTwice, "one path a pass is scored twice", &["furnace.smooth"]),
+    row(
+        "passes-share-stream",
+        Defect::PassesShareStream,
+        "every pass has the random numbers of the first",
+        &["rough.sun", "slab.UR1"],
+    ),
+    row(
+        "purposes-share-stream",
+        Defect::PurposesShareStream,
+        "light samples have the random numbers of the walk",
+        &["rough.multiple"],
+    ),
+    row(
+        "other-band",
+        Defect::OtherBand,
+        "every band has the albedo of the first",
+        &["rough.multiple"],
+    ),
+    row("band-missing", Defect::BandMissing, "the last of several bands is not played", &["rough.sun"]),
+    row(
+        "sine-missing",
+        Defect::SineMissing,
+        "the density of a latitude-longitude map lacks its sine",
+        &["map.sky"],
+    ),
+    row(
+        "environment-scaled",
+        Defect::EnvironmentScaled,
+        "light that a path meets by itself counts 0.1 % too much",
+        &["furnace.smooth"],
+    ),
+    row(
+        "not-a-number",
+        Defect::NotANumber,
+        "one path in a thousand scores NaN",
+        &["rough.sun", "slab.UR1"],
+    ),
+    row(
+        "classes-swapped",
+        Defect::ClassesSwapped,
+        "single and multiple scattering change names",
+        &["rough.single", "rough.multiple", "matched.single"],
+    ),
+];
+
+static PLANTED: OnceLock<Defect> = OnceLock::new();
+
+/// Plants a defect in this process, once and for all.
+pub fn plant(defect: Defect) {
+    assert!(PLANTED.set(defect).is_ok(), "one defect a process");
+}
+
+/// The defect of this process.
+pub fn planted() -> Defect {
+    *PLANTED.get().unwrap_or(&Defect::None)
+}
+
+/// No defect: everything has to be green.
+pub const SHAM: Planted = row("sham", Defect::None, "nothing is wrong", &[]);
+
+/// The sham, then every defect.
+pub fn all() -> Vec<Planted> {
+    std::iter::once(SHAM).chain(TRACER.iter().copied()).collect()
+}
+
+/// All names.
+pub fn names() -> Vec<&'static str> {
+    all().iter().map(|row| row.name).collect()
+}
+
+/// The defect of a name.
+pub fn named(name: &str) -> Option<Defect> {
+    all().into_iter().find(|row| row.name == name).map(|row| row.defect)
+}

@@ -1,0 +1,125 @@
+//! Plays of defects: child processes, as many at once as there are cores, and what their verdicts were.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+use std::time::Instant;
+
+use scatterproof::results::exr_file::write_exr;
+use scatterproof::results::image::Picture;
+use scatterproof::results::json::hash_bytes;
+use scatterproof::results::npy::Array;
+use scatterproof::results::record::Band;
+
+use super::defects::Planted;
+use super::identities;
+
+/// What `verify` said of one defect with one seed.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Exit code; -1 where a signal ended it.
+    pub exit: i32,
+    /// Tests, and whether each was anything but green.
+    pub tests: BTreeMap<String, bool>,
+    /// What it wrote, for people.
+    pub said: String,
+    /// Wall time, seconds.
+    pub seconds: f64,
+}
+
+impl Outcome {
+    /// The tests that were not green.
+    pub fn caught(&self) -> BTreeSet<&str> {
+        self.tests.iter().filter(|(_, caught)| **caught).map(|(name, _)| name.as_str()).collect()
+    }
+}
+
+/// The experiments of this folder, in the order of their names.
+const EXPERIMENTS: [(&str, &str); 7] = [
+    ("furnace.toml", include_str!("furnace.toml")),
+    ("map.toml", include_str!("map.toml")),
+    ("matched.toml", include_str!("matched.toml")),
+    ("mesh.toml", include_str!("mesh.toml")),
+    ("rough.toml", include_str!("rough.toml")),
+    ("scale.toml", include_str!("scale.toml")),
+    ("slab.toml", include_str!("slab.toml")),
+];
+
+/// A sky of 8 x 4 texels, dim but for one next to the zenith.
+fn write_sky(path: &Path) {
+    let bands = [Band { name: "R".into(), range_nm: None, display_rgb: [1.0; 3] }];
+    let mut texels = vec![0.1; 64];
+    texels[1] = 3.0;
+    write_exr(path, &Picture::new(&bands, &Array::new(vec![2, 4, 8, 1], texels)), &[]).expect("a sky");
+}
+
+/// Plays every (defect, number of the seed), and tells of each as it ends.
+pub fn all(plays: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcome)) {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in EXPERIMENTS {
+        fs::write(folder.path().join(name), text).expect("an experiment");
+    }
+    write_sky(&folder.path().join("sky.exr"));
+    let next = AtomicUsize::new(0);
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    let (send, receive) = mpsc::channel();
+    let send = Mutex::new(send);
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            let send = send.lock().expect("a sender").clone();
+            let (next, folder) = (&next, folder.path());
+            scope.spawn(move || {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some((row, seed)) = plays.get(index) else { return };
+                    let outcome = play(row, *seed, folder, index);
+                    send.send((index, outcome)).expect("somebody listens");
+                }
+            });
+        }
+        drop(send);
+        for (index, outcome) in receive {
+            let (row, seed) = &plays[index];
+            tell(row, *seed, &outcome);
+        }
+    });
+}
+
+/// One play: `verify` on all experiments in a child process, then the identities.
+fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
+    let out = folder.join(format!("play-{index}"));
+    let junit = out.with_extension("xml");
+    let mut command = Command::new(std::env::current_exe().expect("this program"));
+    command.args(["defect", row.name, "verify", "--quiet", "--threads", "1", "--out"]).arg(&out);
+    command.arg("--junit").arg(&junit).arg("--set").arg(format!("seed={}", seed(row.name, number)));
+    command.args(EXPERIMENTS.map(|(name, _)| folder.join(name)));
+    let begun = Instant::now();
+    let output = command.stdin(Stdio::null()).output().expect("this program starts");
+    let seconds = begun.elapsed().as_secs_f64();
+    let mut tests = junit_tests(&fs::read_to_string(&junit).unwrap_or_default());
+    tests.extend(identities::all(row.defect));
+    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    let _ = fs::remove_dir_all(&out); // thousands of records would fill the disc
+    Outcome { exit: output.status.code().unwrap_or(-1), tests, said: said.into_owned(), seconds }
+}
+
+/// The seed of a play: a hash of its name, below 2^53.
+fn seed(name: &str, number: u64) -> u64 {
+    let hash = hash_bytes(format!("power/{name}/{number}").as_bytes());
+    u64::from_le_bytes(std::array::from_fn(|i| hash[i])) >> 11
+}
+
+/// `experiment.claim` -> whether any of its verdicts was not green.
+fn junit_tests(xml: &str) -> BTreeMap<String, bool> {
+    let mut tests = BTreeMap::new();
+    for line in xml.lines() {
+        let Some((_, rest)) = line.split_once("<testcase classname=\"") else { continue };
+        let Some((name, _)) = rest.split_once('"') else { continue };
+        *tests.entry(name.to_string()).or_default() |= !line.ends_with("/>");
+    }
+    tests
+}
