@@ -173,7 +173,7 @@ pub const TRACER: &[Planted] = &[
         "failures-redrawn",
         Defect::FailuresRedrawn,
         "microfacet samples that fail are drawn again",
-        &["rough.multiple"],
+        &["sky.sphere"],
     ),
     row(
         "tir-dropped",
@@ -191,13 +191,13 @@ pub const TRACER: &[Planted] = &[
         "shading-normal",
         Defect::ShadingNormal,
         "the side of a direction is asked of the shading normal alone",
-        &["mesh.sun"],
+        &["sky.bumpy"],
     ),
     row(
         "shadow-ignored",
         Defect::ShadowIgnored,
         "light samples are not tested for occlusion by the body",
-        &["mesh.sun"],
+        &["sky.cavity"],
     ),
     row(
         "absolute-epsilon",
@@ -222,8 +222,8 @@ pub const TRACER: &[Planted] = &[
     row(
         "purposes-share-stream",
         Defect::PurposesShareStream,
-        "light samples have the random numbers of the walk",
-        &["rough.multiple"],
+        "light samples have the random numbers of the walk: a short flight chooses the sun",
+        &["matched.single"],
     ),
     row(
         "other-band",
@@ -269,6 +269,9 @@ pub fn plant(defect: Defect) {
 pub fn planted() -> Defect {
     *PLANTED.get().unwrap_or(&Defect::None)
 }
+
+/// Defects that no claim can see, and the unit test that holds the code to the opposite.
+pub const UNIT_TESTED: &[(&str, &str)] = &[];
 
 /// No defect: everything has to be green.
 pub const SHAM: Planted = row("sham", Defect::None, "nothing is wrong", &[]);

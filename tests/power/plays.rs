@@ -23,18 +23,40 @@ use super::identities;
 pub struct Outcome {
     /// Exit code; -1 where a signal ended it.
     pub exit: i32,
-    /// Tests, and whether each was anything but green.
-    pub tests: BTreeMap<String, bool>,
+    /// Tests, and what each saw: the worst of its verdicts.
+    pub tests: BTreeMap<String, Seen>,
     /// What it wrote, for people.
     pub said: String,
     /// Wall time, seconds.
     pub seconds: f64,
 }
 
+/// What a test saw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Seen {
+    /// Nothing.
+    Green,
+    /// Nothing, and too little for what its claim wants: no evidence of a defect either.
+    Underpowered,
+    /// A failure, or that the record is worth nothing.
+    Defect,
+}
+
 impl Outcome {
-    /// The tests that were not green.
+    /// The tests that saw a defect.
     pub fn caught(&self) -> BTreeSet<&str> {
-        self.tests.iter().filter(|(_, caught)| **caught).map(|(name, _)| name.as_str()).collect()
+        let caught = self.tests.iter().filter(|(_, seen)| **seen == Seen::Defect);
+        caught.map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// `verify` came to a verdict, whatever it is.
+    pub fn is_verdict(&self) -> bool {
+        matches!(self.exit, 0 | 1 | 3) && self.tests.keys().any(|name| name.contains('.'))
+    }
+
+    /// Every test is green.
+    pub fn is_green(&self) -> bool {
+        !self.tests.is_empty() && self.tests.values().all(|seen| *seen == Seen::Green)
     }
 }
 
@@ -43,9 +65,9 @@ const EXPERIMENTS: [(&str, &str); 7] = [
     ("furnace.toml", include_str!("furnace.toml")),
     ("map.toml", include_str!("map.toml")),
     ("matched.toml", include_str!("matched.toml")),
-    ("mesh.toml", include_str!("mesh.toml")),
     ("rough.toml", include_str!("rough.toml")),
     ("scale.toml", include_str!("scale.toml")),
+    ("sky.toml", include_str!("sky.toml")),
     ("slab.toml", include_str!("slab.toml")),
 ];
 
@@ -101,7 +123,8 @@ fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
     let output = command.stdin(Stdio::null()).output().expect("this program starts");
     let seconds = begun.elapsed().as_secs_f64();
     let mut tests = junit_tests(&fs::read_to_string(&junit).unwrap_or_default());
-    tests.extend(identities::all(row.defect));
+    let seen = |broken| if broken { Seen::Defect } else { Seen::Green };
+    tests.extend(identities::all(row.defect).into_iter().map(|(name, broken)| (name, seen(broken))));
     let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
     let _ = fs::remove_dir_all(&out); // thousands of records would fill the disc
     Outcome { exit: output.status.code().unwrap_or(-1), tests, said: said.into_owned(), seconds }
@@ -113,13 +136,25 @@ fn seed(name: &str, number: u64) -> u64 {
     u64::from_le_bytes(std::array::from_fn(|i| hash[i])) >> 11
 }
 
-/// `experiment.claim` -> whether any of its verdicts was not green.
-fn junit_tests(xml: &str) -> BTreeMap<String, bool> {
+/// `experiment.claim` -> the worst of its verdicts.
+fn junit_tests(xml: &str) -> BTreeMap<String, Seen> {
     let mut tests = BTreeMap::new();
+    let mut name = None;
+    let mut note = |name: &Option<String>, seen: Seen| {
+        if let Some(name) = name.clone() {
+            let worst = tests.entry(name).or_insert(Seen::Green);
+            *worst = seen.max(*worst);
+        }
+    };
     for line in xml.lines() {
-        let Some((_, rest)) = line.split_once("<testcase classname=\"") else { continue };
-        let Some((name, _)) = rest.split_once('"') else { continue };
-        *tests.entry(name.to_string()).or_default() |= !line.ends_with("/>");
+        if let Some((_, rest)) = line.split_once("<testcase classname=\"") {
+            name = rest.split_once('"').map(|(name, _)| name.to_string());
+            note(&name, Seen::Green);
+        } else if line.contains("type=\"underpowered\"") {
+            note(&name, Seen::Underpowered);
+        } else if line.contains("<failure ") || line.contains("<error ") {
+            note(&name, Seen::Defect);
+        }
     }
     tests
 }
