@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use crate::error::Result;
 use crate::report;
 use crate::results::store::RecordFolder;
-use crate::verify::judge::FAMILY_LEVEL;
 
 /// Make tables, images and pages again, from records alone.
 #[derive(clap::Args, Debug)]
@@ -21,7 +20,7 @@ pub struct Args {
 /// No record, a damaged one, I/O.
 pub fn run(args: &Args) -> Result<u8> {
     for folder in &args.folders {
-        report::write(&RecordFolder::new(folder), FAMILY_LEVEL)?;
+        report::write(&RecordFolder::new(folder))?;
         println!("{}", folder.join("report.html").display());
         println!("{}", folder.join("report.md").display());
     }

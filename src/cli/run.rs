@@ -7,7 +7,6 @@ use crate::error::Result;
 use crate::experiment::load;
 use crate::experiment::registry::Registry;
 use crate::report::{self, terminal};
-use crate::verify::judge::FAMILY_LEVEL;
 
 /// Run experiments: progress on a terminal, then a table and the place of the report.
 ///
@@ -34,7 +33,7 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     let experiments = args.files.iter().map(read).collect::<Result<Vec<_>>>()?;
     for experiment in &experiments {
         let (folder, _) = crate::run::run(experiment, registry, &options, &interrupt)?;
-        let material = report::write(&folder, FAMILY_LEVEL)?;
+        let material = report::write(&folder)?;
         print!("{}", terminal::run_table(&material).to_text());
         for note in terminal::notes(&material) {
             println!("note: {note}");

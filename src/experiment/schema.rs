@@ -18,9 +18,14 @@ pub struct ExperimentFile {
     /// What the experiment shows, for reports.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub description: Option<String>,
-    /// Root of all random streams.
+    /// Root of all random streams, where another sample is wanted; without it the experiment's name and
+    /// content alone name its streams.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 9223372036854775807u64))]
-    pub seed: u64,
+    pub seed: Option<u64>,
+    /// A text that enters the name of every stream, as `verify --fresh-seed` sets it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fresh: Option<String>,
     /// The wavelength bands; each is rendered by itself.
     pub bands: Bands,
     /// The body.

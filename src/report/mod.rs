@@ -11,7 +11,7 @@ use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::timing::Timing;
 use crate::results::{atomic, json::canonical};
-use crate::verify::judge::judge;
+use crate::verify::judge::{Case, Looks, judge};
 use crate::verify::verdict::{self, Verdict};
 
 /// Bytes as text, for data URIs.
@@ -60,25 +60,23 @@ pub struct Figure {
 }
 
 /// Makes every derived view of a results folder: `measurements.csv`, `verdicts.csv`, `summary.json`,
-/// `images/`, `report.md` and `report.html`. The record is judged as a family of its own at `level`.
-pub fn write(folder: &RecordFolder, level: f64) -> Result<Material> {
+/// `images/`, `report.md` and `report.html`. The record is judged by itself, with the second look that a
+/// verification may have left beside it.
+pub fn write(folder: &RecordFolder) -> Result<Material> {
     let stored = folder.read()?;
-    let verdicts = judge(&[&stored], level);
-    write_judged(folder, stored, verdicts, level)
+    let retest = folder.retest_of(&stored)?;
+    let looks = if retest.is_some() { Looks::Two } else { Looks::One };
+    let verdicts = judge(&[Case { main: &stored, retest: retest.as_ref() }], looks).verdicts;
+    write_judged(folder, stored, verdicts)
 }
 
-/// The same with verdicts at hand: those of this record, from a family of several judged at `level`.
-pub fn write_judged(
-    folder: &RecordFolder,
-    stored: Stored,
-    verdicts: Vec<Verdict>,
-    level: f64,
-) -> Result<Material> {
+/// The same with verdicts at hand: those of this record, from a family of several.
+pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict>) -> Result<Material> {
     let (timing, provenance) = (folder.read_timing()?, folder.read_provenance()?);
     let rows = measurements(&stored, timing.as_ref());
     let figures = write_figures(folder, &stored)?;
     let material = Material { stored, timing, provenance, verdicts, rows, figures };
-    let page = page::page(&material, level);
+    let page = page::page(&material);
     let views = [
         ("measurements.csv", measurements::to_csv(&material.rows)),
         ("verdicts.csv", verdict::to_csv(&material.verdicts)),
@@ -161,7 +159,6 @@ mod tests {
     use super::*;
     use crate::results::sample;
     use crate::results::timing::Cost;
-    use crate::verify::judge::FAMILY_LEVEL;
 
     #[test]
     fn views_are_made_from_the_folder_alone_and_again() {
@@ -179,7 +176,7 @@ mod tests {
         );
         folder.write_timing(&timing).expect("a timing");
         folder.write_provenance(&Provenance::collect(2)).expect("a provenance");
-        write(&folder, FAMILY_LEVEL).expect("a report");
+        write(&folder).expect("a report");
 
         let read = |name: &str| std::fs::read_to_string(folder.root().join(name)).expect(name);
         let (markdown, html) = (read("report.md"), read("report.html"));
@@ -198,7 +195,7 @@ mod tests {
         assert_eq!((&summary["verdicts"]["pass"], &summary["exit_code"]), (&json!(1), &json!(1)));
         assert_eq!(read("verdicts.csv").lines().count(), 3);
 
-        write(&folder, FAMILY_LEVEL).expect("a report");
+        write(&folder).expect("a report");
         assert_eq!((read("report.md"), read("report.html")), (markdown, html));
     }
 }

@@ -6,11 +6,12 @@ use super::document::{Block, Document, FigureBlock};
 use super::number::significant;
 use super::table::{Table, claim_table, measurement_table, verdict_table};
 use crate::results::measurements::Measurement;
+use crate::verify::levels::FAMILY_LEVEL;
 use crate::verify::verdict::Outcome;
 
 /// The page of one record.
-pub(super) fn page(material: &Material, level: f64) -> Document {
-    let mut blocks = claims(material, level);
+pub(super) fn page(material: &Material) -> Document {
+    let mut blocks = claims(material);
     blocks.extend(measured(material));
     blocks.extend(cost(material));
     blocks.extend(notes(material));
@@ -22,7 +23,7 @@ fn heading(text: &str) -> Block {
     Block::Heading(2, text.into())
 }
 
-fn claims(material: &Material, level: f64) -> Vec<Block> {
+fn claims(material: &Material) -> Vec<Block> {
     let verdicts = &material.verdicts;
     if verdicts.is_empty() {
         return vec![heading("Claims"), Block::Text("This experiment claims nothing.".into())];
@@ -31,7 +32,7 @@ fn claims(material: &Material, level: f64) -> Vec<Block> {
     let failed = verdicts.iter().filter(|v| v.outcome == Outcome::Fail).count();
     let text = format!(
         "{green} of {} comparisons hold, {failed} fail, {} could not be judged. The probability of any false \
-         failure among them is below {level:.0e} (Holm). \"detectable\" is the smallest true difference, relative \
+         failure in the verification that judged them is at most {FAMILY_LEVEL:.0e} (Holm). \"detectable\" is the smallest true difference, relative \
          to the expected value (absolute where that is 0), that its test would have found with 99 % probability.",
         verdicts.len(),
         verdicts.len() - green - failed,

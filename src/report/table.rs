@@ -184,7 +184,7 @@ mod tests {
     use super::*;
     use crate::results::measurements::measurements;
     use crate::results::sample;
-    use crate::verify::judge::{FAMILY_LEVEL, judge};
+    use crate::verify::judge::judge_alone;
 
     fn small() -> Table {
         let mut table = Table::new(&["name", "value", "nothing"]);
@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn claims_are_counted() {
-        let verdicts = judge(&[&sample::judged(&[("a", 1.0), ("b", 2.0), ("a", 2.0)])], FAMILY_LEVEL);
+        let verdicts = judge_alone(&sample::judged(&[("a", 1.0), ("b", 2.0), ("a", 2.0)]));
         assert_eq!(
             claim_table(&verdicts).rows,
             [["a", "2", "1", "1", "0", "0"], ["b", "1", "0", "1", "0", "0"]]
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn verdicts_show_what_they_could_see() {
-        let text = verdict_table(&judge(&[&sample::judged(&[("holds", 1.0)])], FAMILY_LEVEL)).to_text();
+        let text = verdict_table(&judge_alone(&sample::judged(&[("holds", 1.0)]))).to_text();
         assert!(text.contains("pass     holds  smooth  R     mis"), "{text}");
         assert!(text.contains(" %"), "{text}");
     }

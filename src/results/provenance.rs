@@ -90,6 +90,15 @@ pub fn build() -> &'static str {
     })
 }
 
+/// Today's date, UTC, and the commit of the checkout that this program was built from, as
+/// `2026-11-21 cf14d94`.
+pub fn today_and_commit() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (commit, _) = checkout(Path::new(env!("CARGO_MANIFEST_DIR")));
+    let commit = commit.map_or("unknown".to_string(), |c| c.chars().take(12).collect());
+    format!("{} {commit}", &utc(seconds)[..10])
+}
+
 /// What fixes the bits, as one line; records of different fingerprints are not merged.
 pub fn fingerprint() -> String {
     let crates: String =

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 /// Version of this layout; a reader refuses others.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// `record.json`: everything but the arrays, which stand in `.npy` files beside it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,6 +16,8 @@ pub struct Record {
     pub schema_version: u32,
     /// The experiment's name.
     pub experiment: String,
+    /// `main`, or `retest` for a second look on streams of its own.
+    pub stage: String,
     /// What fixes the bits: numerical version, crates, target (see `results::provenance`).
     pub fingerprint: String,
     /// blake3 of the resolved experiment without claims, hex.

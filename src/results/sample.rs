@@ -29,6 +29,7 @@ pub fn stored(noise: f64) -> Stored {
     let record = Record {
         schema_version: SCHEMA_VERSION,
         experiment: "sample".into(),
+        stage: "main".into(),
         fingerprint: "numerical-1".into(),
         experiment_hash: "e0".into(),
         resolved: json!({"display": {"exposure_stops": 0.0}, "name": "sample"}),

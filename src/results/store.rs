@@ -150,6 +150,26 @@ impl RecordFolder {
         }
     }
 
+    /// Where the second look at this record stands.
+    pub fn retest(&self) -> RecordFolder {
+        RecordFolder::new(self.root.join("retest"))
+    }
+
+    /// The second look at `main`, where there is one of that very experiment and build.
+    ///
+    /// # Errors
+    /// It is there and damaged.
+    pub fn retest_of(&self, main: &Stored) -> Result<Option<Stored>> {
+        let folder = self.retest();
+        if !folder.exists() {
+            return Ok(None);
+        }
+        let stored = folder.read()?;
+        let same = |f: fn(&Record) -> &str| f(&stored.record) == f(&main.record);
+        let fits = same(|r| &r.experiment_hash) && same(|r| &r.claims_hash) && same(|r| &r.fingerprint);
+        Ok(fits.then_some(stored))
+    }
+
     /// Writes `timing.json`.
     pub fn write_timing(&self, timing: &Timing) -> Result<()> {
         self.write_view("timing.json", canonical(timing).as_bytes())

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::job::{Finished, Job};
 use super::jobs::{Plan, named};
+use super::keys::Stage;
 use crate::error::Result;
 use crate::estimators::{self, Anomaly, Cost};
 use crate::experiment::Experiment;
@@ -62,6 +63,7 @@ pub fn assemble(experiment: &Experiment, plan: &Plan, finished: Vec<Finished>) -
     let record = Record {
         schema_version: SCHEMA_VERSION,
         experiment: experiment.file.name.clone(),
+        stage: plan.stage.name().into(),
         fingerprint: fingerprint(),
         experiment_hash: experiment_hash(experiment),
         resolved: experiment.resolved(),
@@ -90,7 +92,8 @@ fn estimator_run(
     let gates = gates_path(job.cell, name);
     arrays.insert(gates.clone(), Array::new(shape, data));
 
-    let image = job.layout.image().map(|(width, height)| {
+    let image = job.layout.image().filter(|_| job.stage == Stage::Main);
+    let image = image.map(|(width, height)| {
         let errors = finished.image.std_error();
         let mut data = finished.image.mean;
         data.extend(errors);

@@ -21,6 +21,10 @@ pub struct Job {
     pub label: String,
     /// Hash of all that its result depends on but the number of passes, hex.
     pub identity: String,
+    /// What its passes are for.
+    pub stage: Stage,
+    /// Their number, where it is not the budget's to say.
+    pub passes: Option<u64>,
     /// Plays passes.
     pub estimator: Box<dyn Estimator>,
     /// Its observables.
@@ -37,7 +41,7 @@ pub struct Job {
 pub struct Group {
     /// Their indices.
     pub bands: Vec<usize>,
-    /// Key of the run.
+    /// Key of the run, or of the second look.
     pub main: StreamKey,
     /// Key of the pilot.
     pub pilot: StreamKey,
@@ -155,7 +159,7 @@ impl Block {
 }
 
 impl Job {
-    /// Plays passes `start..end`; a pilot keeps no image. `stop` is asked between passes; a stopped block is dropped whole.
+    /// Plays passes `start..end`; only the run itself keeps an image. `stop` is asked between passes; a stopped block is dropped whole.
     pub fn play(
         &self,
         stage: Stage,
@@ -177,7 +181,7 @@ impl Job {
             for group in &self.groups {
                 let key = match stage {
                     Stage::Pilot => group.pilot,
-                    Stage::Main => group.main,
+                    Stage::Main | Stage::Retest => group.main,
                 };
                 self.estimator.pass(&group.bands, &key.pass(pass), &mut scores);
             }

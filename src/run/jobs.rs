@@ -29,6 +29,8 @@ pub struct Plan {
     pub comparisons: Vec<Comparison>,
     /// Kind of each estimator.
     pub kinds: Vec<String>,
+    /// What the passes are for.
+    pub stage: Stage,
     scene_bytes: usize,
     /// Passes per job, where the budget says them.
     passes: Option<u64>,
@@ -50,6 +52,11 @@ const MOST_OBSERVABLES: usize = 4096;
 /// Everything that only shows when it is built: meshes, maps, sensors inside bodies, claims on
 /// observables that do not exist.
 pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
+    plan_stage(experiment, registry, Stage::Main)
+}
+
+/// The same for the passes of `stage`.
+pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: Stage) -> Result<Plan> {
     let mut builder = Builder::new(experiment);
     let bands = builder.bands().to_vec();
     let inputs = build::inputs(experiment);
@@ -88,8 +95,9 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
             }
             let estimator = (registered.build)(options, Arc::clone(&scene))?;
             let groups = band_groups(estimator.band_use(), bands.len());
-            let groups =
-                groups.into_iter().map(|group| streams(experiment, cell, &bands, &entry.name, group));
+            let groups = groups
+                .into_iter()
+                .map(|group| streams(experiment, cell, &bands, &entry.name, group, stage));
             let label = match cell.label.as_str() {
                 "" => entry.name.clone(),
                 cell => format!("{cell} / {}", entry.name),
@@ -98,6 +106,8 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
                 "build": provenance::build(),
                 "experiment": experiment.file.name,
                 "seed": experiment.file.seed,
+                "fresh": experiment.file.fresh,
+                "stage": stage.name(),
                 "bands": bands,
                 "content": cell.content(),
                 "pair": experiment.file.pair,
@@ -109,6 +119,8 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
                 estimator_index,
                 label,
                 identity: hash_json(&identity),
+                stage,
+                passes: None,
                 groups: groups.collect(),
                 estimator,
                 layout: layout.clone(),
@@ -125,7 +137,7 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
     for job in &mut jobs {
         job.targets = targets(experiment, job, &comparisons, &observables[job.cell]);
     }
-    Ok(Plan { bands, jobs, comparisons, kinds, scene_bytes: builder.memory_bytes(), passes })
+    Ok(Plan { bands, jobs, comparisons, kinds, stage, scene_bytes: builder.memory_bytes(), passes })
 }
 
 fn streams(
@@ -134,17 +146,19 @@ fn streams(
     bands: &[Band],
     estimator: &str,
     group: Vec<usize>,
+    main: Stage,
 ) -> Group {
     let content = match &experiment.file.pair {
         Some(pair) => cell.content_without(&pair.over),
         None => cell.content(),
     };
     let names: Vec<&str> = group.iter().map(|&band| bands[band].name.as_str()).collect();
+    let fresh = experiment.file.fresh.as_deref();
     let key = |stage| {
         let (experiment, seed) = (experiment.file.name.as_str(), experiment.file.seed);
-        StreamName { experiment, seed, content: &content, bands: &names, estimator, stage }.key()
+        StreamName { experiment, seed, fresh, content: &content, bands: &names, estimator, stage }.key()
     };
-    Group { main: key(Stage::Main), pilot: key(Stage::Pilot), bands: group }
+    Group { main: key(main), pilot: key(Stage::Pilot), bands: group }
 }
 
 /// A layout's observables as the record names them.

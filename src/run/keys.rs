@@ -15,13 +15,17 @@ pub enum Stage {
     Pilot,
     /// The run itself.
     Main,
+    /// The second look at what failed in the first.
+    Retest,
 }
 
 impl Stage {
-    fn name(self) -> &'static str {
+    /// Its name in keys and records.
+    pub fn name(self) -> &'static str {
         match self {
             Stage::Pilot => "pilot",
             Stage::Main => "main",
+            Stage::Retest => "retest",
         }
     }
 }
@@ -32,8 +36,10 @@ impl Stage {
 pub struct StreamName<'a> {
     /// Name of the experiment.
     pub experiment: &'a str,
-    /// Its seed.
-    pub seed: u64,
+    /// Its seed, where it has one.
+    pub seed: Option<u64>,
+    /// What a fresh look mixes in.
+    pub fresh: Option<&'a str>,
     /// The cell's physics in canonical form, without the keys that the experiment pairs over.
     pub content: &'a Value,
     /// Names of the bands that the passes score.
@@ -47,7 +53,7 @@ pub struct StreamName<'a> {
 impl StreamName<'_> {
     /// The key of this sequence.
     pub fn key(&self) -> StreamKey {
-        let name = json!({
+        let mut name = json!({
             "version": KEY_VERSION,
             "experiment": self.experiment,
             "seed": self.seed,
@@ -56,6 +62,9 @@ impl StreamName<'_> {
             "estimator": self.estimator,
             "stage": self.stage.name(),
         });
+        if let Some(fresh) = self.fresh {
+            name["fresh"] = json!(fresh);
+        }
         StreamKey::new(hash_bytes(canonical(&name).as_bytes()))
     }
 }
@@ -75,7 +84,8 @@ mod tests {
         let (a, b) = (json!({"radius_mm": 1.0}), json!({"radius_mm": 2.0}));
         let base = StreamName {
             experiment: "x",
-            seed: 1,
+            seed: Some(1),
+            fresh: None,
             content: &a,
             bands: &["R"],
             estimator: "mis",
@@ -83,12 +93,15 @@ mod tests {
         };
         let variants = [
             StreamName { experiment: "y", ..base.clone() },
-            StreamName { seed: 2, ..base.clone() },
+            StreamName { seed: Some(2), ..base.clone() },
+            StreamName { seed: None, ..base.clone() },
+            StreamName { fresh: Some("monday"), ..base.clone() },
             StreamName { content: &b, ..base.clone() },
             StreamName { bands: &["G"], ..base.clone() },
             StreamName { bands: &["R", "G"], ..base.clone() },
             StreamName { estimator: "snee", ..base.clone() },
             StreamName { stage: Stage::Pilot, ..base.clone() },
+            StreamName { stage: Stage::Retest, ..base.clone() },
         ];
         assert_eq!(first(&base), first(&base.clone()));
         for variant in variants {

@@ -16,6 +16,7 @@ pub mod workers;
 
 mod assemble;
 mod jobs;
+mod retest;
 
 use std::path::{Path, PathBuf};
 
@@ -29,6 +30,7 @@ use progress::Progress;
 
 pub use jobs::{Plan, plan};
 pub use pilot::estimate_seconds;
+pub use retest::retest;
 
 /// How to run; nothing here changes a result.
 #[derive(Clone, Debug)]
@@ -68,21 +70,31 @@ pub fn run(
     interrupt: &Interrupt,
 ) -> Result<(RecordFolder, Stored)> {
     let plan = plan(experiment, registry)?;
+    play(experiment, &plan, &options.folder(&experiment.file.name), options, interrupt)
+}
+
+/// Plays a plan into the results folder `root`.
+fn play(
+    experiment: &Experiment,
+    plan: &Plan,
+    root: &Path,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<(RecordFolder, Stored)> {
     plan.memory(options.threads).check(memory::available())?;
-    let root = options.folder(&experiment.file.name);
     crate::results::atomic::create_folder(&root.join("state"), "create the results folder")?;
     let progress = Progress::new(plan.jobs.len(), options.quiet);
     let settings = workers::Settings {
         threads: options.threads.max(1),
         block_passes: options.block_passes,
         interrupt,
-        root: &root,
+        root,
         progress: &progress,
     };
     let played = workers::play_all(&plan.jobs, &experiment.file.budget, &settings);
     progress.finish();
-    let assembled = assemble::assemble(experiment, &plan, played?)?;
-    let folder = RecordFolder::new(&root);
+    let assembled = assemble::assemble(experiment, plan, played?)?;
+    let folder = RecordFolder::new(root);
     let stored = folder.write(assembled.record, assembled.arrays)?;
     folder.write_timing(&assembled.timing)?;
     folder.write_provenance(&Provenance::collect(options.threads))?;

@@ -15,6 +15,9 @@ pub const LEAST_PASSES: u64 = 128;
 
 /// The passes that a budget pays for; `None` where `stop` was raised.
 pub fn passes(job: &Job, budget: &Budget, stop: &dyn Fn() -> bool) -> Option<u64> {
+    if job.passes.is_some() {
+        return job.passes;
+    }
     match budget {
         Budget::Passes(passes) => Some(*passes),
         Budget::CpuSeconds(seconds) => for_seconds(job, *seconds, stop),

@@ -12,7 +12,6 @@ use std::time::{Duration, Instant};
 use super::checkpoint;
 use super::interrupt::Interrupt;
 use super::job::{Block, Finished, Job, Origin};
-use super::keys::Stage;
 use super::pilot;
 use super::progress::Progress;
 use crate::error::{Error, Result};
@@ -111,7 +110,7 @@ impl Pool<'_> {
         while let Some(work) = self.next(sender) {
             let begun = Instant::now();
             let job = &self.jobs[work.job];
-            let Some(block) = job.play(Stage::Main, work.start, work.end, work.keep_level, &stop) else {
+            let Some(block) = job.play(job.stage, work.start, work.end, work.keep_level, &stop) else {
                 return;
             };
             let seconds = begun.elapsed().as_secs_f64() / (work.end - work.start) as f64;

@@ -36,12 +36,12 @@ impl HenyeyGreensteinSampler {
     }
 
     /// 1 - |cosine to the peak| at a chart coordinate.
-    fn from_pole(&self, x: f64) -> f64 {
+    fn distance_to_pole(&self, x: f64) -> f64 {
         (self.scale * exp_m1(self.length * x)).min(2.0)
     }
 
     fn mu(&self, x: f64) -> f64 {
-        let mu = 1.0 - self.from_pole(x);
+        let mu = 1.0 - self.distance_to_pole(x);
         if self.phase.g < 0.0 { -mu } else { mu }
     }
 }
@@ -64,7 +64,7 @@ impl Sampler for HenyeyGreensteinSampler {
     }
 
     fn density(&self, _piece: usize, [x, _]: [f64; 2]) -> f64 {
-        self.phase.pdf(self.mu(x)) * TAU * self.length * (self.scale + self.from_pole(x))
+        self.phase.pdf(self.mu(x)) * TAU * self.length * (self.scale + self.distance_to_pole(x))
     }
 
     fn contrasts(&self) -> Vec<Contrast> {

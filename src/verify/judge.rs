@@ -1,35 +1,66 @@
-//! From comparisons to verdicts: every comparison by itself (`trial`), then all of them under
-//! one family-wise error rate, then what controls expect.
+//! From comparisons to verdicts: every comparison by itself (`trial`), then all of them as one family
+//! with at most two looks (`levels`), then what controls expect.
 
 use std::collections::BTreeMap;
 
-use super::trial::{Claim, Evidence, Expect, Trial, trial};
+pub use super::levels::{FAMILY_LEVEL, Looks, POWER};
+use super::levels::{FIRST_LOOK, SECOND_LOOK};
+use super::trial::{Claim, Evidence, Expect, Item, Trial, trial};
 use super::verdict::{Outcome, Verdict};
+use crate::results::record::{Against, Quantity};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::{Test, chi_square_sf, critical_value};
 use crate::stats::multiplicity::holm;
 
-/// The probability of any false failure in one whole verification.
-pub const FAMILY_LEVEL: f64 = 1e-6;
-
-/// The probability with which a difference of size `detectable` is found.
-pub const POWER: f64 = 0.99;
-
 /// A table of more comparisons than this is also tested as a whole.
 const TABLE: usize = 10;
 
-/// Judges every comparison of every record as one family of tests at `level` ([`FAMILY_LEVEL`]).
-pub fn judge(records: &[&Stored], level: f64) -> Vec<Verdict> {
+/// A record to judge.
+#[derive(Clone, Copy, Debug)]
+pub struct Case<'a> {
+    /// What was measured.
+    pub main: &'a Stored,
+    /// What was measured again for a second look, where there was one.
+    pub retest: Option<&'a Stored>,
+}
+
+/// What a verification says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
+    /// One verdict a comparison, case by case.
+    pub verdicts: Vec<Verdict>,
+    /// Number of the case that each verdict is of.
+    pub case_of: Vec<usize>,
+    /// What wants a second look that no record holds yet; its verdicts are `fail` until then.
+    pub wanted: Vec<Wanted>,
+}
+
+/// A quantity that wants a second look.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted {
+    /// The case.
+    pub case: usize,
+    /// The quantity.
+    pub quantity: Quantity,
+}
+
+/// Judges one record by itself, with one look.
+pub fn judge_alone(stored: &Stored) -> Vec<Verdict> {
+    judge(&[Case { main: stored, retest: None }], Looks::One).verdicts
+}
+
+/// Judges every comparison of every record as one family of tests.
+pub fn judge(cases: &[Case], looks: Looks) -> Judgement {
     let mut trials = Vec::new();
-    for stored in records {
-        let own: Vec<Trial> = stored.record.comparisons.iter().map(|c| trial(stored, c)).collect();
+    for (case, Case { main, .. }) in cases.iter().enumerate() {
+        let comparisons = main.record.comparisons.iter().enumerate();
+        let own: Vec<Trial> = comparisons.map(|(index, c)| trial(main, index, c)).collect();
         // Cells that an experiment pairs share their streams: their deviations are not independent.
-        let paired = !stored.record.resolved["pair"].is_null();
+        let paired = !main.record.resolved["pair"].is_null();
         let tables = if paired { vec![] } else { table_trials(&own) };
-        trials.extend(own);
-        trials.extend(tables);
+        trials.extend(own.into_iter().chain(tables).map(|trial| (case, trial)));
     }
-    conclude(trials, level)
+    conclude(cases, trials, looks)
 }
 
 /// For each column of a table (one estimator, band, observable and class of an `equals` claim), the
@@ -62,7 +93,8 @@ fn sum_of_squares(rows: &[&Trial]) -> Trial {
         expected_error: nothing,
         ..rows[0].verdict.clone()
     };
-    Trial { evidence: Evidence::Sum { test }, detect: None, verdict, ..rows[0].clone() }
+    let evidence = Evidence::Sum { test };
+    Trial { item: Item::Table, evidence, detect: None, one_look: true, verdict, ..rows[0].clone() }
 }
 
 /// The |z| whose normal p-value is the test's; the statistic itself where that p-value underflows.
@@ -74,44 +106,144 @@ fn normal_equivalent(evidence: &Evidence) -> f64 {
     }
 }
 
-/// Adjusts p-values over the family and states outcomes.
-fn conclude(trials: Vec<Trial>, level: f64) -> Vec<Verdict> {
-    let p_values: Vec<f64> = trials.iter().filter_map(|t| t.evidence.p_value()).collect();
-    // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
-    let own_level = level / p_values.len().max(1) as f64;
+/// Adjusts p-values over the family, looks again where that is due, and states outcomes.
+fn conclude(cases: &[Case], trials: Vec<(usize, Trial)>, looks: Looks) -> Judgement {
+    let p_values: Vec<f64> = trials.iter().filter_map(|(_, t)| t.evidence.p_value()).collect();
     let mut adjusted = holm(&p_values).into_iter();
-    trials
+    let adjusted: Vec<f64> = trials
+        .iter()
+        .map(|(_, t)| t.evidence.p_value().and_then(|_| adjusted.next()).unwrap_or(f64::NAN))
+        .collect();
+    let again: Vec<usize> = (0..trials.len())
+        .filter(|&i| looks == Looks::Two && wants_second_look(&trials[i].1, adjusted[i], looks))
+        .collect();
+    let seconds: Vec<Option<Trial>> =
+        again.iter().map(|&i| second(&cases[trials[i].0], &trials[i].1)).collect();
+    // A look that is still missing counts as one: the level of the others must not depend on it.
+    let second_p: Vec<f64> =
+        seconds.iter().map(|t| t.as_ref().and_then(|t| t.evidence.p_value()).unwrap_or(1.0)).collect();
+    let second_adjusted = holm(&second_p);
+    let mut second_looks: BTreeMap<usize, SecondLook> = BTreeMap::new();
+    let mut wanted = Vec::new();
+    for ((&i, second), adjusted_p) in again.iter().zip(seconds).zip(second_adjusted) {
+        let (case, first) = &trials[i];
+        let look = match second.map(|t| t.evidence) {
+            None => {
+                wanted.extend(
+                    quantities(&cases[*case], first).map(|quantity| Wanted { case: *case, quantity }),
+                );
+                SecondLook::Missing
+            }
+            Some(Evidence::None(reason)) => SecondLook::Invalid(reason),
+            Some(Evidence::Identity { holds }) => SecondLook::Taken(if holds { 1.0 } else { 0.0 }),
+            Some(Evidence::Test { test, .. } | Evidence::Sum { test }) if test.p_value.is_nan() => {
+                SecondLook::Invalid("the test has no p-value".into())
+            }
+            Some(Evidence::Test { .. } | Evidence::Sum { .. }) => SecondLook::Taken(adjusted_p),
+        };
+        second_looks.insert(i, look);
+    }
+    let tests = p_values.len().max(1) as f64;
+    let case_of = trials.iter().map(|(case, _)| *case).collect();
+    let verdicts = trials
         .into_iter()
-        .map(|t| {
-            let adjusted_p = t.evidence.p_value().and_then(|_| adjusted.next());
-            state(t, adjusted_p, level, own_level)
-        })
-        .collect()
+        .enumerate()
+        .map(|(i, (_, t))| state(t, adjusted[i], second_looks.get(&i), looks, tests))
+        .collect();
+    Judgement { verdicts, case_of, wanted }
 }
 
-fn state(trial: Trial, adjusted_p: Option<f64>, level: f64, own_level: f64) -> Verdict {
-    let Trial { claim, evidence, detect, mut verdict, .. } = trial;
+/// Did the first look fail, and is it one that a second look decides? A control that must differ has to
+/// be seen at once.
+fn wants_second_look(trial: &Trial, adjusted_p: f64, looks: Looks) -> bool {
+    matches!(trial.evidence, Evidence::Test { .. })
+        && !trial.one_look
+        && trial.claim.expect == Expect::Pass
+        && (looks.at_once()..FIRST_LOOK).contains(&adjusted_p)
+}
+
+/// The same trial on the record of the second look, where that holds all it needs.
+fn second(case: &Case, first: &Trial) -> Option<Trial> {
+    let retest = case.retest?;
+    let held = |q: &Quantity| retest.batches(q).is_some();
+    match first.item {
+        Item::Comparison(index) if quantities(case, first).all(|q| held(&q)) => {
+            Some(trial(retest, index, &case.main.record.comparisons[index]))
+        }
+        Item::Comparison(_) | Item::Table => None,
+    }
+}
+
+/// What a second look at a trial has to measure.
+fn quantities<'a>(case: &Case<'a>, trial: &Trial) -> impl Iterator<Item = Quantity> + use<'a> {
+    let comparison = match trial.item {
+        Item::Comparison(index) => Some(&case.main.record.comparisons[index]),
+        Item::Table => None,
+    };
+    comparison.into_iter().flat_map(|c| {
+        let other = match &c.against {
+            Against::Quantity { other, .. } => Some(other.clone()),
+            Against::Value { .. } => None,
+        };
+        std::iter::once(c.quantity.clone()).chain(other)
+    })
+}
+
+/// What a second look came to.
+enum SecondLook {
+    /// It was not taken yet.
+    Missing,
+    /// It means nothing, for this reason.
+    Invalid(String),
+    /// Its adjusted p-value.
+    Taken(f64),
+}
+
+fn state(
+    trial: Trial,
+    adjusted_p: f64,
+    second: Option<&SecondLook>,
+    looks: Looks,
+    tests: f64,
+) -> Verdict {
+    let Trial { claim, evidence, detect, one_look, mut verdict, .. } = trial;
     if let Evidence::Test { test, .. } | Evidence::Sum { test } = &evidence {
         (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
-        verdict.adjusted_p = adjusted_p.unwrap_or(f64::NAN);
+        verdict.adjusted_p = adjusted_p;
     }
     if let Evidence::Test { difference, .. } = &evidence {
+        // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
+        let own_level = looks.first(one_look || claim.expect != Expect::Pass) / tests;
         let reference = if verdict.expected == 0.0 { 1.0 } else { verdict.expected.abs() };
         verdict.detectable = difference.detectable(own_level, POWER) / reference;
     }
-    let found = match &evidence {
-        Evidence::None(reason) => Outcome::Invalid(reason.clone()),
-        Evidence::Identity { holds: true } => Outcome::Pass,
-        Evidence::Identity { holds: false } => Outcome::Fail,
+    if let Some(SecondLook::Taken(p)) = second {
+        verdict.second_p = *p;
+    }
+    let found = match (&evidence, second) {
+        (Evidence::None(reason), _) => Outcome::Invalid(reason.clone()),
+        (Evidence::Identity { holds: true }, _) => Outcome::Pass,
+        (Evidence::Identity { holds: false }, _) => Outcome::Fail,
+        (_, Some(SecondLook::Missing)) => Outcome::Fail,
+        (_, Some(SecondLook::Invalid(reason))) => Outcome::Invalid(format!("second look: {reason}")),
+        (_, Some(SecondLook::Taken(p))) if *p < SECOND_LOOK => Outcome::Fail,
         // Not `adjusted_p < level`: a NaN must not pass.
-        Evidence::Test { .. } | Evidence::Sum { .. } => match verdict.adjusted_p {
+        (Evidence::Test { .. } | Evidence::Sum { .. }, _) => match verdict.adjusted_p {
             p if p.is_nan() => Outcome::Invalid("the test has no p-value".into()),
-            p if p < level => Outcome::Fail,
+            p if p < looks.at_once() => Outcome::Fail,
             _ if detect.is_some_and(|d| verdict.detectable > d) => Outcome::Underpowered,
             _ => Outcome::Pass,
         },
     };
     verdict.note = note(&found, &evidence, detect, &verdict);
+    match second {
+        Some(SecondLook::Missing) => verdict.note += "; wants a second look on fresh streams",
+        Some(SecondLook::Taken(_)) if found == Outcome::Pass => {
+            verdict.note = "failed at the first look and cleared by a second on fresh streams".into();
+        }
+        Some(SecondLook::Taken(_)) => verdict.note += ", at both looks",
+        _ => {}
+    }
     verdict.outcome = expected_outcome(&claim, found, &mut verdict.note);
     if claim.post_hoc {
         let reason = "post hoc: claimed when passes had been played; another seed makes it evidence";

@@ -29,7 +29,7 @@ fn other(paired: bool) -> Against {
 }
 
 fn one(s: &Stored) -> Verdict {
-    let mut verdicts = judge(&[s], FAMILY_LEVEL);
+    let mut verdicts = judge_alone(s);
     assert_eq!(verdicts.len(), 1);
     verdicts.remove(0)
 }
@@ -222,9 +222,9 @@ fn controls_are_green_when_they_find_what_they_expect() {
 
 #[test]
 fn many_tests_share_one_level() {
-    let alone = judge(&[&judged(&[("a", 1.04)])], FAMILY_LEVEL);
+    let alone = judge_alone(&judged(&[("a", 1.04)]));
     let many: Vec<(&str, f64)> = std::iter::repeat_n(("a", 1.04), 1000).collect();
-    let many = judge(&[&judged(&many)], FAMILY_LEVEL);
+    let many = judge_alone(&judged(&many));
     assert_eq!(alone[0].adjusted_p, alone[0].p_value);
     assert!((many[0].adjusted_p / many[0].p_value - 1000.0).abs() < 1e-6);
     assert!(many[0].detectable > alone[0].detectable);
@@ -257,23 +257,23 @@ fn table(off: f64) -> Stored {
 
 #[test]
 fn a_table_is_also_judged_as_a_whole() {
-    let good = judge(&[&table(0.0)], FAMILY_LEVEL);
+    let good = judge_alone(&table(0.0));
     assert_eq!(good.len(), 31);
     assert!(good.iter().all(Verdict::is_green));
     assert_eq!((good[30].test.as_str(), good[30].dof), ("sum of z^2", 30.0));
     assert_eq!(good[30].cell, "all 30 cells");
     // Three standard errors in every cell, of alternating sign: no cell alone can tell.
-    let bad = judge(&[&table(3.0)], FAMILY_LEVEL);
+    let bad = judge_alone(&table(3.0));
     assert!(bad[..30].iter().all(Verdict::is_green));
     assert_eq!(bad[30].outcome, Outcome::Fail);
     let mut paired = table(3.0);
     paired.record.resolved["pair"] = json!({"over": ["boundary"]});
-    assert_eq!(judge(&[&paired], FAMILY_LEVEL).len(), 30);
+    assert_eq!(judge_alone(&paired).len(), 30);
 }
 
 #[test]
 fn csv_has_the_columns_that_others_rely_on() {
-    let csv = to_csv(&judge(&[&judged(&[("a,b", 1.0)])], FAMILY_LEVEL));
+    let csv = to_csv(&judge_alone(&judged(&[("a,b", 1.0)])));
     let head = "experiment,cell,band,class,estimators,claim,test,statistic,p_value,adjusted_p,detectable,outcome,";
     assert!(csv.starts_with(head), "{csv}");
     assert!(csv.contains("\nsample,smooth,R,all,mis,\"a,b\",t,"), "{csv}");
@@ -282,5 +282,84 @@ fn csv_has_the_columns_that_others_rely_on() {
 #[test]
 fn exit_codes() {
     assert_eq!(exit_code(&[]), 0);
-    assert_eq!(exit_code(&judge(&[&judged(&[("a", 1.0), ("b", 2.0)])], FAMILY_LEVEL)), 1);
+    assert_eq!(exit_code(&judge_alone(&judged(&[("a", 1.0), ("b", 2.0)]))), 1);
+}
+
+/// A record whose mean is `off` standard errors from the claimed value, and one of a second look.
+fn two_looks(off: f64, second_off: f64) -> (Stored, Stored) {
+    let at = |off: f64, salt: u64| {
+        let mut s = with_claim(stored(0.1), "equals", None, value(1.0, 0.0), None);
+        set_gates(&mut s, "mis", |i, _, _| 0.1 * uniform(i + salt));
+        let now = judge_alone(&s);
+        // Moved so that the statistic is exactly `off`.
+        let (mean, error) = (now[0].value, now[0].std_error);
+        set_gates(&mut s, "mis", |i, _, _| 1.0 - mean + off * error + 0.1 * uniform(i + salt));
+        s
+    };
+    (at(off, 0), at(second_off, 70_000))
+}
+
+fn judged_twice(off: f64, second_off: Option<f64>) -> Judgement {
+    let (main, retest) = two_looks(off, second_off.unwrap_or(0.0));
+    let retest = second_off.map(|_| &retest);
+    judge(&[Case { main: &main, retest }], Looks::Two)
+}
+
+#[test]
+fn a_first_look_between_the_levels_wants_a_second() {
+    // t with 63 degrees of freedom: 4.0 has p 1.7e-4, 3.0 has 3.9e-3, 6.5 has 1.4e-8.
+    let waiting = judged_twice(4.0, None);
+    assert_eq!(waiting.verdicts[0].outcome, Outcome::Fail);
+    assert!(waiting.verdicts[0].note.ends_with("wants a second look on fresh streams"));
+    assert_eq!(waiting.wanted, [Wanted { case: 0, quantity: quantity("mis", 0) }]);
+    for off in [3.0, 6.5] {
+        let at_once = judged_twice(off, None);
+        assert!(at_once.wanted.is_empty(), "{off}");
+        assert_eq!(at_once.verdicts[0].is_green(), off == 3.0);
+    }
+    // Alone, a record is judged with one look at 1e-6.
+    let (main, _) = two_looks(4.0, 0.0);
+    assert!(judge_alone(&main)[0].is_green());
+}
+
+#[test]
+fn the_second_look_decides() {
+    let cleared = judged_twice(4.0, Some(3.0));
+    assert_eq!(cleared.verdicts[0].outcome, Outcome::Pass);
+    assert!(cleared.verdicts[0].note.contains("cleared by a second"), "{:?}", cleared.verdicts[0]);
+    assert!(cleared.wanted.is_empty());
+    let confirmed = judged_twice(4.0, Some(4.0));
+    assert_eq!(confirmed.verdicts[0].outcome, Outcome::Fail);
+    assert!(confirmed.verdicts[0].second_p < 5e-4);
+    assert!(confirmed.verdicts[0].note.ends_with("at both looks"));
+    // What needed no second look does not listen to one.
+    assert!(judged_twice(3.0, Some(9.0)).verdicts[0].is_green());
+    assert!(!judged_twice(6.5, Some(0.0)).verdicts[0].is_green());
+}
+
+#[test]
+fn a_second_look_that_means_nothing_clears_nothing() {
+    let (main, mut retest) = two_looks(4.0, 0.0);
+    retest.record.cells[0].runs[0].anomalies.insert("nonfinite".into(), 1);
+    let judgement = judge(&[Case { main: &main, retest: Some(&retest) }], Looks::Two);
+    assert_invalid(&judgement.verdicts[0], "second look: mis counted 1 of `nonfinite`");
+    retest.record.cells[0].runs.clear();
+    let judgement = judge(&[Case { main: &main, retest: Some(&retest) }], Looks::Two);
+    assert_eq!((judgement.verdicts[0].is_green(), judgement.wanted.len()), (false, 1));
+}
+
+#[test]
+fn shared_errors_and_controls_have_one_look() {
+    let claim = |error: f64, expect| {
+        let (mut main, retest) = two_looks(4.0, 0.0);
+        main.record.claims = json!([{"name": "c", "expect": expect, "equals": {}}]);
+        main.record.comparisons[0].against = value(1.0, error);
+        judge(&[Case { main: &main, retest: Some(&retest) }], Looks::Two).verdicts.remove(0)
+    };
+    let error = 0.1 / 16.0;
+    assert!(claim(0.01 * error, None).note.contains("cleared"));
+    let shared = claim(0.03 * error, None);
+    assert!(shared.is_green() && shared.note.is_empty(), "{shared:?}");
+    assert!(shared.detectable > claim(0.01 * error, None).detectable);
+    assert_eq!(claim(0.0, Some("differs")).outcome, Outcome::Fail);
 }

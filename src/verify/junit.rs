@@ -66,7 +66,7 @@ fn escape(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::judge::{FAMILY_LEVEL, judge};
+    use super::super::judge::judge_alone;
     use super::*;
     use crate::results::sample;
 
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn counts_and_cases() {
         let stored = sample::judged(&[("a<b", 1.0), ("far", 2.0)]);
-        let xml = to_junit(&judge(&[&stored], FAMILY_LEVEL));
+        let xml = to_junit(&judge_alone(&stored));
         assert!(
             xml.contains("<testsuite name=\"sample\" tests=\"2\" failures=\"1\" errors=\"0\">"),
             "{xml}"

@@ -1,7 +1,11 @@
-//! Claims and records in, verdicts out. Pure: a verdict is a function of records and a level.
+//! Claims and records in, verdicts out, and a list of what wants a second look. Pure: a verdict is a
+//! function of records and levels.
 
 /// From comparisons to verdicts.
 pub mod judge;
+/// The error rates of a whole verification.
+pub mod levels;
+
 /// Verdicts for continuous integration.
 pub mod junit;
 /// What verification says.

@@ -1,5 +1,6 @@
 //! What one comparison shows by itself, before it is held against the others.
 
+use super::levels::SHARED_ERROR;
 use super::verdict::{Outcome, Verdict};
 use crate::results::record::{Against, Bias, Comparison, EstimatorRun, Quantity, Record};
 use crate::results::store::Stored;
@@ -77,15 +78,28 @@ pub(super) enum Evidence {
     Sum { test: Test },
 }
 
+/// What a trial is about, the same in the record of a second look.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Item {
+    /// This comparison of the record.
+    Comparison(usize),
+    /// Many of them.
+    Table,
+}
+
 /// One comparison and what it shows.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Trial {
+    /// What it is about.
+    pub item: Item,
     pub claim: Claim,
     /// Index of the claim in its record.
     pub claim_index: usize,
     pub evidence: Evidence,
     /// The largest difference that may go unseen, in the units of the verdict's `detectable`.
     pub detect: Option<f64>,
+    /// A second look would share this one's errors: there is none.
+    pub one_look: bool,
     /// Filled in but for adjusted p-value, detectable, outcome and note.
     pub verdict: Verdict,
 }
@@ -146,8 +160,8 @@ impl<'a> Arm<'a> {
     }
 }
 
-/// Judges one comparison by itself.
-pub(super) fn trial(stored: &Stored, comparison: &Comparison) -> Trial {
+/// Judges comparison `index` of a record by itself.
+pub(super) fn trial(stored: &Stored, index: usize, comparison: &Comparison) -> Trial {
     let claim = Claim::of(&stored.record, comparison.claim);
     let a = Arm::of(stored, &comparison.quantity);
     let (other, paired) = match &comparison.against {
@@ -180,7 +194,17 @@ pub(super) fn trial(stored: &Stored, comparison: &Comparison) -> Trial {
         (None, Some(a)) => weigh(a, b.as_ref().filter(|_| paired), &expected, &arms, &mut verdict),
         (objection, _) => Evidence::None(objection.unwrap_or_default()),
     };
-    Trial { claim, claim_index: comparison.claim, evidence, detect: comparison.detect, verdict }
+    let sampling = a.as_ref().map_or(f64::NAN, |a| a.mean.std_error);
+    let one_look = stated_error(&expected, &arms) > SHARED_ERROR * sampling;
+    Trial {
+        item: Item::Comparison(index),
+        claim,
+        claim_index: comparison.claim,
+        evidence,
+        detect: comparison.detect,
+        one_look,
+        verdict,
+    }
 }
 
 /// Holds an arm against what is expected; `pair` is the other arm where both shared their streams.
@@ -296,6 +320,7 @@ fn blank_verdict(stored: &Stored, comparison: &Comparison, claim: &Claim) -> Ver
         expected: f64::NAN,
         expected_error: f64::NAN,
         dof: f64::NAN,
+        second_p: f64::NAN,
         note: String::new(),
     }
 }

@@ -68,12 +68,14 @@ pub struct Verdict {
     pub expected_error: f64,
     /// Degrees of freedom of the test.
     pub dof: f64,
+    /// Adjusted p-value of the second look, where there was one.
+    pub second_p: f64,
     /// The reason for the outcome, as a sentence.
     pub note: String,
 }
 
 /// Columns of `verdicts.csv`.
-pub const COLUMNS: [&str; 19] = [
+pub const COLUMNS: [&str; 20] = [
     "experiment",
     "cell",
     "band",
@@ -92,12 +94,42 @@ pub const COLUMNS: [&str; 19] = [
     "expected",
     "expected_error",
     "dof",
+    "second_p",
     "note",
+];
+
+/// The columns that hold numbers.
+const NUMBERS: [&str; 10] = [
+    "statistic",
+    "p_value",
+    "adjusted_p",
+    "detectable",
+    "value",
+    "std_error",
+    "expected",
+    "expected_error",
+    "dof",
+    "second_p",
 ];
 
 /// The verdicts as CSV text.
 pub fn to_csv(verdicts: &[Verdict]) -> String {
     csv_text::to_text(&COLUMNS, verdicts.iter().map(Verdict::fields))
+}
+
+/// The verdicts as JSON: an array of objects with the columns as keys; a number that does not apply is
+/// null.
+pub fn to_json(verdicts: &[Verdict]) -> String {
+    let value = |name: &str, field: String| match field.parse::<f64>() {
+        Ok(number) if NUMBERS.contains(&name) && number.is_finite() => serde_json::json!(number),
+        _ if NUMBERS.contains(&name) => serde_json::Value::Null,
+        _ => serde_json::Value::String(field),
+    };
+    let object = |v: &Verdict| -> serde_json::Map<String, serde_json::Value> {
+        let fields = COLUMNS.iter().zip(v.fields());
+        fields.map(|(name, field)| (name.to_string(), value(name, field))).collect()
+    };
+    serde_json::json!(verdicts.iter().map(object).collect::<Vec<_>>()).to_string()
 }
 
 /// 0 all green, 1 a claim failed, 3 none failed but some could not be judged.
@@ -138,6 +170,7 @@ impl Verdict {
             number(self.expected),
             number(self.expected_error),
             number(self.dof),
+            number(self.second_p),
             self.note.clone(),
         ]
     }

@@ -67,7 +67,7 @@ fn settings_come_before_set() {
     let fast = load("fast", &["seed=8"]).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(fast.resolved()["budget"], json!({ "passes": 4 }));
     assert_eq!(content(&fast)["object"]["boundary"], json!({ "matched": {} }));
-    assert_eq!(fast.file.seed, 8);
+    assert_eq!(fast.file.seed, Some(8));
     let origin =
         |key: &str| fast.origins.iter().find(|(k, ..)| k == key).map(|(_, v, o)| format!("{v} {o}"));
     assert_eq!(origin("budget.passes").as_deref(), Some("4 setting `fast` (x.toml:15:17)"));
