@@ -8,8 +8,9 @@
 //! ```
 //!
 //! The last is what the others start: this program is scatterproof's own command line over a registry
-//! whose estimator `tracer` (or whose samplers) hold the defect. What judges is the same code, with the
-//! same levels, as for any user. All defects get the same experiments (`*.toml` here), the same budgets,
+//! whose estimator `tracer` (or whose samplers) hold the defect; where the claims are green and an
+//! identity of the surface is broken, it exits with 1 all the same. What judges is the same code, with
+//! the same levels, as for any user. All defects get the same experiments (`*.toml` here), the same budgets,
 //! and seeds that are hashes of their names.
 
 mod defects;
@@ -68,7 +69,10 @@ fn scatterproof_with(name: &str, arguments: &[OsString]) -> ExitCode {
     };
     defects::plant(defect);
     let rest = arguments.iter().skip(3).cloned();
-    scatterproof::cli::main_with(&registry(), std::iter::once("power".into()).chain(rest))
+    let code = scatterproof::cli::main_with(&registry(), std::iter::once("power".into()).chain(rest));
+    let broken: Vec<_> = identities::all(defect).into_iter().filter(|(_, broken)| *broken).collect();
+    broken.iter().for_each(|(name, _)| eprintln!("{name} is broken"));
+    if code == ExitCode::SUCCESS && !broken.is_empty() { ExitCode::from(1) } else { code }
 }
 
 /// As `cargo test` calls it: words that begin with a dash are for test programs of another kind, and of

@@ -10,8 +10,8 @@ use super::defects::{self, Planted, UNIT_TESTED};
 use super::is_sham;
 use super::plays::{self, Outcome};
 
-/// Is an outcome as it must be? A defect is caught where `verify` does not exit with 0 or an identity is
-/// broken, and one of the tests that are expected to see it has seen it; the sham has to be green.
+/// Is an outcome as it must be? A defect is caught where the program does not exit with 0, and one of the
+/// tests that are expected to see it has seen it; the sham has to be green.
 pub fn judge(row: &Planted, outcome: &Outcome) -> Result<String, String> {
     let caught = outcome.caught();
     let list = caught.iter().copied().collect::<Vec<_>>().join(", ");
@@ -21,7 +21,7 @@ pub fn judge(row: &Planted, outcome: &Outcome) -> Result<String, String> {
             _ => Err(format!("the sham is not green: {list}\n{}", outcome.said)),
         };
     }
-    if !outcome.is_verdict() {
+    if !outcome.is_verdict() || outcome.exit == 0 {
         return Err(format!("no verdict:\n{}", outcome.said));
     }
     if !row.expected.iter().any(|test| caught.contains(test)) {
