@@ -11,7 +11,7 @@
 //! whose estimator `tracer` (or whose samplers) hold the defect; where the claims are green and an
 //! identity of the surface is broken, it exits with 1 all the same. What judges is the same code, with
 //! the same levels, as for any user. All defects get the same experiments (`*.toml` here), the same budgets,
-//! and seeds that are hashes of their names.
+//! and streams that their names name.
 
 mod defects;
 mod identities;

@@ -115,7 +115,7 @@ fn markdown(rows: &[Planted], tallies: &BTreeMap<&str, Tally>, seeds: u64) -> St
     let mut text = format!(
         "# The blindness matrix\n\n\
          Made by `cargo test --release --test power -- matrix --seeds {seeds}`; do not edit.\n\n\
-         Each defect was planted in a test-only program and played with {seeds} seeds (hashes of its \
+         Each defect was planted in a test-only program and played with {seeds} seeds (named by its \
          name) at the budget of continuous integration, the same for all. A test is a claim of an \
          experiment in `tests/power/`, or an identity that holds to rounding. *Always* lists the tests \
          that saw the defect with every seed, *sometimes* the others that saw it, each with its number \

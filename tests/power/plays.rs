@@ -11,7 +11,6 @@ use std::time::Instant;
 
 use scatterproof::results::exr_file::write_exr;
 use scatterproof::results::image::Picture;
-use scatterproof::results::json::hash_bytes;
 use scatterproof::results::npy::Array;
 use scatterproof::results::record::Band;
 
@@ -114,15 +113,15 @@ pub fn all(plays: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcom
 /// One play: `verify` on all experiments in a child process, then the identities.
 fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
     let out = folder.join(format!("play-{index}"));
-    let junit = out.with_extension("xml");
+    let verdicts = out.with_extension("csv");
     let mut command = Command::new(std::env::current_exe().expect("this program"));
     command.args(["defect", row.name, "verify", "--quiet", "--threads", "1", "--out"]).arg(&out);
-    command.arg("--junit").arg(&junit).arg("--set").arg(format!("seed={}", seed(row.name, number)));
+    command.arg("--csv").arg(&verdicts).arg("--fresh-seed").arg(format!("{}/{number}", row.name));
     command.args(EXPERIMENTS.map(|(name, _)| folder.join(name)));
     let begun = Instant::now();
     let output = command.stdin(Stdio::null()).output().expect("this program starts");
     let seconds = begun.elapsed().as_secs_f64();
-    let mut tests = junit_tests(&fs::read_to_string(&junit).unwrap_or_default());
+    let mut tests = seen_in(&fs::read_to_string(&verdicts).unwrap_or_default());
     let seen = |broken| if broken { Seen::Defect } else { Seen::Green };
     tests.extend(identities::all(row.defect).into_iter().map(|(name, broken)| (name, seen(broken))));
     let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
@@ -130,31 +129,19 @@ fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
     Outcome { exit: output.status.code().unwrap_or(-1), tests, said: said.into_owned(), seconds }
 }
 
-/// The seed of a play: a hash of its name, below 2^53.
-fn seed(name: &str, number: u64) -> u64 {
-    let hash = hash_bytes(format!("power/{name}/{number}").as_bytes());
-    u64::from_le_bytes(std::array::from_fn(|i| hash[i])) >> 11
-}
-
-/// `experiment.claim` -> the worst of its verdicts.
-fn junit_tests(xml: &str) -> BTreeMap<String, Seen> {
+/// `experiment.claim` -> the worst of its verdicts, from the table that `verify --csv` writes.
+fn seen_in(table: &str) -> BTreeMap<String, Seen> {
+    let mut reader = csv::Reader::from_reader(table.as_bytes());
     let mut tests = BTreeMap::new();
-    let mut name = None;
-    let mut note = |name: &Option<String>, seen: Seen| {
-        if let Some(name) = name.clone() {
-            let worst = tests.entry(name).or_insert(Seen::Green);
-            *worst = seen.max(*worst);
-        }
-    };
-    for line in xml.lines() {
-        if let Some((_, rest)) = line.split_once("<testcase classname=\"") {
-            name = rest.split_once('"').map(|(name, _)| name.to_string());
-            note(&name, Seen::Green);
-        } else if line.contains("type=\"underpowered\"") {
-            note(&name, Seen::Underpowered);
-        } else if line.contains("<failure ") || line.contains("<error ") {
-            note(&name, Seen::Defect);
-        }
+    for row in reader.deserialize::<BTreeMap<String, String>>() {
+        let row = row.expect("a row of verdicts");
+        let seen = match row["outcome"].as_str() {
+            "pass" => Seen::Green,
+            "underpowered" => Seen::Underpowered,
+            _ => Seen::Defect,
+        };
+        let worst = tests.entry(format!("{}.{}", row["experiment"], row["claim"])).or_insert(seen);
+        *worst = seen.max(*worst);
     }
     tests
 }
