@@ -41,6 +41,40 @@ pub enum Defect {
     EnvironmentScaled,
     NotANumber,
     ClassesSwapped,
+    // Samplers.
+    DensityTilted,
+    DensityDoubled,
+    SamplerFlipped,
+    DrawFlipped,
+    Untruncated,
+    ShareMissing,
+    BoundSign,
+    Unnormalised,
+    ComponentDensity,
+    LobeNumberReused,
+    MassOff,
+    DeltaLeaks,
+    NullsRedrawn,
+    SamplerSineMissing,
+    NeighboursAlike,
+    // The verifier.
+    VarianceByDifference,
+    DeviationForError,
+    OneSided,
+    PixelsForPasses,
+}
+
+/// Where a defect stands, and so what is played to find it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// In the path tracer.
+    Tracer,
+    /// In a sampler.
+    Sampler,
+    /// In the verifier's arithmetic.
+    Verifier,
+    /// Nowhere.
+    Sham,
 }
 
 /// One row of the catalogue.
@@ -50,6 +84,8 @@ pub struct Planted {
     pub name: &'static str,
     /// The defect.
     pub defect: Defect,
+    /// Where it stands.
+    pub family: Family,
     /// What is wrong, in one line.
     pub what: &'static str,
     /// The tests, `experiment.claim` or `identity NAME`, of which each is expected to see it.
@@ -62,7 +98,11 @@ const fn row(
     what: &'static str,
     expected: &'static [&'static str],
 ) -> Planted {
-    Planted { name, defect, what, expected }
+    Planted { name, defect, family: Family::Tracer, what, expected }
+}
+
+const fn of(family: Family, row: Planted) -> Planted {
+    Planted { family, ..row }
 }
 
 /// Every defect of the path tracer.
@@ -181,12 +221,7 @@ pub const TRACER: &[Planted] = &[
         "totally reflected paths end",
         &["furnace.smooth", "slab.UR1"],
     ),
-    row(
-        "depth-cut-off",
-        Defect::DepthCutOff,
-        "paths end after 32 scattering events",
-        &["slab.UT1"],
-    ),
+    row("depth-cut-off", Defect::DepthCutOff, "paths end after 32 scattering events", &["slab.UT1"]),
     row(
         "shading-normal",
         Defect::ShadingNormal,
@@ -205,12 +240,7 @@ pub const TRACER: &[Planted] = &[
         "rays start 1e-4 mm off their surface",
         &["scale.same"],
     ),
-    row(
-        "single-precision",
-        Defect::SinglePrecision,
-        "scores add up in f32",
-        &["furnace.smooth"],
-    ),
+    row("single-precision", Defect::SinglePrecision, "scores add up in f32", &["furnace.smooth"]),
     row("path-dropped", Defect::PathDropped, "one path a pass is not scored", &["furnace.smooth"]),
     row("path-twice", Defect::PathTwice, "one path a pass is scored twice", &["furnace.smooth"]),
     row(
@@ -225,12 +255,7 @@ pub const TRACER: &[Planted] = &[
         "light samples have the random numbers of the walk: a short flight chooses the sun",
         &["matched.single"],
     ),
-    row(
-        "other-band",
-        Defect::OtherBand,
-        "every band has the albedo of the first",
-        &["rough.multiple"],
-    ),
+    row("other-band", Defect::OtherBand, "every band has the albedo of the first", &["rough.multiple"]),
     row("band-missing", Defect::BandMissing, "the last of several bands is not played", &["rough.sun"]),
     row(
         "sine-missing",
@@ -258,6 +283,121 @@ pub const TRACER: &[Planted] = &[
     ),
 ];
 
+/// Every defect of a sampler.
+pub const SAMPLERS: &[Planted] = &[
+    sampler(
+        "density-tilted",
+        Defect::DensityTilted,
+        "a density is off by what the claim says it detects",
+    ),
+    sampler("density-doubled", Defect::DensityDoubled, "1/(2 pi) for 1/(4 pi) in a phase function"),
+    sampler("sampler-flipped", Defect::SamplerFlipped, "draws and density are those of -g"),
+    sampler("draw-flipped", Defect::DrawFlipped, "draws are those of -g"),
+    sampler("untruncated", Defect::Untruncated, "draws go beyond the end that the density has"),
+    sampler("share-missing", Defect::ShareMissing, "a truncated density is not divided by its share"),
+    sampler("bound-sign", Defect::BoundSign, "the sign of an equiangular bound is wrong"),
+    sampler("unnormalised", Defect::Unnormalised, "equiangular draws along a direction 1.1 long"),
+    sampler("component-density", Defect::ComponentDensity, "a lobe's density is told for the mixture's"),
+    sampler(
+        "lobe-number-reused",
+        Defect::LobeNumberReused,
+        "the number that chose a lobe is not rescaled",
+    ),
+    sampler("mass-off", Defect::MassOff, "a delta lobe is drawn 10 % too often"),
+    sampler("delta-leaks", Defect::DeltaLeaks, "a delta lobe's mass leaks into the density"),
+    sampler("nulls-redrawn", Defect::NullsRedrawn, "failed draws are drawn again"),
+    sampler("sampler-sine-missing", Defect::SamplerSineMissing, "theta is uniform, the density is not"),
+    sampler("neighbours-alike", Defect::NeighboursAlike, "every other draw nearly repeats the last"),
+];
+
+const fn sampler(name: &'static str, defect: Defect, what: &'static str) -> Planted {
+    of(Family::Sampler, row(name, defect, what, &["samplers.densities"]))
+}
+
+/// Every defect of the verifier's arithmetic.
+pub const VERIFIER: &[Planted] = &[
+    verifier(
+        "variance-by-difference",
+        Defect::VarianceByDifference,
+        "variance as E[x^2] - E[x]^2 in f32",
+        &["calibration fixed-data"],
+    ),
+    verifier(
+        "deviation-for-error",
+        Defect::DeviationForError,
+        "the standard deviation is taken for the standard error",
+        &["calibration false-alarms"],
+    ),
+    verifier("one-sided", Defect::OneSided, "a one-sided p-value", &["calibration false-alarms"]),
+    verifier(
+        "pixels-for-passes",
+        Defect::PixelsForPasses,
+        "pixels of a pass are counted as independent",
+        &["calibration false-alarms"],
+    ),
+];
+
+const fn verifier(
+    name: &'static str,
+    defect: Defect,
+    what: &'static str,
+    expected: &'static [&'static str],
+) -> Planted {
+    of(Family::Verifier, row(name, defect, what, expected))
+}
+
+/// Defects that stand where this program cannot plant them, and the test of the library that holds the code
+/// to the opposite.
+pub const UNIT_TESTED: &[(&str, &str)] = &[
+    (
+        "a block is dropped or counted twice in the merge",
+        "stats::tree::tests::a_missing_block_is_noticed",
+    ),
+    (
+        "a record holds fewer passes than it says",
+        "verify::judge::tests::what_a_test_cannot_rest_on_is_invalid",
+    ),
+    (
+        "the order of blocks enters a sum",
+        "tests/reproducibility.rs::threads_blocks_and_folders_change_no_byte",
+    ),
+    (
+        "streams of neighbouring ids are correlated",
+        "sampling::stream::tests::neighbouring_streams_are_independent",
+    ),
+    (
+        "two passes or pixels share a stream",
+        "sampling::stream::tests::no_two_streams_of_a_run_start_alike",
+    ),
+    (
+        "a false alarm is more frequent than its level",
+        "stats::hypothesis::tests::false_alarms_have_their_level",
+    ),
+];
+
+/// No defect: everything has to be green.
+pub const SHAM: Planted = of(Family::Sham, row("sham", Defect::None, "nothing is wrong", &[]));
+
+/// Whether claims on samplers can be judged; until then the rows of [`SAMPLERS`] are not played.
+pub const SAMPLERS_ARE_JUDGED: bool = false;
+
+/// The sham, then every defect.
+pub fn all() -> Vec<Planted> {
+    let planted = [TRACER, SAMPLERS, VERIFIER].into_iter().flatten();
+    let played = planted.filter(|row| SAMPLERS_ARE_JUDGED || row.family != Family::Sampler);
+    std::iter::once(SHAM).chain(played.copied()).collect()
+}
+
+/// All names.
+pub fn names() -> Vec<&'static str> {
+    all().iter().map(|row| row.name).collect()
+}
+
+/// The row of a name.
+pub fn named(name: &str) -> Option<Planted> {
+    all().into_iter().find(|row| row.name == name)
+}
+
 static PLANTED: OnceLock<Defect> = OnceLock::new();
 
 /// Plants a defect in this process, once and for all.
@@ -268,25 +408,4 @@ pub fn plant(defect: Defect) {
 /// The defect of this process.
 pub fn planted() -> Defect {
     *PLANTED.get().unwrap_or(&Defect::None)
-}
-
-/// Defects that no claim can see, and the unit test that holds the code to the opposite.
-pub const UNIT_TESTED: &[(&str, &str)] = &[];
-
-/// No defect: everything has to be green.
-pub const SHAM: Planted = row("sham", Defect::None, "nothing is wrong", &[]);
-
-/// The sham, then every defect.
-pub fn all() -> Vec<Planted> {
-    std::iter::once(SHAM).chain(TRACER.iter().copied()).collect()
-}
-
-/// All names.
-pub fn names() -> Vec<&'static str> {
-    all().iter().map(|row| row.name).collect()
-}
-
-/// The defect of a name.
-pub fn named(name: &str) -> Option<Defect> {
-    all().into_iter().find(|row| row.name == name).map(|row| row.defect)
 }

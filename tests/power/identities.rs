@@ -8,11 +8,14 @@ use scatterproof::optics::microfacet::{MicrofacetKind, Microfacets};
 use super::defects::Defect;
 use super::surface::Surface;
 
+/// An identity: whether it holds.
+type Identity = fn(&Surface) -> bool;
+
 /// Every identity, and whether it is broken.
 pub fn all(defect: Defect) -> Vec<(String, bool)> {
     let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.3 };
     let surface = Surface { eta: 1.4, facets, defect };
-    let checks: [(&str, fn(&Surface) -> bool); 4] = [
+    let checks: [(&str, Identity); 4] = [
         ("identity reciprocity", reciprocity),
         ("identity sample-weight", sample_weight),
         ("identity sample-density", sample_density),

@@ -17,17 +17,21 @@ mod defects;
 mod identities;
 mod matrix;
 mod plays;
+mod samplers;
 mod surface;
 mod tracer;
+mod verifier;
 
 use std::env;
 use std::ffi::OsString;
+use std::fs;
+use std::path::Path;
 use std::process::ExitCode;
 
-use defects::{Defect, planted};
-use schemars::JsonSchema;
+use defects::{Defect, Family, Planted, planted};
 use scatterproof::experiment::estimators::{builtin, read};
 use scatterproof::experiment::registry::{Registry, RegistryEntry};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tracer::Tracer;
 
@@ -39,6 +43,7 @@ struct TracerOptions {}
 /// The library's registry, and the tracer with what is planted in this process.
 fn registry() -> Registry {
     let mut registry = builtin();
+    registry.samplers.extend(samplers::entries());
     registry.entries.push(RegistryEntry {
         kind: "tracer",
         doc: "the second path tracer, and the defect that is planted in it",
@@ -63,16 +68,31 @@ fn main() -> ExitCode {
 
 /// The command line with a defect.
 fn scatterproof_with(name: &str, arguments: &[OsString]) -> ExitCode {
-    let Some(defect) = defects::named(name) else {
+    let Some(row) = defects::named(name) else {
         eprintln!("unknown defect `{name}`; one of: {}", defects::names().join(", "));
         return ExitCode::from(2);
     };
-    defects::plant(defect);
-    let rest = arguments.iter().skip(3).cloned();
-    let code = scatterproof::cli::main_with(&registry(), std::iter::once("power".into()).chain(rest));
-    let broken: Vec<_> = identities::all(defect).into_iter().filter(|(_, broken)| *broken).collect();
+    defects::plant(row.defect);
+    let mut code = ExitCode::SUCCESS;
+    if arguments.len() > 3 {
+        let rest = arguments.iter().skip(3).cloned();
+        code = scatterproof::cli::main_with(&registry(), std::iter::once("power".into()).chain(rest));
+    }
+    let broken: Vec<_> = identities(&row).into_iter().filter(|(_, broken)| *broken).collect();
     broken.iter().for_each(|(name, _)| eprintln!("{name} is broken"));
     if code == ExitCode::SUCCESS && !broken.is_empty() { ExitCode::from(1) } else { code }
+}
+
+/// What is asked of a row's code without random streams, and whether it is broken.
+fn identities(row: &Planted) -> Vec<(String, bool)> {
+    let mut asked = Vec::new();
+    if matches!(row.family, Family::Tracer | Family::Sham) {
+        asked.extend(identities::all(row.defect));
+    }
+    if matches!(row.family, Family::Verifier | Family::Sham) {
+        asked.extend(verifier::all(row.defect));
+    }
+    asked
 }
 
 /// As `cargo test` calls it: words that begin with a dash are for test programs of another kind, and of
@@ -101,8 +121,30 @@ fn tests(words: &[String]) -> ExitCode {
         };
         println!("{:24} {verdict:6} exit {} {text}", row.name, outcome.exit);
     });
-    println!("{} defects (and the sham): {survived} not as they must be", rows.len());
-    if survived == 0 { ExitCode::SUCCESS } else { ExitCode::from(101) }
+    let missing = unit_tests_missing();
+    missing.iter().for_each(|test| println!("no unit test `{test}`"));
+    println!("{} rows: {survived} not as they must be", rows.len());
+    if survived == 0 && missing.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(101) }
+}
+
+/// Of the unit tests that the matrix names those that the sources do not hold.
+fn unit_tests_missing() -> Vec<&'static str> {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut folders = vec![package.join("src"), package.join("tests")];
+    let mut sources = String::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("a folder of sources") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                sources += &fs::read_to_string(&path).expect("a source");
+            }
+        }
+    }
+    let named = defects::UNIT_TESTED.iter().map(|(_, test)| *test);
+    let function = |test: &str| format!("fn {}()", test.rsplit("::").next().unwrap_or_default());
+    named.filter(|test| !sources.contains(&function(test))).collect()
 }
 
 /// Is this the sham?

@@ -141,8 +141,7 @@ fn markdown(rows: &[Planted], tallies: &BTreeMap<&str, Tally>, seeds: u64) -> St
             _ => "",
         };
         let (name, what, count) = (row.name, row.what, caught(row, tally));
-        let [always, sometimes, blind] =
-            [killers.join(", "), sometimes.join(", "), blind.join(", ")];
+        let [always, sometimes, blind] = [killers.join(", "), sometimes.join(", "), blind.join(", ")];
         writeln!(
             text,
             "| {name}{mark} | {what} | {count}/{} | {always} | {sometimes} | {blind} |",
