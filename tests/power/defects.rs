@@ -41,6 +41,7 @@ pub enum Defect {
     EnvironmentScaled,
     NotANumber,
     ClassesSwapped,
+    ScoresScaled,
     // Samplers.
     DensityTilted,
     DensityDoubled,
@@ -274,6 +275,12 @@ pub const TRACER: &[Planted] = &[
         Defect::NotANumber,
         "one path in a thousand scores NaN",
         &["rough.sun", "slab.UR1"],
+    ),
+    row(
+        "scores-scaled",
+        Defect::ScoresScaled,
+        "every score is 5 % too high: as much as furnace.matched claims to detect",
+        &["furnace.matched", "furnace.smooth"],
     ),
     row(
         "classes-swapped",

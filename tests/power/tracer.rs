@@ -53,6 +53,7 @@ impl Estimator for Tracer {
             }
             for index in 0..self.scene.sensor.rays_per_pass() {
                 let times = match self.defect {
+                    Defect::ScoresScaled => 1.05,
                     Defect::PathDropped if index == 0 => 0.0,
                     Defect::PathTwice if index == 0 => 2.0,
                     _ => 1.0,
