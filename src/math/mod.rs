@@ -46,5 +46,5 @@ mod turns;
 
 pub use frame::Frame;
 pub use inverse::{erf_inv, increasing_root};
-pub use quadrature::{Integral, integrate};
+pub use quadrature::{Integral, gauss_kronrod, integrate};
 pub use turns::sin_cos_turns;

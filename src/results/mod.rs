@@ -19,6 +19,8 @@ pub mod npy;
 pub mod provenance;
 /// The record's layout.
 pub mod record;
+/// What a record holds of samplers.
+pub mod sampler;
 /// A small made-up record.
 #[cfg(test)]
 pub mod sample;

@@ -73,6 +73,7 @@ pub fn assemble(experiment: &Experiment, plan: &Plan, finished: Vec<Finished>) -
         comparisons: plan.comparisons.clone(),
         bands: plan.bands.clone(),
         cells,
+        samplers: Vec::new(),
         checksums: BTreeMap::new(),
     };
     Ok(Assembled { record, arrays, timing })
