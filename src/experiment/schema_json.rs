@@ -21,7 +21,7 @@ pub fn sampler_schema(registry: &Registry) -> Json {
     let mut schema = schemars::schema_for!(SamplerFile).to_value();
     schema["title"] = json!("scatterproof experiment on samplers");
     let kinds = registry.samplers.iter();
-    let kinds = kinds.map(|entry| (entry.kind, entry.doc, (entry.options_schema)().to_value()));
+    let kinds = kinds.map(|entry| (entry.kind, entry.doc, entry.options()));
     inject("SamplerEntry", kinds.collect(), &mut schema);
     schema
 }

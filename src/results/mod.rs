@@ -19,11 +19,11 @@ pub mod npy;
 pub mod provenance;
 /// The record's layout.
 pub mod record;
-/// What a record holds of samplers.
-pub mod sampler;
 /// A small made-up record.
 #[cfg(test)]
 pub mod sample;
+/// What a record holds of samplers.
+pub mod sampler;
 /// A record's folder.
 pub mod store;
 /// What it cost in time.

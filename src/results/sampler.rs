@@ -109,8 +109,11 @@ impl Stored {
         let array = self.arrays.get(path)?;
         let n = array.data.len() / 3;
         let row = |i: usize| &array.data[i * n..(i + 1) * n];
-        (array.shape.first() == Some(&3))
-            .then(|| Cells { observed: row(0), mass: row(1), bound: row(2) })
+        (array.shape.first() == Some(&3)).then(|| Cells {
+            observed: row(0),
+            mass: row(1),
+            bound: row(2),
+        })
     }
 }
 

@@ -153,8 +153,7 @@ pub fn shares(quadrature: &mut Quadrature) -> Vec<f64> {
     let masses = pieces.iter().enumerate().map(|(piece, p)| {
         let steps = steps(p.dimensions);
         let edge = |k: usize, i: usize| {
-            p.axes[k].range[0]
-                + (p.axes[k].range[1] - p.axes[k].range[0]) * i as f64 / steps[k] as f64
+            p.axes[k].range[0] + (p.axes[k].range[1] - p.axes[k].range[0]) * i as f64 / steps[k] as f64
         };
         let boxes = (0..steps[0]).flat_map(|i| (0..steps[1]).map(move |j| (i, j)));
         let areas = boxes.map(|(i, j)| Area {
@@ -275,9 +274,8 @@ impl Builder<'_, '_> {
         let finer = self.finer(total);
         let grid = [side * finer; 2];
         let length = |k: usize| axes[k].range[1] - axes[k].range[0];
-        let low = [0, 1].map(|k| {
-            axes[k].range[0] + if axes[k].periodic { OFFSET * length(k) } else { 0.0 }
-        });
+        let low =
+            [0, 1].map(|k| axes[k].range[0] + if axes[k].periodic { OFFSET * length(k) } else { 0.0 });
         let edge = |k: usize, i: usize| low[k] + length(k) * i as f64 / grid[k] as f64;
         let mut plane = Plane { axes: axes.clone(), low, grid, nodes: Vec::new() };
         for i in 0..grid[0] {

@@ -158,12 +158,7 @@ impl Counting<'_> {
 
     /// One draw; the group of its cell, where it is in one.
     #[inline]
-    fn draw(
-        &self,
-        stream: &mut Stream,
-        counts: &mut Counts,
-        moments: &mut [Moments],
-    ) -> Option<usize> {
+    fn draw(&self, stream: &mut Stream, counts: &mut Counts, moments: &mut [Moments]) -> Option<usize> {
         let (cell, point) = match self.sampler.draw(stream) {
             Draw::Null => {
                 counts.nulls += 1;
@@ -175,7 +170,9 @@ impl Counting<'_> {
                 (self.extra(Extra::Delta(index)), None)
             }
             Draw::Delta { .. } => (None, None),
-            Draw::Point { piece, at, density } => (self.point(piece, at, density, counts), Some((piece, at))),
+            Draw::Point { piece, at, density } => {
+                (self.point(piece, at, density, counts), Some((piece, at)))
+            }
         };
         let point = point.filter(|_| cell.is_some());
         for (contrast, moments) in self.contrasts.iter().zip(moments) {

@@ -25,8 +25,8 @@ mod retest;
 use std::path::{Path, PathBuf};
 
 use crate::error::Result;
-use crate::experiment::{Experiment, Loaded};
 use crate::experiment::registry::Registry;
+use crate::experiment::{Experiment, Loaded};
 use crate::results::provenance::{self, Provenance};
 use crate::results::store::{RecordFolder, Stored};
 use interrupt::Interrupt;

@@ -32,8 +32,8 @@ use crate::results::record::{Record, SCHEMA_VERSION};
 use crate::results::sampler::{ContrastRun, Delta, NullMass, SamplerRun, cells_path};
 use crate::results::store::{Arrays, RecordFolder, Stored};
 use crate::results::timing::{Cost, Timing};
-use crate::samplers::{Null, Sampler};
-use crate::sampling::stream::StreamKey;
+use crate::samplers::{Draw, Null, Sampler};
+use crate::sampling::stream::{Purpose, StreamKey};
 use crate::stats::moments::Moments;
 
 /// What one sampler gave.
@@ -101,6 +101,30 @@ pub fn build_all(experiment: &SamplerExperiment, registry: &Registry) -> Result<
     jobs(experiment, registry, Stage::Main, 1, &|_| true).map(|_| ())
 }
 
+/// CPU seconds that the draws of each sampler take, by the time of the first few; nothing where `dry`.
+///
+/// # Errors
+/// Options that a sampler refuses.
+pub fn estimate_seconds(
+    experiment: &SamplerExperiment,
+    registry: &Registry,
+    dry: bool,
+) -> Result<Vec<Option<f64>>> {
+    let few = 20_000;
+    let timed = |job: &Job| {
+        let mut stream = job.key.pass(0).stream(0, Purpose::Walk);
+        let before = thread_cpu_time();
+        for _ in 0..few {
+            if let Draw::Point { piece, at, .. } = job.sampler.draw(&mut stream) {
+                std::hint::black_box(job.sampler.density(piece, at));
+            }
+        }
+        thread_cpu_time().saturating_sub(before).as_secs_f64() * job.samples as f64 / f64::from(few)
+    };
+    let jobs = jobs(experiment, registry, Stage::Main, 1, &|_| true)?;
+    Ok(jobs.iter().map(|job| (!dry).then(|| timed(job))).collect())
+}
+
 /// Whether the folder holds a record of exactly this experiment, its claims included, by this build.
 pub fn has_record(experiment: &SamplerExperiment, out: &Path) -> bool {
     let folder = RecordFolder::new(out.join(&experiment.file.name));
@@ -137,9 +161,8 @@ fn job(
     entry: &SamplerEntry,
 ) -> Result<Job> {
     let file = &experiment.file;
-    let (kind, options) = entry
-        .choice()
-        .ok_or_else(|| Error::input(format!("sampler `{}` has no kind", entry.name)))?;
+    let (kind, options) =
+        entry.choice().ok_or_else(|| Error::input(format!("sampler `{}` has no kind", entry.name)))?;
     let registered = registry
         .samplers
         .iter()
@@ -344,11 +367,7 @@ fn centres(partition: &Partition, quadrature: &Quadrature) -> Vec<(usize, [f64; 
     centres
 }
 
-fn contrasts(
-    counting: &Counting,
-    quadrature: &mut Quadrature,
-    moments: &[Moments],
-) -> Vec<ContrastRun> {
+fn contrasts(counting: &Counting, quadrature: &mut Quadrature, moments: &[Moments]) -> Vec<ContrastRun> {
     let runs = counting.contrasts.iter().zip(moments).map(|(contrast, moments)| {
         let expected = match contrast.expected {
             Some(value) => Mass { value, bound: 0.0 },

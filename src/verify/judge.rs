@@ -58,7 +58,8 @@ pub fn judge(cases: &[Case], looks: Looks) -> Judgement {
         // Cells that an experiment pairs share their streams: their deviations are not independent.
         let paired = !main.record.resolved["pair"].is_null();
         let tables = if paired { vec![] } else { table_trials(&own) };
-        trials.extend(own.into_iter().chain(tables).map(|trial| (case, trial)));
+        let samplers = super::sampler::trials(main);
+        trials.extend(own.into_iter().chain(tables).chain(samplers).map(|trial| (case, trial)));
     }
     conclude(cases, trials, looks)
 }
@@ -135,11 +136,17 @@ fn conclude(cases: &[Case], trials: Vec<(usize, Trial)>, looks: Looks) -> Judgem
                 SecondLook::Missing
             }
             Some(Evidence::None(reason)) => SecondLook::Invalid(reason),
-            Some(Evidence::Identity { holds }) => SecondLook::Taken(if holds { 1.0 } else { 0.0 }),
-            Some(Evidence::Test { test, .. } | Evidence::Sum { test }) if test.p_value.is_nan() => {
+            Some(Evidence::Identity { holds } | Evidence::Exact { holds, .. }) => {
+                SecondLook::Taken(if holds { 1.0 } else { 0.0 })
+            }
+            Some(Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. })
+                if test.p_value.is_nan() =>
+            {
                 SecondLook::Invalid("the test has no p-value".into())
             }
-            Some(Evidence::Test { .. } | Evidence::Sum { .. }) => SecondLook::Taken(adjusted_p),
+            Some(Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }) => {
+                SecondLook::Taken(adjusted_p)
+            }
         };
         second_looks.insert(i, look);
     }
@@ -170,7 +177,7 @@ fn second(case: &Case, first: &Trial) -> Option<Trial> {
         Item::Comparison(index) if quantities(case, first).all(|q| held(&q)) => {
             Some(trial(retest, index, &case.main.record.comparisons[index]))
         }
-        Item::Comparison(_) | Item::Table => None,
+        Item::Comparison(_) | Item::Table | Item::Sampler => None,
     }
 }
 
@@ -178,7 +185,7 @@ fn second(case: &Case, first: &Trial) -> Option<Trial> {
 fn quantities<'a>(case: &Case<'a>, trial: &Trial) -> impl Iterator<Item = Quantity> + use<'a> {
     let comparison = match trial.item {
         Item::Comparison(index) => Some(&case.main.record.comparisons[index]),
-        Item::Table => None,
+        Item::Table | Item::Sampler => None,
     };
     comparison.into_iter().flat_map(|c| {
         let other = match &c.against {
@@ -207,13 +214,17 @@ fn state(
     tests: f64,
 ) -> Verdict {
     let Trial { claim, evidence, detect, one_look, mut verdict, .. } = trial;
-    if let Evidence::Test { test, .. } | Evidence::Sum { test } = &evidence {
+    if let Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. } = &evidence
+    {
         (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
         verdict.adjusted_p = adjusted_p;
     }
+    // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
+    let own_level = looks.first(one_look || claim.expect != Expect::Pass) / tests;
+    if let Evidence::Fit { fit, .. } = &evidence {
+        verdict.detectable = fit.detectable(own_level, POWER);
+    }
     if let Evidence::Test { difference, .. } = &evidence {
-        // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
-        let own_level = looks.first(one_look || claim.expect != Expect::Pass) / tests;
         let reference = if verdict.expected == 0.0 { 1.0 } else { verdict.expected.abs() };
         verdict.detectable = difference.detectable(own_level, POWER) / reference;
     }
@@ -222,18 +233,20 @@ fn state(
     }
     let found = match (&evidence, second) {
         (Evidence::None(reason), _) => Outcome::Invalid(reason.clone()),
-        (Evidence::Identity { holds: true }, _) => Outcome::Pass,
-        (Evidence::Identity { holds: false }, _) => Outcome::Fail,
+        (Evidence::Identity { holds: true } | Evidence::Exact { holds: true, .. }, _) => Outcome::Pass,
+        (Evidence::Identity { holds: false } | Evidence::Exact { holds: false, .. }, _) => Outcome::Fail,
         (_, Some(SecondLook::Missing)) => Outcome::Fail,
         (_, Some(SecondLook::Invalid(reason))) => Outcome::Invalid(format!("second look: {reason}")),
         (_, Some(SecondLook::Taken(p))) if *p < SECOND_LOOK => Outcome::Fail,
         // Not `adjusted_p < level`: a NaN must not pass.
-        (Evidence::Test { .. } | Evidence::Sum { .. }, _) => match verdict.adjusted_p {
-            p if p.is_nan() => Outcome::Invalid("the test has no p-value".into()),
-            p if p < looks.at_once() => Outcome::Fail,
-            _ if detect.is_some_and(|d| verdict.detectable > d) => Outcome::Underpowered,
-            _ => Outcome::Pass,
-        },
+        (Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }, _) => {
+            match verdict.adjusted_p {
+                p if p.is_nan() => Outcome::Invalid("the test has no p-value".into()),
+                p if p < looks.at_once() => Outcome::Fail,
+                _ if detect.is_some_and(|d| verdict.detectable > d) => Outcome::Underpowered,
+                _ => Outcome::Pass,
+            }
+        }
     };
     verdict.note = note(&found, &evidence, detect, &verdict);
     match second {
@@ -263,6 +276,8 @@ fn note(found: &Outcome, evidence: &Evidence, detect: Option<f64>, verdict: &Ver
         (Outcome::Fail, Evidence::Identity { .. }) => {
             format!("no sampling error, and a relative deviation of {:.1e}", verdict.statistic)
         }
+        (Outcome::Pass | Outcome::Fail, Evidence::Exact { said, .. }) => said.clone(),
+        (Outcome::Fail, Evidence::Fit { said, .. }) => said.clone(),
         (Outcome::Fail, Evidence::Sum { .. }) => "the table as a whole deviates".into(),
         (Outcome::Fail, _) => {
             let difference = verdict.value - verdict.expected;
@@ -303,10 +318,10 @@ fn expected_outcome(claim: &Claim, found: Outcome, note: &mut String) -> Outcome
 impl Evidence {
     fn p_value(&self) -> Option<f64> {
         match self {
-            Evidence::Test { test, .. } | Evidence::Sum { test } => {
+            Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. } => {
                 Some(test.p_value).filter(|p| !p.is_nan())
             }
-            Evidence::None(_) | Evidence::Identity { .. } => None,
+            Evidence::None(_) | Evidence::Identity { .. } | Evidence::Exact { .. } => None,
         }
     }
 }

@@ -11,5 +11,7 @@ pub mod junit;
 /// What verification says.
 pub mod verdict;
 
+/// What a sampler's record shows.
+mod sampler;
 /// What one comparison shows by itself.
 mod trial;

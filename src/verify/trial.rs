@@ -4,6 +4,7 @@ use super::levels::SHARED_ERROR;
 use super::verdict::{Outcome, Verdict};
 use crate::results::record::{Against, Bias, Comparison, EstimatorRun, Quantity, Record};
 use crate::results::store::Stored;
+use crate::stats::goodness::{Goodness, Proportion};
 use crate::stats::hypothesis::{Estimate, Spread, Test};
 use crate::stats::moments::Moments;
 use crate::stats::tree::total;
@@ -32,7 +33,7 @@ const STATED: [&str; 1] = ["wrong_side"];
 pub(super) struct Claim {
     /// Its name, or its kind and place in the file.
     pub label: String,
-    /// `equals` or `agree`.
+    /// `equals`, `agree` or `sampler`.
     pub kind: String,
     /// The outcome that makes it green.
     pub expect: Expect,
@@ -53,7 +54,7 @@ impl Claim {
     pub fn of(record: &Record, index: usize) -> Claim {
         let entry = &record.claims[index];
         let text = |key: &str| entry[key].as_str();
-        let kind = ["equals", "agree"].iter().find(|kind| !entry[**kind].is_null());
+        let kind = ["equals", "agree", "sampler"].iter().find(|kind| !entry[**kind].is_null());
         let kind = kind.map_or("claim", |kind| *kind).to_string();
         let expect = match text("expect") {
             Some("differs") => Expect::Differs,
@@ -76,6 +77,33 @@ pub(super) enum Evidence {
     Test { difference: Estimate, test: Test },
     /// A test of many comparisons at once.
     Sum { test: Test },
+    /// Counts against probabilities.
+    Fit { fit: Fit, test: Test, said: String },
+    /// A statement without chance: it holds, or it does not.
+    Exact { holds: bool, said: String },
+}
+
+/// Counts against probabilities: what knows the smallest defect that it would have found.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Fit {
+    /// Of many cells.
+    Cells(Goodness),
+    /// Of one outcome.
+    Share(Proportion),
+}
+
+impl Fit {
+    /// The smallest relative error of the density, or of the probability, that is rejected at `level`
+    /// with probability `power`.
+    pub fn detectable(&self, level: f64, power: f64) -> f64 {
+        match self {
+            Fit::Cells(found) => found.detectable(level, power).relative,
+            Fit::Share(found) => {
+                let (below, above) = found.detectable(level, power);
+                (found.mass - below).max(above - found.mass) / found.mass
+            }
+        }
+    }
 }
 
 /// What a trial is about, the same in the record of a second look.
@@ -85,6 +113,8 @@ pub(super) enum Item {
     Comparison(usize),
     /// Many of them.
     Table,
+    /// A sampler.
+    Sampler,
 }
 
 /// One comparison and what it shows.
