@@ -89,7 +89,7 @@ pub struct Planted {
     pub family: Family,
     /// What is wrong, in one line.
     pub what: &'static str,
-    /// The tests, `experiment.claim` or `identity NAME`, of which each is expected to see it.
+    /// The tests, `experiment.claim`, `samplers.TEST` or `identity NAME`, of which each is expected to see it.
     pub expected: &'static [&'static str],
 }
 
@@ -296,29 +296,96 @@ pub const SAMPLERS: &[Planted] = &[
         "density-tilted",
         Defect::DensityTilted,
         "a density is off by what the claim says it detects",
+        &["samplers.chi2 coarse"],
     ),
-    sampler("density-doubled", Defect::DensityDoubled, "1/(2 pi) for 1/(4 pi) in a phase function"),
-    sampler("sampler-flipped", Defect::SamplerFlipped, "draws and density are those of -g"),
-    sampler("draw-flipped", Defect::DrawFlipped, "draws are those of -g"),
-    sampler("untruncated", Defect::Untruncated, "draws go beyond the end that the density has"),
-    sampler("share-missing", Defect::ShareMissing, "a truncated density is not divided by its share"),
-    sampler("bound-sign", Defect::BoundSign, "the sign of an equiangular bound is wrong"),
-    sampler("unnormalised", Defect::Unnormalised, "equiangular draws along a direction 1.1 long"),
-    sampler("component-density", Defect::ComponentDensity, "a lobe's density is told for the mixture's"),
+    sampler(
+        "density-doubled",
+        Defect::DensityDoubled,
+        "1/(2 pi) for 1/(4 pi) in a phase function",
+        &["samplers.identity D7"],
+    ),
+    sampler(
+        "sampler-flipped",
+        Defect::SamplerFlipped,
+        "draws and density are those of -g",
+        &["samplers.contrast mean cosine"],
+    ),
+    sampler(
+        "draw-flipped",
+        Defect::DrawFlipped,
+        "draws are those of -g",
+        &["samplers.chi2 coarse", "samplers.contrast mean cosine"],
+    ),
+    sampler(
+        "untruncated",
+        Defect::Untruncated,
+        "draws go beyond the end that the density has",
+        &["samplers.outside"],
+    ),
+    sampler(
+        "share-missing",
+        Defect::ShareMissing,
+        "a truncated density is not divided by its share",
+        &["samplers.identity D7"],
+    ),
+    sampler(
+        "bound-sign",
+        Defect::BoundSign,
+        "the sign of an equiangular bound is wrong",
+        &["samplers.chi2 coarse", "samplers.identity D7"],
+    ),
+    sampler(
+        "unnormalised",
+        Defect::Unnormalised,
+        "equiangular draws along a direction 1.1 long",
+        &["samplers.chi2 coarse"],
+    ),
+    sampler(
+        "component-density",
+        Defect::ComponentDensity,
+        "a lobe's density is told for the mixture's",
+        &["samplers.identity D5"],
+    ),
     sampler(
         "lobe-number-reused",
         Defect::LobeNumberReused,
         "the number that chose a lobe is not rescaled",
+        &["samplers.chi2 coarse"],
     ),
-    sampler("mass-off", Defect::MassOff, "a delta lobe is drawn 10 % too often"),
-    sampler("delta-leaks", Defect::DeltaLeaks, "a delta lobe's mass leaks into the density"),
-    sampler("nulls-redrawn", Defect::NullsRedrawn, "failed draws are drawn again"),
-    sampler("sampler-sine-missing", Defect::SamplerSineMissing, "theta is uniform, the density is not"),
-    sampler("neighbours-alike", Defect::NeighboursAlike, "every other draw nearly repeats the last"),
+    sampler(
+        "mass-off",
+        Defect::MassOff,
+        "a delta lobe is drawn 10 % too often",
+        &["samplers.delta delta"],
+    ),
+    sampler(
+        "delta-leaks",
+        Defect::DeltaLeaks,
+        "a delta lobe's mass leaks into the density",
+        &["samplers.identity D7"],
+    ),
+    sampler("nulls-redrawn", Defect::NullsRedrawn, "failed draws are drawn again", &["samplers.null"]),
+    sampler(
+        "sampler-sine-missing",
+        Defect::SamplerSineMissing,
+        "theta is uniform, the density is not",
+        &["samplers.chi2 coarse", "samplers.contrast cos^2"],
+    ),
+    sampler(
+        "neighbours-alike",
+        Defect::NeighboursAlike,
+        "every other draw nearly repeats the last",
+        &["samplers.serial"],
+    ),
 ];
 
-const fn sampler(name: &'static str, defect: Defect, what: &'static str) -> Planted {
-    of(Family::Sampler, row(name, defect, what, &["samplers.densities"]))
+const fn sampler(
+    name: &'static str,
+    defect: Defect,
+    what: &'static str,
+    expected: &'static [&'static str],
+) -> Planted {
+    of(Family::Sampler, row(name, defect, what, expected))
 }
 
 /// Every defect of the verifier's arithmetic.
@@ -385,14 +452,10 @@ pub const UNIT_TESTED: &[(&str, &str)] = &[
 /// No defect: everything has to be green.
 pub const SHAM: Planted = of(Family::Sham, row("sham", Defect::None, "nothing is wrong", &[]));
 
-/// Whether claims on samplers can be judged; until then the rows of [`SAMPLERS`] are not played.
-pub const SAMPLERS_ARE_JUDGED: bool = false;
-
 /// The sham, then every defect.
 pub fn all() -> Vec<Planted> {
     let planted = [TRACER, SAMPLERS, VERIFIER].into_iter().flatten();
-    let played = planted.filter(|row| SAMPLERS_ARE_JUDGED || row.family != Family::Sampler);
-    std::iter::once(SHAM).chain(played.copied()).collect()
+    std::iter::once(SHAM).chain(planted.copied()).collect()
 }
 
 /// All names.

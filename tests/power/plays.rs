@@ -14,7 +14,7 @@ use scatterproof::results::image::Picture;
 use scatterproof::results::npy::Array;
 use scatterproof::results::record::Band;
 
-use super::defects::{Family, Planted, SAMPLERS_ARE_JUDGED};
+use super::defects::{Family, Planted};
 
 /// What `verify` said of one defect with one seed.
 #[derive(Clone, Debug)]
@@ -119,8 +119,7 @@ fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
     if row.family != Family::Verifier {
         command.args(["verify", "--quiet", "--threads", "1", "--out"]).arg(&out);
         command.arg("--csv").arg(&verdicts).arg("--fresh-seed").arg(format!("{}/{number}", row.name));
-        let judged = |family| SAMPLERS_ARE_JUDGED || family != Family::Sampler;
-        let mine = |family| judged(family) && (row.family == Family::Sham || row.family == family);
+        let mine = |family| row.family == Family::Sham || row.family == family;
         let files = EXPERIMENTS.iter().filter(|(family, ..)| mine(*family));
         command.args(files.map(|(_, name, _)| folder.join(name)));
     }
@@ -135,7 +134,8 @@ fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
     Outcome { exit: output.status.code().unwrap_or(-1), tests, said: said.into_owned(), seconds }
 }
 
-/// `experiment.claim` -> the worst of its verdicts, from the table that `verify --csv` writes.
+/// Test -> the worst of its verdicts, from the table that `verify --csv` writes. A test is named
+/// `experiment.claim`; one claim on samplers is many tests, which are named `samplers.test`.
 fn seen_in(table: &str) -> BTreeMap<String, Seen> {
     let mut reader = csv::Reader::from_reader(table.as_bytes());
     let mut tests = BTreeMap::new();
@@ -146,7 +146,8 @@ fn seen_in(table: &str) -> BTreeMap<String, Seen> {
             "underpowered" => Seen::Underpowered,
             _ => Seen::Defect,
         };
-        let worst = tests.entry(format!("{}.{}", row["experiment"], row["claim"])).or_insert(seen);
+        let of = if row["experiment"] == "samplers" { "test" } else { "claim" };
+        let worst = tests.entry(format!("{}.{}", row["experiment"], row[of])).or_insert(seen);
         *worst = seen.max(*worst);
     }
     tests

@@ -52,7 +52,7 @@ const G: f64 = 0.7;
 
 /// Root mean square of the density's relative error under [`Defect::DensityTilted`]: what the experiment
 /// claims to detect (`detect` in samplers.toml).
-const TILT: f64 = 0.1;
+const TILT: f64 = 0.06;
 
 /// Henyey-Greenstein about a direction of travel that is aligned with nothing; chart ((1 + mu)/2, turns).
 struct Phase {
