@@ -61,16 +61,17 @@ impl Tally {
 pub fn main(words: &[String]) -> ExitCode {
     let value = |flag: &str| words.iter().position(|w| w == flag).and_then(|i| words.get(i + 1));
     let seeds: u64 = value("--seeds").map_or(20, |text| text.parse().expect("--seeds takes a number"));
+    assert!(seeds > 0, "no seed, no evidence");
     let published = concat!(env!("CARGO_MANIFEST_DIR"), "/results/published");
     let out = Path::new(value("--out").map_or(published, String::as_str));
     let rows = defects::all();
     let plays: Vec<(Planted, u64)> =
         (0..seeds).flat_map(|seed| rows.iter().map(move |row| (*row, seed))).collect();
     let mut tallies: BTreeMap<&str, Tally> = BTreeMap::new();
-    let mut cpu = 0.0;
+    let mut busy = 0.0;
     plays::all(&plays, |row, seed, outcome| {
         tallies.entry(row.name).or_default().add(row, outcome);
-        cpu += outcome.seconds;
+        busy += outcome.seconds;
         if let Err(why) = judge(row, outcome) {
             println!("{} seed {seed}: {why}", row.name);
         }
@@ -79,7 +80,7 @@ pub fn main(words: &[String]) -> ExitCode {
     fs::write(out.join("blindness.csv"), csv(&rows, &tallies)).expect("blindness.csv");
     fs::write(out.join("blindness.md"), markdown(&rows, &tallies, seeds)).expect("blindness.md");
     let bad: Vec<_> = rows.iter().filter(|row| tallies[row.name].good < seeds).collect();
-    println!("{} plays in {cpu:.0} s of processes, into {}", plays.len(), out.display());
+    println!("{} plays in {busy:.0} s of processes, into {}", plays.len(), out.display());
     bad.iter().for_each(|row| println!("red: {}", row.name));
     if bad.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) }
 }
@@ -121,7 +122,8 @@ fn markdown(rows: &[Planted], tallies: &BTreeMap<&str, Tally>, seeds: u64) -> St
          that saw the defect with every seed, *sometimes* the others that saw it, each with its number \
          of seeds. A defect that one test alone always sees is marked `!`: nothing stands behind that \
          test. Tests that were expected to see a defect and missed a seed are listed as blind. The whole \
-         matrix is `blindness.csv`.\n\n\
+         matrix is `blindness.csv`. Of techniques that the program does not have nothing is planted; each \
+         brings its own rows.\n\n\
          | defect | what is wrong | caught | always | sometimes | blind |\n|---|---|---|---|---|---|\n"
     );
     for row in rows {
