@@ -147,8 +147,8 @@ pub const TRACER: &[Planted] = &[
     row(
         "reflection-jacobian",
         Defect::ReflectionJacobian,
-        "the density of rough refraction has reflection's Jacobian 1 / (4 |w.h|)",
-        &["rough.sun", "identity normalisation"],
+        "the density of rough refraction has reflection's Jacobian 1 / (4 w.h)",
+        &["rough.sun", "identity sample-density"],
     ),
     row(
         "sample-count-missing",

@@ -113,10 +113,11 @@ fn caught(row: &Planted, tally: &Tally) -> u64 {
 
 /// The same for people.
 fn markdown(rows: &[Planted], tallies: &BTreeMap<&str, Tally>, seeds: u64) -> String {
+    let played = if seeds == 1 { "one seed".to_string() } else { format!("{seeds} seeds") };
     let mut text = format!(
         "# The blindness matrix\n\n\
          Made by `cargo test --release --test power -- matrix --seeds {seeds}`; do not edit.\n\n\
-         Each defect was planted in a test-only program and played with {seeds} seeds (named by its \
+         Each defect was planted in a test-only program and played with {played} (named by its \
          name) at the budget of continuous integration, the same for all. A test is a claim of an \
          experiment in `tests/power/`, or an identity that holds to rounding. *Always* lists the tests \
          that saw the defect with every seed, *sometimes* the others that saw it, each with its number \
