@@ -7,12 +7,12 @@ use crate::error::{Error, Result};
 use crate::experiment::registry::Registry;
 use crate::experiment::{LoadOptions, Loaded, load_any};
 use crate::report::{self, table::verdict_table};
-use crate::results::record::Quantity;
+use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::{atomic, provenance};
 use crate::run::Options;
 use crate::run::interrupt::Interrupt;
-use crate::verify::judge::{Case, Judgement, Looks, judge};
+use crate::verify::judge::{Case, Judgement, Looks, Measured, judge};
 use crate::verify::junit;
 use crate::verify::levels::{FAMILY_LEVEL, FIRST_LOOK, RETEST_FACTOR};
 use crate::verify::nights::Nights;
@@ -195,26 +195,54 @@ impl Court<'_> {
         let mut looked = false;
         for (index, subject) in subjects.iter_mut().enumerate() {
             let own = judgement.wanted.iter().filter(|w| w.case == index);
-            let wanted: Vec<Quantity> = own.map(|w| w.quantity.clone()).collect();
-            let (false, Some(Loaded::Scene(experiment))) = (wanted.is_empty(), &subject.experiment)
-            else {
-                continue;
-            };
-            eprintln!("second look at {}", experiment.file.name);
-            let stored = crate::run::retest(
-                experiment,
-                self.registry,
-                &self.working,
-                &self.interrupt,
-                &subject.main.record,
-                &wanted,
-                RETEST_FACTOR,
-            )?;
-            subject.retest = Some(stored);
+            let mut wanted: Vec<Measured> = own.map(|w| w.subject.clone()).collect();
+            let (false, Some(experiment)) = (wanted.is_empty(), &subject.experiment) else { continue };
+            eprintln!("second look at {}", experiment.name());
+            // What an earlier second look holds stays in its record.
+            wanted.extend(subject.retest.iter().flat_map(held));
+            let main = &subject.main.record;
+            subject.retest = Some(self.measured_again(experiment, main, &wanted)?);
             looked = true;
         }
         Ok(looked)
     }
+
+    fn measured_again(&self, experiment: &Loaded, main: &Record, wanted: &[Measured]) -> Result<Stored> {
+        let quantities = wanted.iter().filter_map(|w| match w {
+            Measured::Quantity(quantity) => Some(quantity.clone()),
+            Measured::Sampler(_) => None,
+        });
+        let samplers = wanted.iter().filter_map(|w| match w {
+            Measured::Sampler(name) => Some(name.clone()),
+            Measured::Quantity(_) => None,
+        });
+        let (registry, working, interrupt) = (self.registry, &self.working, &self.interrupt);
+        match experiment {
+            Loaded::Scene(experiment) => {
+                let wanted: Vec<Quantity> = quantities.collect();
+                let factor = RETEST_FACTOR;
+                crate::run::retest(experiment, registry, working, interrupt, main, &wanted, factor)
+            }
+            Loaded::Samplers(experiment) => {
+                let names = samplers.collect();
+                let factor = RETEST_FACTOR;
+                crate::run::samplers::retest(experiment, registry, working, interrupt, &names, factor)
+            }
+        }
+    }
+}
+
+/// Everything that a record holds.
+fn held(stored: &Stored) -> Vec<Measured> {
+    let cells = stored.record.cells.iter().enumerate();
+    let quantities = cells.flat_map(|(cell, c)| {
+        c.runs.iter().filter_map(move |run| {
+            let (estimator, observable) = (run.estimator.clone(), run.observables.first()?.clone());
+            Some(Measured::Quantity(Quantity { cell, estimator, observable, band: 0 }))
+        })
+    });
+    let samplers = stored.record.samplers.iter().map(|run| Measured::Sampler(run.sampler.clone()));
+    quantities.chain(samplers).collect()
 }
 
 /// The state that earlier nights left; empty where there is none.
@@ -264,16 +292,24 @@ fn tell(verdicts: &[Verdict], verbose: bool) {
          {FAMILY_LEVEL:e} (Holm over all; below {FIRST_LOOK:e} a second look on fresh streams decides)",
         verdicts.len()
     );
-    if let Some(worst) = verdicts
-        .iter()
-        .filter(|v| v.expected != 0.0 && v.detectable.is_finite())
-        .map(|v| v.detectable)
-        .max_by(f64::total_cmp)
-    {
-        println!(
-            "largest defect that could have gone unseen (99 % power): {:.2} % of the value",
-            100.0 * worst
-        );
+    tell_power(verdicts);
+}
+
+/// The largest defects that could have gone unseen, by what they are relative to.
+fn tell_power(verdicts: &[Verdict]) {
+    let largest = |chosen: &dyn Fn(&&Verdict) -> bool| {
+        let of = verdicts.iter().filter(chosen).map(|v| v.detectable).filter(|d| d.is_finite());
+        of.max_by(f64::total_cmp)
+    };
+    let is_cells = |v: &&Verdict| v.test.starts_with("chi2");
+    let is_mean =
+        |v: &&Verdict| ["t", "welch t", "paired t"].contains(&v.test.as_str()) && v.expected != 0.0;
+    let what = [
+        (largest(&is_mean), "of the value of a mean"),
+        (largest(&is_cells), "of a sampler's density, everywhere"),
+    ];
+    for (worst, of) in what.into_iter().filter_map(|(worst, of)| worst.map(|worst| (worst, of))) {
+        println!("largest defect that could have gone unseen (99 % power): {:.2} % {of}", 100.0 * worst);
     }
 }
 

@@ -164,7 +164,9 @@ impl RoughSampler {
             Event::Refract => {
                 let cos_t = ((r * r - 1.0 + m * m).max(0.0)).sqrt() / r;
                 let shift = cos_t - m / r;
-                (self.upper(-shift * h - wo / r), shift * shift / cos_t)
+                // At the critical angle nothing is refracted: the share vanishes with cos_t, the density with it.
+                let jacobian = if cos_t == 0.0 { 0.0 } else { shift * shift / cos_t };
+                (self.upper(-shift * h - wo / r), jacobian)
             }
         }
     }

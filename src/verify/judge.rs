@@ -35,13 +35,22 @@ pub struct Judgement {
     pub wanted: Vec<Wanted>,
 }
 
-/// A quantity that wants a second look.
+/// What wants a second look.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wanted {
     /// The case.
     pub case: usize,
-    /// The quantity.
-    pub quantity: Quantity,
+    /// What is to be measured again.
+    pub subject: Measured,
+}
+
+/// Something that can be measured again.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Measured {
+    /// A quantity of a scene.
+    Quantity(Quantity),
+    /// A sampler, by name.
+    Sampler(String),
 }
 
 /// Judges one record by itself, with one look.
@@ -138,26 +147,24 @@ fn conclude(cases: &[Case], trials: Vec<(usize, Trial)>, looks: Looks) -> Judgem
     let mut wanted = Vec::new();
     for ((&i, second), adjusted_p) in again.iter().zip(seconds).zip(second_adjusted) {
         let (case, first) = &trials[i];
-        let look = match second.map(|t| t.evidence) {
-            None => {
-                wanted.extend(
-                    quantities(&cases[*case], first).map(|quantity| Wanted { case: *case, quantity }),
-                );
-                SecondLook::Missing
-            }
-            Some(Evidence::None(reason)) => SecondLook::Invalid(reason),
-            Some(Evidence::Identity { holds } | Evidence::Exact { holds, .. }) => {
-                SecondLook::Taken(if holds { 1.0 } else { 0.0 })
-            }
-            Some(Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. })
-                if test.p_value.is_nan() =>
-            {
-                SecondLook::Invalid("the test has no p-value".into())
-            }
-            Some(Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }) => {
-                SecondLook::Taken(adjusted_p)
-            }
-        };
+        let look =
+            match second.map(|t| t.evidence) {
+                None => {
+                    let subjects = measured_by(&cases[*case], first);
+                    wanted.extend(subjects.into_iter().map(|subject| Wanted { case: *case, subject }));
+                    SecondLook::Missing
+                }
+                Some(Evidence::None(reason)) => SecondLook::Invalid(reason),
+                Some(Evidence::Identity { holds } | Evidence::Exact { holds, .. }) => {
+                    SecondLook::Taken(if holds { 1.0 } else { 0.0 })
+                }
+                Some(
+                    Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. },
+                ) if test.p_value.is_nan() => SecondLook::Invalid("the test has no p-value".into()),
+                Some(Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }) => {
+                    SecondLook::Taken(adjusted_p)
+                }
+            };
         second_looks.insert(i, look);
     }
     let tests = p_values.len().max(1) as f64;
@@ -173,7 +180,7 @@ fn conclude(cases: &[Case], trials: Vec<(usize, Trial)>, looks: Looks) -> Judgem
 /// Did the first look fail, and is it one that a second look decides? A control that must differ has to
 /// be seen at once.
 fn wants_second_look(trial: &Trial, adjusted_p: f64, looks: Looks) -> bool {
-    matches!(trial.evidence, Evidence::Test { .. })
+    matches!(trial.evidence, Evidence::Test { .. } | Evidence::Fit { .. })
         && !trial.one_look
         && trial.claim.expect == Expect::Pass
         && (looks.at_once()..FIRST_LOOK).contains(&adjusted_p)
@@ -182,28 +189,39 @@ fn wants_second_look(trial: &Trial, adjusted_p: f64, looks: Looks) -> bool {
 /// The same trial on the record of the second look, where that holds all it needs.
 fn second(case: &Case, first: &Trial) -> Option<Trial> {
     let retest = case.retest?;
-    let held = |q: &Quantity| retest.batches(q).is_some();
+    let is_held = |subject: &Measured| match subject {
+        Measured::Quantity(quantity) => retest.batches(quantity).is_some(),
+        Measured::Sampler(name) => retest.record.samplers.iter().any(|run| run.sampler == *name),
+    };
+    let subjects = measured_by(case, first);
+    if subjects.is_empty() || !subjects.iter().all(is_held) {
+        return None;
+    }
     match first.item {
-        Item::Comparison(index) if quantities(case, first).all(|q| held(&q)) => {
-            Some(trial(retest, index, &case.main.record.comparisons[index]))
-        }
-        Item::Comparison(_) | Item::Table | Item::Sampler => None,
+        Item::Comparison(index) => Some(trial(retest, index, &case.main.record.comparisons[index])),
+        Item::Sampler => super::sampler::trials(retest).into_iter().find(|again| {
+            let of = |t: &Trial| (t.claim_index, t.verdict.estimators.clone(), t.verdict.test.clone());
+            of(again) == of(first)
+        }),
+        Item::Table => None,
     }
 }
 
 /// What a second look at a trial has to measure.
-fn quantities<'a>(case: &Case<'a>, trial: &Trial) -> impl Iterator<Item = Quantity> + use<'a> {
-    let comparison = match trial.item {
-        Item::Comparison(index) => Some(&case.main.record.comparisons[index]),
-        Item::Table | Item::Sampler => None,
-    };
-    comparison.into_iter().flat_map(|c| {
-        let other = match &c.against {
-            Against::Quantity { other, .. } => Some(other.clone()),
-            Against::Value { .. } => None,
-        };
-        std::iter::once(c.quantity.clone()).chain(other)
-    })
+fn measured_by(case: &Case, trial: &Trial) -> Vec<Measured> {
+    match trial.item {
+        Item::Comparison(index) => {
+            let comparison = &case.main.record.comparisons[index];
+            let other = match &comparison.against {
+                Against::Quantity { other, .. } => Some(other.clone()),
+                Against::Value { .. } => None,
+            };
+            let quantities = std::iter::once(comparison.quantity.clone()).chain(other);
+            quantities.map(Measured::Quantity).collect()
+        }
+        Item::Sampler => vec![Measured::Sampler(trial.verdict.estimators.clone())],
+        Item::Table => Vec::new(),
+    }
 }
 
 /// What a second look came to.

@@ -311,7 +311,7 @@ fn a_first_look_between_the_levels_wants_a_second() {
     let waiting = judged_twice(4.0, None);
     assert_eq!(waiting.verdicts[0].outcome, Outcome::Fail);
     assert!(waiting.verdicts[0].note.ends_with("wants a second look on fresh streams"));
-    assert_eq!(waiting.wanted, [Wanted { case: 0, quantity: quantity("mis", 0) }]);
+    assert_eq!(waiting.wanted, [Wanted { case: 0, subject: Measured::Quantity(quantity("mis", 0)) }]);
     for off in [3.0, 6.5] {
         let at_once = judged_twice(off, None);
         assert!(at_once.wanted.is_empty(), "{off}");

@@ -71,7 +71,7 @@ fn blank(record: &Record, index: usize, sampler: &str, test: &str, evidence: Evi
         claim_index: index,
         evidence,
         detect: None,
-        one_look: true,
+        one_look: false,
         reference: None,
         verdict,
     }
