@@ -1,10 +1,8 @@
-//! Significance tests of means, and what they can detect. Two-sided throughout, and by survival
-//! functions alone: 1 - cdf has no digits left where gates decide.
-
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+//! Significance tests of means, and what they can detect. Two-sided throughout.
 
 use super::moments::Moments;
-use crate::math;
+use super::tails::student_two_sided;
+pub use super::tails::{chi_square_sf, critical_value};
 
 /// An estimate with its standard error and the degrees of freedom of that error (infinite where the
 /// error is known).
@@ -105,73 +103,12 @@ impl Spread {
     }
 }
 
-/// P(|Z| > |z|) for a standard normal Z.
-pub fn normal_two_sided(z: f64) -> f64 {
-    math::erfc(z.abs() * std::f64::consts::FRAC_1_SQRT_2)
-}
-
-/// P(|T| > |t|) for Student's T; the normal at infinitely many degrees of freedom.
-pub fn student_two_sided(t: f64, dof: f64) -> f64 {
-    if dof == f64::INFINITY {
-        return normal_two_sided(t);
-    }
-    StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |d| 2.0 * d.sf(t.abs()))
-}
-
-/// P(X > x) for a chi-square X.
-pub fn chi_square_sf(x: f64, dof: f64) -> f64 {
-    ChiSquared::new(dof).map_or(f64::NAN, |d| d.sf(x))
-}
-
-/// The t > 0 with P(|T| > t) = `level`, by bisection of the survival function; `level` in (0, 1].
-pub fn critical_value(level: f64, dof: f64) -> f64 {
-    let above = |t: f64| student_two_sided(t, dof) > level;
-    let (mut low, mut high) = (0.0, 1.0);
-    while above(high) {
-        (low, high) = (high, 2.0 * high);
-    }
-    while high - low > 1e-14 * high {
-        let middle = 0.5 * (low + high);
-        if above(middle) { low = middle } else { high = middle }
-    }
-    high
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn close(a: f64, b: f64, relative: f64) {
         assert!((a - b).abs() <= relative * b.abs(), "{a:e} is not {b:e}");
-    }
-
-    // mpmath 40 digits: betainc(nu/2, 1/2, 0, nu/(nu + t^2), regularized=True).
-    #[test]
-    fn student_survival() {
-        close(student_two_sided(2.0, 63.0), 0.04981576369904481, 1e-12);
-        close(student_two_sided(-5.5, 63.0), 7.367567470776202e-07, 1e-12);
-        close(student_two_sided(12.0, 127.0), 1.2065688250812803e-22, 1e-12);
-        close(student_two_sided(40.0, 63.0), 1.6974279920901165e-46, 1e-12);
-        close(student_two_sided(3.3, 10.5), 0.007516643641858988, 1e-12);
-        assert!(student_two_sided(1.0, 0.0).is_nan());
-    }
-
-    // mpmath: erfc(z / sqrt(2)).
-    #[test]
-    fn normal_survival() {
-        close(normal_two_sided(0.5), 0.6170750774519738, 1e-14);
-        close(normal_two_sided(-1.96), 0.04999579029644087, 1e-14);
-        close(normal_two_sided(4.9), 9.58366553180638e-07, 1e-13);
-        close(normal_two_sided(30.0), 9.813427854296374e-198, 1e-12);
-    }
-
-    // mpmath: gammainc(k/2, x/2, inf, regularized=True).
-    #[test]
-    fn chi_square_survival() {
-        close(chi_square_sf(90.0, 63.0), 0.014414544792022971, 1e-12);
-        close(chi_square_sf(11.0, 12.0), 0.528918686525862, 1e-12);
-        close(chi_square_sf(400.0, 63.0), 1.6839703370731965e-50, 1e-11);
-        close(chi_square_sf(1.5, 1.0), 0.2206713619198468, 1e-12);
     }
 
     // scipy: t.isf(0.5e-6, 63), norm.isf(0.5e-6), t.isf(0.5e-8, 63).

@@ -1,10 +1,20 @@
 //! Moments, tests, multiplicity. Door for `statrs`, of which only survival functions are used.
 
+/// Tests of acceptance by optical depth, and enumeration of discrete choices.
+pub mod acceptance;
+/// Two estimators at equal cost.
+pub mod efficiency;
+/// E-values: evidence that accumulates.
+pub mod evidence;
+/// Tests of samples against known probabilities.
+pub mod goodness;
 /// Significance tests of means, and what they can detect.
 pub mod hypothesis;
 /// Mergeable moments of scalars and images.
 pub mod moments;
 /// Many tests under one error rate.
 pub mod multiplicity;
+/// Survival functions and their inverses.
+pub mod tails;
 /// The fixed dyadic reduction over passes.
 pub mod tree;

@@ -1,0 +1,463 @@
+//! Efficiency at equal cost: the log ratio of two estimators' variance times cost, with an interval from a
+//! block jackknife, and the conditions under which such a number means anything.
+//!
+//! For arms A and B, R = log(V_A c_A) - log(V_B c_B): V is the variance of one pass, pooled over all blocks,
+//! c the cost of one pass, sum cost / sum n. At R < 0, A reaches an error at less cost: exp(-R) is its gain.
+//!
+//! *Why a jackknife.* An F interval for V_A/V_B believes in normal values and covers 25 % instead of 95 % on
+//! lognormal ones; the mean of per-block log variances is biased by the concavity of the logarithm, and
+//! differently for two shapes. Leaving out one block at a time and recomputing the pooled ratio measures
+//! its spread whatever the shape, and V and c together, which are correlated: long paths cost more and
+//! vary more.
+//!
+//! *Unequal blocks* (a partial last one). With n_k of n passes in block k and h_k = n / n_k, the pseudo-value
+//! of f is h_k f - (h_k - 1) f(without k), and
+//!   J = sum pseudo_k / h_k,   var J = (1/B) sum (pseudo_k - J)^2 / (h_k - 1)
+//! (F. Busing, E. Meijer, R. van der Leeden, "Delete-m jackknife for unequal m" (1999)). With equal blocks
+//! this is Tukey's (B - 1)/B sum (f(without k) - mean)^2. As R is a difference of a function of A's blocks and
+//! one of B's, deleting block k of both arms changes it by the sum of the two changes: with
+//! e_k = (pseudo_k - J) / sqrt(B (h_k - 1)) in each arm, the joint variance is sum (e_k(A) - e_k(B))^2, which
+//! keeps the covariance of blocks that ran side by side. Arms with different numbers of blocks are
+//! independent: their variances add, and Satterthwaite's dof holds.
+//!
+//! The quoted R is the plain one, not bias-corrected: its bias is of order 1/n, its error of order
+//! 1/sqrt(n).
+
+use std::fmt;
+
+use super::hypothesis::{Estimate, Test};
+use super::moments::Moments;
+use super::tails::critical_value;
+use super::tree::Merge;
+use crate::math::{exp, ln};
+
+/// The fewest blocks of an arm: below, Student's interval is too wide to say anything.
+pub const FEWEST_BLOCKS: usize = 8;
+
+/// The largest share of an arm's sum of squares that one pass may hold.
+pub const LARGEST_SHARE: f64 = 0.05;
+
+/// Passes that ran together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Block {
+    /// Moments of the passes' values.
+    pub moments: Moments,
+    /// What they cost together, in any unit that both arms share: CPU seconds, rays.
+    pub cost: f64,
+}
+
+/// Why there is no ratio.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoRatio {
+    /// Fewer than [`FEWEST_BLOCKS`] blocks in an arm, or an empty block.
+    TooFewBlocks,
+    /// A moment or a cost is not finite, or a cost is not positive.
+    NotFinite,
+    /// An arm's passes (perhaps without one block) are all equal: its variance has no logarithm.
+    NoVariance,
+}
+
+impl fmt::Display for NoRatio {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            NoRatio::TooFewBlocks => "an arm has too few blocks, or an empty one",
+            NoRatio::NotFinite => "a moment or a cost is not finite, or a cost is not positive",
+            NoRatio::NoVariance => "an arm has no variance, at least without one of its blocks",
+        })
+    }
+}
+
+/// A log ratio, A over B.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogRatio {
+    /// The logarithm, with its jackknife error and the error's degrees of freedom.
+    pub log: Estimate,
+    /// Half the width of the two-sided Student interval of `log` at the confidence that was asked for.
+    pub half_width: f64,
+}
+
+impl LogRatio {
+    /// The ratio itself.
+    pub fn ratio(&self) -> f64 {
+        exp(self.log.value)
+    }
+
+    /// The interval of the ratio.
+    pub fn interval(&self) -> (f64, f64) {
+        (exp(self.log.value - self.half_width), exp(self.log.value + self.half_width))
+    }
+
+    /// The two-sided test that the true ratio is `ratio`.
+    pub fn test(&self, ratio: f64) -> Test {
+        self.log.minus(&Estimate::known(ln(ratio), 0.0)).test_zero()
+    }
+}
+
+/// What one arm is like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arm {
+    /// Moments of all its passes.
+    pub moments: Moments,
+    /// Cost of a pass.
+    pub cost: f64,
+    /// Kurtosis of a pass (3 for a normal). The variance of log V is about (kurtosis - 1) / n.
+    pub kurtosis: f64,
+    /// The largest share of M2 (about the mean of all passes) that one block holds.
+    pub largest_block: f64,
+    /// A lower and an upper bound of the largest share of M2 that one pass holds: see [`one_pass_share`].
+    pub largest_pass: (f64, f64),
+}
+
+/// Two estimators at equal cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Efficiency {
+    /// V_A c_A / (V_B c_B): below 1 where A is the more efficient.
+    pub work: LogRatio,
+    /// V_A / V_B.
+    pub variance: LogRatio,
+    /// c_A / c_B.
+    pub cost: LogRatio,
+    /// Arm A.
+    pub a: Arm,
+    /// Arm B.
+    pub b: Arm,
+    /// Were the blocks deleted in pairs?
+    pub is_joint: bool,
+    /// How far `work`'s log moved from the first half of the blocks to all of them: when the passes doubled.
+    pub moved: f64,
+    /// May the ratio be quoted: it moved by no more than `half_width`, and in neither arm may one pass hold
+    /// more than [`LARGEST_SHARE`] of M2 (by the upper bound of `largest_pass`). The first condition alone
+    /// fails by chance in 1 - confidence of all honest comparisons: R of half the data has twice the
+    /// variance, its covariance with R of all is the latter's variance, and so their difference has the
+    /// standard error of R itself.
+    pub resolved: bool,
+}
+
+/// Bounds of the largest share s of sum (x_i - m)^2 that one pass of any block holds, m the mean of all.
+///
+/// In block k let Q2 = sum (x_i - m)^2 and Q4 = sum (x_i - m)^4 (its moments shifted by d = mean_k - m). One of
+/// the terms of Q4 is the square of the largest of Q2, so that is at most sqrt(Q4); and Q4 <= (largest term)
+/// Q2, so it is at least Q4 / Q2. With M2 = sum of all Q2:
+///   max_k Q4 / (Q2 M2) <= s <= max_k sqrt(Q4) / M2.
+/// Over one block the bounds are kurtosis / n and sqrt(kurtosis / n).
+pub fn one_pass_share(blocks: &[Block], mean: f64) -> (f64, f64) {
+    let about = |b: &Block| about(&b.moments, mean);
+    let m2: f64 = blocks.iter().map(|b| about(b).0).sum();
+    let bounds = blocks.iter().map(|b| {
+        let (q2, q4) = about(b);
+        (if q2 > 0.0 { q4 / (q2 * m2) } else { 0.0 }, q4.sqrt() / m2)
+    });
+    let (low, high) = bounds.fold((0.0f64, 0.0f64), |s, b| (s.0.max(b.0), s.1.max(b.1)));
+    (low, high.min(1.0))
+}
+
+/// Second and fourth powers of deviations from `mean`, summed: with x - mean = (x - mean_k) + d,
+/// M2 + n d^2 and M4 + 4 d M3 + 6 d^2 M2 + n d^4.
+fn about(moments: &Moments, mean: f64) -> (f64, f64) {
+    let (n, d) = (moments.n as f64, moments.mean - mean);
+    let d2 = d * d;
+    let q4 = moments.m4 + 4.0 * d * moments.m3 + 6.0 * d2 * moments.m2 + n * d2 * d2;
+    (moments.m2 + n * d2, q4.max(0.0))
+}
+
+/// Compares arms at `confidence`: 0.95 to show, 0.999 to decide.
+///
+/// # Errors
+///
+/// [`NoRatio`].
+pub fn compare(a: &[Block], b: &[Block], confidence: f64) -> Result<Efficiency, NoRatio> {
+    let (left, right) = (Jackknife::of(a)?, Jackknife::of(b)?);
+    let work = left.over(&right, |j| &j.work, confidence);
+    let half = |blocks: &[Block]| Totals::of(&blocks[..blocks.len() / 2]).work();
+    let moved = (half(a) - half(b) - work.log.value).abs();
+    let (a, b) = (left.arm(a), right.arm(b));
+    let is_shared = a.largest_pass.1 <= LARGEST_SHARE && b.largest_pass.1 <= LARGEST_SHARE;
+    Ok(Efficiency {
+        work,
+        variance: left.over(&right, |j| &j.variance, confidence),
+        cost: left.over(&right, |j| &j.cost, confidence),
+        a,
+        b,
+        is_joint: left.is_paired_with(&right),
+        moved,
+        // A NaN (a first half without variance) resolves nothing.
+        resolved: is_shared && moved <= work.half_width,
+    })
+}
+
+/// Moments and cost of some blocks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Totals {
+    moments: Moments,
+    cost: f64,
+}
+
+impl Totals {
+    fn of(blocks: &[Block]) -> Totals {
+        blocks
+            .iter()
+            .fold(Totals::default(), |sum, b| sum.and(&Totals { moments: b.moments, cost: b.cost }))
+    }
+
+    fn and(&self, later: &Totals) -> Totals {
+        Totals { moments: self.moments.merge(later.moments), cost: self.cost + later.cost }
+    }
+
+    fn log_variance(&self) -> f64 {
+        ln(self.moments.variance())
+    }
+
+    fn log_cost(&self) -> f64 {
+        ln(self.cost / self.moments.n as f64)
+    }
+
+    fn work(&self) -> f64 {
+        self.log_variance() + self.log_cost()
+    }
+}
+
+/// A function of all blocks, and e_k of every block.
+#[derive(Clone, Debug)]
+struct Deviations {
+    value: f64,
+    each: Vec<f64>,
+}
+
+/// One arm's log variance, log cost and their sum.
+struct Jackknife {
+    total: Totals,
+    variance: Deviations,
+    cost: Deviations,
+    work: Deviations,
+}
+
+impl Jackknife {
+    fn of(blocks: &[Block]) -> Result<Jackknife, NoRatio> {
+        if blocks.len() < FEWEST_BLOCKS || blocks.iter().any(|b| b.moments.n == 0) {
+            return Err(NoRatio::TooFewBlocks);
+        }
+        let is_good = |b: &Block| {
+            b.moments.to_array().iter().all(|x| x.is_finite()) && b.cost.is_finite() && b.cost > 0.0
+        };
+        if !blocks.iter().all(is_good) {
+            return Err(NoRatio::NotFinite);
+        }
+        let without = without_each(blocks);
+        let total = Totals::of(blocks);
+        if !without.iter().chain([&total]).all(|t| t.moments.m2 > 0.0) {
+            return Err(NoRatio::NoVariance);
+        }
+        let n = total.moments.n as f64;
+        let deviations = |f: fn(&Totals) -> f64| {
+            let (value, count) = (f(&total), blocks.len() as f64);
+            let h: Vec<f64> = blocks.iter().map(|b| n / b.moments.n as f64).collect();
+            let pseudo: Vec<f64> =
+                h.iter().zip(&without).map(|(h, t)| h * value - (h - 1.0) * f(t)).collect();
+            let centre: f64 = pseudo.iter().zip(&h).map(|(p, h)| p / h).sum();
+            let each = pseudo.iter().zip(&h).map(|(p, h)| (p - centre) / (count * (h - 1.0)).sqrt());
+            Deviations { value, each: each.collect() }
+        };
+        let (variance, cost) = (deviations(Totals::log_variance), deviations(Totals::log_cost));
+        Ok(Jackknife { total, variance, cost, work: deviations(Totals::work) })
+    }
+
+    fn arm(&self, blocks: &[Block]) -> Arm {
+        let moments = self.total.moments;
+        let share = |b: &Block| about(&b.moments, moments.mean).0 / moments.m2;
+        Arm {
+            moments,
+            cost: self.total.cost / moments.n as f64,
+            kurtosis: moments.kurtosis(),
+            largest_block: blocks.iter().map(share).fold(0.0, f64::max),
+            largest_pass: one_pass_share(blocks, moments.mean),
+        }
+    }
+
+    fn is_paired_with(&self, other: &Jackknife) -> bool {
+        self.work.each.len() == other.work.each.len()
+    }
+
+    fn over(&self, other: &Jackknife, of: fn(&Jackknife) -> &Deviations, confidence: f64) -> LogRatio {
+        let (a, b) = (of(self), of(other));
+        let squares = |d: &Deviations| d.each.iter().map(|e| e * e).sum::<f64>().sqrt();
+        let alone = |d: &Deviations| Estimate {
+            value: d.value,
+            std_error: squares(d),
+            dof: d.each.len() as f64 - 1.0,
+        };
+        let log = if self.is_paired_with(other) {
+            let each = a.each.iter().zip(&b.each).map(|(a, b)| a - b).collect();
+            alone(&Deviations { value: a.value - b.value, each })
+        } else {
+            alone(a).minus(&alone(b))
+        };
+        LogRatio { log, half_width: critical_value(1.0 - confidence, log.dof) * log.std_error }
+    }
+}
+
+/// All blocks but one, for each: merged prefixes with merged suffixes, because taking a block out again by
+/// subtraction would cancel.
+fn without_each(blocks: &[Block]) -> Vec<Totals> {
+    let mut after = vec![Totals::default()];
+    for block in blocks.iter().rev() {
+        let later = after[after.len() - 1];
+        after.push(Totals::of(std::slice::from_ref(block)).and(&later));
+    }
+    let mut before = Totals::default();
+    let mut without = Vec::with_capacity(blocks.len());
+    for (k, block) in blocks.iter().enumerate() {
+        without.push(before.and(&after[blocks.len() - 1 - k]));
+        before = before.and(&Totals::of(std::slice::from_ref(block)));
+    }
+    without
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(a: f64, b: f64, relative: f64) {
+        assert!((a - b).abs() <= relative * b.abs(), "{a:e} is not {b:e}");
+    }
+
+    fn block(values: &[f64], cost: f64) -> Block {
+        let mut moments = Moments::default();
+        values.iter().for_each(|x| moments.push(*x));
+        Block { moments, cost }
+    }
+
+    /// Values without a pattern: the fractional parts of multiples of an irrational number, cubed.
+    fn blocks(count: usize, size: usize, seed: f64) -> Vec<Block> {
+        let value = |i: usize| ((i as f64 + seed) * 0.618_033_988_749_895).fract();
+        let block = |k: usize| {
+            let values: Vec<f64> = (0..size).map(|i| value(k * size + i).powi(3)).collect();
+            block(&values, 2.0 + value(k))
+        };
+        (0..count).map(block).collect()
+    }
+
+    fn log_work(blocks: &[Block]) -> f64 {
+        let total = Totals::of(blocks);
+        (total.moments.m2 / (total.moments.n - 1) as f64).ln()
+            + (total.cost / total.moments.n as f64).ln()
+    }
+
+    // Tukey's formula, written out for equal blocks: joint, and independent with an arm of other length.
+    #[test]
+    fn the_jackknife_is_tukeys() {
+        let (a, b, short) = (blocks(12, 16, 0.3), blocks(12, 16, 70.7), blocks(9, 16, 5.5));
+        let drop = |blocks: &[Block], k: usize| log_work(&[&blocks[..k], &blocks[k + 1..]].concat());
+        let tukey = |values: Vec<f64>| {
+            let n = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / n;
+            (n - 1.0) / n * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
+        };
+        let joint = compare(&a, &b, 0.95).expect("a ratio");
+        assert!(joint.is_joint && joint.work.log.dof == 11.0);
+        close(joint.work.log.value, log_work(&a) - log_work(&b), 1e-12);
+        let variance = tukey((0..12).map(|k| drop(&a, k) - drop(&b, k)).collect());
+        close(joint.work.log.std_error, variance.sqrt(), 1e-10);
+        close(joint.work.half_width, 2.200985160082949 * variance.sqrt(), 1e-9);
+        let apart = compare(&a, &short, 0.95).expect("a ratio");
+        let of_a = tukey((0..12).map(|k| drop(&a, k)).collect());
+        let of_short = tukey((0..9).map(|k| drop(&short, k)).collect());
+        assert!(!apart.is_joint);
+        close(apart.work.log.std_error, (of_a + of_short).sqrt(), 1e-10);
+        let dof = (of_a + of_short).powi(2) / (of_a * of_a / 11.0 + of_short * of_short / 8.0);
+        close(apart.work.log.dof, dof, 1e-9);
+        close(apart.variance.log.value + apart.cost.log.value, apart.work.log.value, 1e-12);
+    }
+
+    // The same arm twice: blocks that ran side by side have nothing between them.
+    #[test]
+    fn an_arm_against_itself_is_even() {
+        let a = blocks(64, 64, 0.3);
+        let found = compare(&a, &a, 0.95).expect("a ratio");
+        assert_eq!((found.work.log.value, found.work.log.std_error), (0.0, 0.0));
+        assert_eq!((found.work.ratio(), found.moved), (1.0, 0.0));
+        assert!(found.resolved);
+        // Twice the cost and three times the values: ratio 2 * 9, without an error.
+        let b: Vec<Block> = a
+            .iter()
+            .map(|b| {
+                let [n, mean, m2, m3, m4] = b.moments.to_array();
+                let moments = Moments::from_array([n, 3.0 * mean, 9.0 * m2, 27.0 * m3, 81.0 * m4]);
+                Block { moments, cost: 2.0 * b.cost }
+            })
+            .collect();
+        let found = compare(&b, &a, 0.95).expect("a ratio");
+        close(found.work.ratio(), 18.0, 1e-12);
+        close(found.variance.ratio(), 9.0, 1e-12);
+        close(found.cost.ratio(), 2.0, 1e-12);
+        assert!(found.work.log.std_error < 1e-12);
+        close(found.a.kurtosis, found.b.kurtosis, 1e-12);
+    }
+
+    // The influence of a block on a mean is its share of the passes times its distance from the mean, so for
+    // the cost (log c is nearly linear where costs are nearly equal) the error of blocks of n_k passes is
+    // sqrt(sum n_k (c_k - c)^2 / ((B - 1) n)) / c, whatever their sizes: the partial block counts by its
+    // passes, where equal weights would let its own noise dominate.
+    #[test]
+    fn a_partial_block_has_its_weight() {
+        let mut a = blocks(64, 64, 0.3);
+        for (k, b) in a.iter_mut().enumerate() {
+            b.cost = 64.0 * (1.0 + 1e-3 * (k as f64 * 0.618).fract());
+        }
+        a.push(Block { moments: Moments { n: 2, ..a[0].moments }, cost: 2.0 * 1.01 });
+        let spread = super::super::hypothesis::Spread::of(
+            a.iter().map(|b| (b.moments.n as f64, b.cost / b.moments.n as f64)),
+        );
+        let b = blocks(16, 16, 900.1).into_iter().map(|b| Block { cost: 1.0, ..b }).collect::<Vec<_>>();
+        let found = compare(&a, &b, 0.95).expect("a ratio").cost.log;
+        close(found.std_error, spread.estimate.std_error / spread.estimate.value, 0.03);
+    }
+
+    #[test]
+    fn shares_of_one_pass_are_bounded() {
+        let mut values: Vec<f64> = (0..640).map(|i| f64::from(i % 7)).collect();
+        values[77] = 60.0;
+        let blocks: Vec<Block> = values.chunks(64).map(|v| block(v, 1.0)).collect();
+        let total = Totals::of(&blocks).moments;
+        let share = (60.0 - total.mean).powi(2) / total.m2;
+        let (low, high) = one_pass_share(&blocks, total.mean);
+        assert!(low <= share && share <= high && high < 1.1 * share, "{low} {share} {high}");
+        let one = [Block { moments: total, cost: 1.0 }];
+        let (low, high) = one_pass_share(&one, total.mean);
+        close(low, total.kurtosis() / 640.0, 1e-12);
+        close(high, (total.kurtosis() / 640.0).sqrt(), 1e-12);
+        // The ratio of such an arm is not to be quoted, and of one without the spike it is.
+        let calm: Vec<Block> = blocks.iter().map(|b| Block { cost: 1.0, ..*b }).skip(2).collect();
+        assert!(!compare(&blocks, &calm, 0.95).expect("a ratio").resolved);
+        assert!(compare(&calm, &calm, 0.95).expect("a ratio").resolved);
+    }
+
+    // The second half of A is three times as wide as the first: the log ratio moves by log 5 when the passes
+    // double, while no single pass is to blame.
+    #[test]
+    fn a_ratio_that_moves_is_not_resolved() {
+        let steady = blocks(64, 64, 0.3);
+        let mut drifting = blocks(64, 64, 40.4);
+        for block in &mut drifting[32..] {
+            let [n, mean, m2, m3, m4] = block.moments.to_array();
+            block.moments = Moments::from_array([n, mean, 9.0 * m2, 27.0 * m3, 81.0 * m4]);
+        }
+        let found = compare(&drifting, &steady, 0.95).expect("a ratio");
+        assert!(found.a.largest_pass.1 < LARGEST_SHARE && found.moved > 1.0 && !found.resolved);
+    }
+
+    #[test]
+    fn what_has_no_ratio() {
+        let good = blocks(16, 16, 0.3);
+        let refusal = |bad: Vec<Block>| {
+            assert_eq!(compare(&bad, &good, 0.95).err(), compare(&good, &bad, 0.95).err());
+            compare(&bad, &good, 0.95).expect_err("no ratio")
+        };
+        assert_eq!(refusal(good[..7].to_vec()), NoRatio::TooFewBlocks);
+        assert_eq!(refusal(vec![Block { cost: f64::NAN, ..good[0] }; 16]), NoRatio::NotFinite);
+        assert_eq!(refusal(vec![Block { cost: 0.0, ..good[0] }; 16]), NoRatio::NotFinite);
+        assert_eq!(refusal(vec![block(&[1.0, 1.0], 1.0); 16]), NoRatio::NoVariance);
+        let mut one = vec![block(&[1.0, 1.0], 1.0); 16];
+        one[3] = block(&[1.0, 5.0], 1.0);
+        assert_eq!(refusal(one), NoRatio::NoVariance);
+    }
+}
