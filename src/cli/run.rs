@@ -35,6 +35,9 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
         let (folder, _) = crate::run::run(experiment, registry, &options, &interrupt)?;
         let material = report::write(&folder)?;
         print!("{}", terminal::run_table(&material).to_text());
+        if let Some(table) = terminal::efficiency_table(&material) {
+            println!("\nefficiency against the first estimator, 95 % interval:\n{}", table.to_text());
+        }
         for note in terminal::notes(&material) {
             println!("note: {note}");
         }

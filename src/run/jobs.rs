@@ -95,45 +95,45 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
                 kinds.push(kind.clone());
             }
             for arm in timed.arms(cell, &entry.name) {
-            let estimator = (registered.build)(options, Arc::clone(&scene))?;
-            let groups = band_groups(estimator.band_use(), bands.len());
-            let groups = groups
-                .into_iter()
-                .map(|group| streams(experiment, cell, &bands, &arm.name, group, stage))
-                .collect();
-            let label = match cell.label.as_str() {
-                "" => arm.name.clone(),
-                cell => format!("{cell} / {}", arm.name),
-            };
-            let identity = json!({
-                "build": provenance::build(),
-                "experiment": experiment.file.name,
-                "seed": experiment.file.seed,
-                "fresh": experiment.file.fresh,
-                "stage": stage.name(),
-                "bands": bands,
-                "content": cell.content(),
-                "pair": experiment.file.pair,
-                "inputs": inputs,
-                "estimator": entry,
-                "control": arm.is_control,
-            });
-            jobs.push(Job {
-                cell: index,
-                estimator_index,
-                name: arm.name,
-                is_control: arm.is_control,
-                side_by_side: arm.is_timed.then_some(index),
-                label,
-                identity: hash_json(&identity),
-                stage,
-                passes: None,
-                groups,
-                estimator,
-                layout: layout.clone(),
-                targets: vec![0],
-                claims: claims.clone(),
-            });
+                let estimator = (registered.build)(options, Arc::clone(&scene))?;
+                let groups = band_groups(estimator.band_use(), bands.len());
+                let groups = groups
+                    .into_iter()
+                    .map(|group| streams(experiment, cell, &bands, &arm.name, group, stage))
+                    .collect();
+                let label = match cell.label.as_str() {
+                    "" => arm.name.clone(),
+                    cell => format!("{cell} / {}", arm.name),
+                };
+                let identity = json!({
+                    "build": provenance::build(),
+                    "experiment": experiment.file.name,
+                    "seed": experiment.file.seed,
+                    "fresh": experiment.file.fresh,
+                    "stage": stage.name(),
+                    "bands": bands,
+                    "content": cell.content(),
+                    "pair": experiment.file.pair,
+                    "inputs": inputs,
+                    "estimator": entry,
+                    "control": arm.is_control,
+                });
+                jobs.push(Job {
+                    cell: index,
+                    estimator_index,
+                    name: arm.name,
+                    is_control: arm.is_control,
+                    side_by_side: arm.is_timed.then_some(index),
+                    label,
+                    identity: hash_json(&identity),
+                    stage,
+                    passes: None,
+                    groups,
+                    estimator,
+                    layout: layout.clone(),
+                    targets: vec![0],
+                    claims: claims.clone(),
+                });
             }
         }
     }
@@ -172,7 +172,10 @@ impl<'a> Timed<'a> {
     /// The runs of an estimator in a cell.
     fn arms(&self, cell: &CellSpec, name: &str) -> Vec<Arm> {
         let here = || {
-            self.duels.iter().filter(|(only, ..)| comparisons::is_in(cell, only)).map(|(_, a, b)| (*a, *b))
+            self.duels
+                .iter()
+                .filter(|(only, ..)| comparisons::is_in(cell, only))
+                .map(|(_, a, b)| (*a, *b))
         };
         let is_timed = here().any(|(candidate, baseline)| candidate == name || baseline == name);
         let mut arms = vec![Arm { name: name.into(), is_control: false, is_timed }];

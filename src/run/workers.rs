@@ -381,8 +381,7 @@ mod tests {
         let arms = [arm(3, 0), arm(5, 0), arm(8, 0)];
         let (spans, is_whole) = order(&arms, 1);
         assert!(is_whole);
-        let expected =
-            [(3, 8, 12), (5, 8, 12), (8, 8, 12), (8, 12, 16), (5, 12, 16), (3, 12, 16)];
+        let expected = [(3, 8, 12), (5, 8, 12), (8, 8, 12), (8, 12, 16), (5, 12, 16), (3, 12, 16)];
         assert_eq!(spans, expected);
         // With a steady drift, the middle of the passes of every arm is at the same time.
         for job in [3, 5, 8] {

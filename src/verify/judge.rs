@@ -145,6 +145,7 @@ fn conclude(cases: &[Case], trials: Vec<(usize, Trial)>, looks: Looks) -> Judgem
             }
             Some(Evidence::None(reason)) => SecondLook::Invalid(reason),
             Some(Evidence::Identity { holds }) => SecondLook::Taken(if holds { 1.0 } else { 0.0 }),
+            Some(Evidence::Efficiency(_)) => SecondLook::Invalid("efficiencies have one look".into()),
             Some(Evidence::Bits(_)) => SecondLook::Invalid("a question of bits".into()),
             Some(Evidence::Test { test, .. } | Evidence::Sum { test }) if test.p_value.is_nan() => {
                 SecondLook::Invalid("the test has no p-value".into())
@@ -193,7 +194,7 @@ fn quantities<'a>(case: &Case<'a>, trial: &Trial) -> impl Iterator<Item = Quanti
     comparison.into_iter().flat_map(|c| {
         let other = match &c.against {
             Against::Quantity { other, .. } => Some(other.clone()),
-            Against::Value { .. } => None,
+            Against::Value { .. } | Against::Efficiency { .. } => None,
         };
         std::iter::once(c.quantity.clone()).chain(other)
     })
@@ -221,9 +222,14 @@ fn state(
         (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
         verdict.adjusted_p = adjusted_p;
     }
+    // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
+    let own_level = looks.first(one_look || claim.expect != Expect::Pass) / tests;
+    if let Evidence::Efficiency(shown) = &evidence {
+        let test = &shown.test;
+        (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
+        (verdict.adjusted_p, verdict.detectable) = (adjusted_p, shown.detectable(own_level));
+    }
     if let Evidence::Test { difference, .. } = &evidence {
-        // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
-        let own_level = looks.first(one_look || claim.expect != Expect::Pass) / tests;
         let reference = reference.unwrap_or(verdict.expected.abs());
         let reference = if reference == 0.0 { 1.0 } else { reference };
         verdict.detectable = difference.detectable(own_level, POWER) / reference;
@@ -233,6 +239,10 @@ fn state(
     }
     let found = match (&evidence, second) {
         (Evidence::None(reason), _) => Outcome::Invalid(reason.clone()),
+        (Evidence::Efficiency(shown), _) => {
+            let levels = (looks.at_once(), own_level);
+            shown.outcome(verdict.adjusted_p, levels, detect, claim.expect == Expect::Fails)
+        }
         (Evidence::Identity { holds: true } | Evidence::Bits(None), _) => Outcome::Pass,
         (Evidence::Identity { holds: false } | Evidence::Bits(Some(_)), _) => Outcome::Fail,
         (_, Some(SecondLook::Missing)) => Outcome::Fail,
@@ -246,7 +256,10 @@ fn state(
             _ => Outcome::Pass,
         },
     };
-    verdict.note = note(&found, &evidence, detect, &verdict);
+    verdict.note = match &evidence {
+        Evidence::Efficiency(shown) => shown.note(&found, own_level),
+        _ => note(&found, &evidence, detect, &verdict),
+    };
     match second {
         Some(SecondLook::Missing) => verdict.note += "; wants a second look on fresh streams",
         Some(SecondLook::Taken(_)) if found == Outcome::Pass => {
@@ -302,6 +315,7 @@ fn expected_outcome(claim: &Claim, found: Outcome, note: &mut String) -> Outcome
     let (wanted, green) = match claim.expect {
         Expect::Pass => return found,
         Expect::Differs => ("a difference", found == Outcome::Fail),
+        Expect::Fails => ("a failure", found == Outcome::Fail),
         Expect::Invalid => ("an invalid test", matches!(found, Outcome::Invalid(_))),
     };
     let said = if note.is_empty() { "no difference found".to_string() } else { std::mem::take(note) };
@@ -319,6 +333,7 @@ impl Evidence {
             Evidence::Test { test, .. } | Evidence::Sum { test } => {
                 Some(test.p_value).filter(|p| !p.is_nan())
             }
+            Evidence::Efficiency(shown) => Some(shown.test.p_value).filter(|p| !p.is_nan()),
             Evidence::None(_) | Evidence::Identity { .. } | Evidence::Bits(_) => None,
         }
     }

@@ -11,6 +11,13 @@ pub mod junit;
 /// What verification says.
 pub mod verdict;
 
+/// Efficiencies of all pairs of estimators.
+pub mod comparisons;
+/// Claims of efficiency.
+pub mod efficiency;
+/// What counts of work cost.
+pub mod weights;
+
 /// Claims that a record comes out again.
 mod reproduction;
 
