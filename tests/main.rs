@@ -3,6 +3,7 @@
 mod cli;
 mod damage;
 mod docs;
+mod efficiency;
 mod interruption;
 mod layering;
 mod reproducibility;

@@ -8,7 +8,7 @@ use crate::results::store::Stored;
 /// matter. From a regression of CPU time on counters over the nine cells (rounded), which this prints:
 ///
 /// ```text
-/// cargo test --release --lib -- --ignored --nocapture cpu_time_follows_the_counters
+/// cargo test --release --test integration -- --ignored --nocapture cpu_time_follows_the_counters
 /// ```
 ///
 /// They predict costs together; one by one they mean little, because nearly every event comes with a ray.
