@@ -105,13 +105,14 @@ fn what_an_efficiency_cannot_rest_on_is_invalid() {
     assert_invalid(&by_counters(uncounted, 1.5), "no counts of work by batch");
 }
 
-/// A symmetric tail, so that the mean test has no objection: one pass in 128 has 30 times the deviation.
+/// A symmetric tail, so that the mean test has no objection: four passes of 256 make the variance.
 #[test]
 fn a_variance_that_few_passes_make_is_not_resolved() {
     let mut s = scored(0.1, 0.05);
-    let tail = |i: u64| if i % 128 == 5 { 3.0 } else { 0.1 };
-    set_gates(&mut s, "snee", |i, _, _| {
-        1.0 + tail(i) * if (i / 128) % 2 == 0 { 1.0 } else { -1.0 } * (0.5 + 0.5 * uniform(i + 40).abs())
+    set_gates(&mut s, "snee", |i, _, _| match (i % 64, (i / 64) % 2) {
+        (5, 0) => 4.0,
+        (5, _) => -2.0,
+        _ => 1.0 + 0.05 * uniform(i + 9000),
     });
     assert_invalid(&by_counters(s, 0.001), "not resolved");
 }
