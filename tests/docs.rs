@@ -12,12 +12,15 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 7] = [
+const PAGES: [&str; 10] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
+    "docs/comparing-records.md",
     "docs/experiment-file.md",
+    "docs/judging-other-renderers.md",
     "docs/limits.md",
+    "examples/ci-gate/README.md",
     "results/README.md",
     "scripts/README.md",
 ];

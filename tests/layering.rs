@@ -22,7 +22,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
     // Evidence.
     ("stats", &["math"]),
     ("results", &["math", "stats"]),
-    ("verify", &["stats", "results"]),
+    ("verify", &["math", "stats", "results"]),
     ("report", &["stats", "results", "verify"]),
     // The bridge.
     ("experiment", &EXPERIMENT),

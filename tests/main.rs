@@ -1,11 +1,14 @@
 //! Integration tests, one binary: the program as a user runs it, and the sources as a reader sees them.
 
+mod calibration;
 mod cli;
 mod damage;
 mod docs;
 mod efficiency;
 mod interruption;
+mod judging;
 mod layering;
+mod looks;
 mod reproducibility;
 mod tokens;
 mod work;

@@ -1,8 +1,10 @@
 //! The command line: one file a subcommand, no logic of their own. Door for `clap`.
 
 pub mod check;
+pub mod compare;
 pub mod completions;
 pub mod init;
+pub mod judge;
 pub mod list;
 pub mod plan;
 pub mod report;
@@ -38,6 +40,8 @@ enum Action {
     Run(run::Args),
     Verify(verify::Args),
     Report(report::Args),
+    Compare(compare::Args),
+    Judge(judge::Args),
     Plan(plan::Args),
     Check(check::Args),
     Init(init::Args),
@@ -101,6 +105,8 @@ pub fn main(registry: &Registry) -> ExitCode {
         Action::Run(args) => run::run(args, registry),
         Action::Verify(args) => verify::run(args, registry),
         Action::Report(args) => report::run(args),
+        Action::Compare(args) => compare::run(args, out),
+        Action::Judge(args) => judge::run(args, out),
         Action::Plan(args) => plan::run(args, registry),
         Action::Check(args) => check::run(args, registry, out).map(|()| 0),
         Action::Init(args) => init::run(args, out).map(|()| 0),
@@ -129,4 +135,17 @@ fn listen() -> crate::error::Result<crate::run::interrupt::Interrupt> {
         doing: "listen for signals".into(),
         source,
     })
+}
+
+/// For clap: a number above 0.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
+        _ => Err("a number above 0 is needed".into()),
+    }
+}
+
+/// For clap: a number between 0 and 1, both excluded.
+fn probability(text: &str) -> Result<f64, String> {
+    positive(text).ok().filter(|p| *p < 1.0).ok_or_else(|| "a number between 0 and 1 is needed".into())
 }

@@ -15,6 +15,7 @@ use crate::run::interrupt::Interrupt;
 use crate::verify::judge::{Case, Judgement, Looks, judge};
 use crate::verify::junit;
 use crate::verify::levels::{FAMILY_LEVEL, FIRST_LOOK, RETEST_FACTOR};
+use crate::verify::nights::Nights;
 use crate::verify::verdict::{self, Verdict};
 
 /// Judge the claims of experiments; runs what has no record yet.
@@ -36,6 +37,10 @@ pub struct Args {
     /// same streams again); results go to `fresh/` under the results folder.
     #[arg(long, value_name = "TOKEN", num_args = 0..=1, default_missing_value = "")]
     fresh_seed: Option<String>,
+    /// With --fresh-seed: the file in which evidence adds up over nights (`evidence.json` in the folder of
+    /// fresh results without it).
+    #[arg(long, value_name = "FILE", requires = "fresh_seed")]
+    evidence: Option<PathBuf>,
     /// Write the verdicts as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
@@ -81,9 +86,7 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
         working: args.working.options(),
         interrupt: listen()?,
     };
-    if let Some(token) = &args.fresh_seed {
-        court.refresh(token);
-    }
+    let token = args.fresh_seed.as_ref().map(|token| court.refresh(token));
     let mut subjects = court.subjects(&args.paths)?;
     let mut judgement = judge_all(&subjects);
     if court.look_again(&mut subjects, &judgement)? {
@@ -97,6 +100,12 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     }
     tell(&judgement.verdicts, args.verbose);
     write_files(args, &judgement.verdicts)?;
+    let alarmed = match &token {
+        Some(token) => {
+            court.add_night(args.evidence.as_deref(), token, &judgement.verdicts, &subjects)?
+        }
+        None => false,
+    };
     for (index, subject) in subjects.into_iter().enumerate() {
         let of = judgement.verdicts.iter().zip(&judgement.case_of);
         let own = of.filter(|(_, case)| **case == index).map(|(v, _)| v.clone()).collect();
@@ -104,7 +113,7 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
             report::write_judged(&subject.folder, subject.main, own)?;
         }
     }
-    Ok(verdict::exit_code(&judgement.verdicts))
+    Ok(if alarmed { 1 } else { verdict::exit_code(&judgement.verdicts) })
 }
 
 fn judge_all(subjects: &[Subject]) -> Judgement {
@@ -115,11 +124,40 @@ fn judge_all(subjects: &[Subject]) -> Judgement {
 
 impl Court<'_> {
     /// All streams by another name, and all results elsewhere.
-    fn refresh(&mut self, token: &str) {
+    fn refresh(&mut self, token: &str) -> String {
         let token = if token.is_empty() { provenance::today_and_commit() } else { token.to_string() };
         eprintln!("fresh streams; the same again: --fresh-seed \"{token}\"");
         self.reading.sets.push(format!("fresh={}", toml_text(&token)));
         self.working.out.push("fresh");
+        token
+    }
+
+    /// Adds this night to the state file; whether the nights together raise an alarm.
+    fn add_night(
+        &self,
+        file: Option<&Path>,
+        token: &str,
+        verdicts: &[Verdict],
+        subjects: &[Subject],
+    ) -> Result<bool> {
+        let path = file.map_or_else(|| self.working.out.join("evidence.json"), Path::to_path_buf);
+        let mut nights = read_nights(&path)?;
+        let code = |experiment: &str| {
+            let of = subjects.iter().map(|s| &s.main.record).find(|r| r.experiment == experiment);
+            of.map_or_else(String::new, |r| format!("{} {}", r.fingerprint, r.claims_hash))
+        };
+        if nights.add(token, verdicts, code) {
+            atomic::write(&path, nights.to_json().as_bytes(), "write the evidence of the nights")?;
+        } else {
+            println!("these streams are counted already; the evidence stays as it is");
+        }
+        let alarms = nights.alarms();
+        let (count, limit) = (nights.tokens.len(), nights.threshold());
+        println!("evidence over {count} nights: {} alarms (log e >= {limit:.1})", alarms.len());
+        for (name, evidence) in &alarms {
+            println!("alarm: {name}: log e = {:.1} after {} nights", evidence.log_e, evidence.nights);
+        }
+        Ok(!alarms.is_empty())
     }
 
     /// What the paths name, measured where there is no record yet.
@@ -174,6 +212,18 @@ impl Court<'_> {
         }
         Ok(looked)
     }
+}
+
+/// The state that earlier nights left; empty where there is none.
+fn read_nights(path: &Path) -> Result<Nights> {
+    if !path.exists() {
+        return Ok(Nights::default());
+    }
+    let text =
+        std::fs::read_to_string(path).map_err(Error::io(path, "read the evidence of the nights"))?;
+    Nights::from_json(&text).map_err(|e| {
+        Error::record(path, format!("not a state of nights: {e}; move it away to begin again"))
+    })
 }
 
 /// A text as a TOML string.

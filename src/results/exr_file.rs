@@ -24,21 +24,43 @@ pub struct ExrImage {
     /// Row by row. Channels of the first part have their own names, those of later parts
     /// `part.channel`.
     pub channels: BTreeMap<String, Vec<f32>>,
+    /// True where a channel is stored in half precision (11 bits).
+    pub has_half: bool,
 }
 
-/// Writes a picture: a first part `rgb` that any viewer shows (channels R, G, B), then a part for each
+/// A part of a file: its name, and its channels by name.
+pub type Part = (String, Vec<(String, Vec<f32>)>);
+
+/// Writes a picture, row 0 of the file at the top: a first part `rgb` that any viewer shows (channels R, G, B), then a part for each
 /// band with channels `mean` and `std_error`. Values are rounded to f32; the record has them whole.
 /// Every part carries `attributes` as lines of its standard attribute `comments`.
 pub fn write_exr(path: &Path, picture: &Picture, attributes: &[(&str, &str)]) -> Result<()> {
     let rgb = |c: usize| picture.rgb().map(|rgb| rgb[c] as f32).collect();
-    let mut layers =
-        vec![layer(picture, "rgb", [("R", rgb(0)), ("G", rgb(1)), ("B", rgb(2))], attributes)];
+    let colours = ["R", "G", "B"].iter().enumerate();
+    let mut parts: Vec<Part> =
+        vec![("rgb".into(), colours.map(|(c, name)| (name.to_string(), rgb(c))).collect())];
     for (b, band) in picture.bands.iter().enumerate() {
         let mean = picture.mean(b).map(|x| x as f32).collect();
         let std_error = picture.std_error(b).map(|x| x as f32).collect();
-        layers.push(layer(picture, &band.name, [("mean", mean), ("std_error", std_error)], attributes));
+        let channels = vec![("mean".into(), mean), ("std_error".into(), std_error)];
+        parts.push((band.name.clone(), channels));
     }
-    let window = IntegerBounds::from_dimensions((picture.width, picture.height));
+    write_parts(path, (picture.width, picture.height), parts, attributes)
+}
+
+/// Writes planes of `size` (pixels per row, rows) as 32-bit floats, every part with `attributes` as
+/// lines of its standard attribute `comments`.
+///
+/// # Errors
+/// Planes of another size, I/O.
+pub fn write_parts(
+    path: &Path,
+    size: (usize, usize),
+    parts: Vec<Part>,
+    attributes: &[(&str, &str)],
+) -> Result<()> {
+    let layers: Vec<_> = parts.into_iter().map(|part| layer(size, part, attributes)).collect();
+    let window = IntegerBounds::from_dimensions(size);
     let image = Image::from_layers(ImageAttributes::new(window), layers);
     let mut bytes = Cursor::new(Vec::new());
     let encoded = image.write().non_parallel().to_buffered(&mut bytes);
@@ -46,20 +68,19 @@ pub fn write_exr(path: &Path, picture: &Picture, attributes: &[(&str, &str)]) ->
     atomic::write(path, &bytes.into_inner(), "write the image")
 }
 
-fn layer<const N: usize>(
-    picture: &Picture,
-    name: &str,
-    channels: [(&str, Vec<f32>); N],
+fn layer(
+    size: (usize, usize),
+    (name, channels): Part,
     attributes: &[(&str, &str)],
 ) -> Layer<AnyChannels<FlatSamples>> {
     let channels =
-        channels.into_iter().map(|(name, data)| AnyChannel::new(name, FlatSamples::F32(data)));
-    let mut about = LayerAttributes::named(name);
+        channels.into_iter().map(|(name, data)| AnyChannel::new(&*name, FlatSamples::F32(data)));
+    let mut about = LayerAttributes::named(&*name);
     // One standard attribute: the crate writes custom ones in a hash map's order, which is random.
     let lines: String = attributes.iter().map(|(key, value)| format!("{key}: {value}\n")).collect();
     about.comments = Some(Text::from(&*lines));
     let channels = AnyChannels::sort(channels.collect::<SmallVec<_>>());
-    Layer::new((picture.width, picture.height), about, Encoding::SMALL_LOSSLESS, channels)
+    Layer::new(size, about, Encoding::SMALL_LOSSLESS, channels)
 }
 
 /// Reads every channel of an image as f32: half, float or integer, one part or several of one size.
@@ -70,7 +91,7 @@ pub fn read_exr(path: &Path) -> Result<ExrImage> {
     let image = reader.all_layers().all_attributes().non_parallel().from_buffered(Cursor::new(bytes));
     let layers = image.map_err(|e| refuse(e.to_string()))?.layer_data;
     let size = layers.first().map(|layer| layer.size).ok_or_else(|| refuse("it has no parts".into()))?;
-    let mut channels = BTreeMap::new();
+    let (mut channels, mut has_half) = (BTreeMap::new(), false);
     for (index, layer) in layers.iter().enumerate() {
         let part = layer.attributes.layer_name.as_ref().map_or(index.to_string(), ToString::to_string);
         if layer.size != size {
@@ -82,10 +103,11 @@ pub fn read_exr(path: &Path) -> Result<ExrImage> {
             if channel.sampling.x() != 1 || channel.sampling.y() != 1 {
                 return Err(refuse(format!("channel `{name}` is subsampled")));
             }
+            has_half |= matches!(channel.sample_data, FlatSamples::F16(_));
             channels.insert(name, channel.sample_data.values_as_f32().collect());
         }
     }
-    Ok(ExrImage { width: size.x(), height: size.y(), channels })
+    Ok(ExrImage { width: size.x(), height: size.y(), channels, has_half })
 }
 
 #[cfg(test)]

@@ -96,6 +96,33 @@ pub fn write_png(path: &Path, picture: &Picture, exposure_stops: f64) -> Result<
     Ok(png)
 }
 
+/// Writes signed values, row by row from the top, in diverging colours: white at 0, deep red at `limit`
+/// and beyond, deep blue at -`limit` and below, grey where the value is not a number.
+pub fn write_diverging_png(path: &Path, width: usize, values: &[f64], limit: f64) -> Result<()> {
+    let height = values.len() / width.max(1);
+    let data: Vec<u8> = values.iter().flat_map(|x| diverging(x / limit)).collect();
+    let bytes = encode(width, height, &data)
+        .map_err(|e| Error::input(format!("an image of {width}x{height} pixels: {e}")))?;
+    atomic::write(path, &bytes, "write the picture")
+}
+
+/// From -1 (blue) over 0 (white) to 1 (red), sRGB values: linear between the end and middle colours of
+/// C. Brewer's scheme RdBu.
+fn diverging(x: f64) -> [u8; 3] {
+    if x.is_nan() {
+        return [128; 3];
+    }
+    const WHITE: [f64; 3] = [247.0, 247.0, 247.0];
+    let (half, end) = if x < 0.0 {
+        ([67.0, 147.0, 195.0], [5.0, 48.0, 97.0])
+    } else {
+        ([214.0, 96.0, 77.0], [103.0, 0.0, 31.0])
+    };
+    let at = 2.0 * x.abs().min(1.0);
+    let (from, to, part) = if at < 1.0 { (WHITE, half, at) } else { (half, end, at - 1.0) };
+    [0, 1, 2].map(|c| (from[c] + part * (to[c] - from[c])).round() as u8)
+}
+
 fn encode(width: usize, height: usize, data: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
@@ -131,6 +158,12 @@ mod tests {
     fn transfer() {
         let byte = |x: f64| (srgb_transfer(x) * 255.0).round();
         assert_eq!([0.0, 0.001, 0.18, 0.5, 1.0].map(byte), [0.0, 3.0, 118.0, 188.0, 255.0]);
+    }
+
+    #[test]
+    fn diverging_colours() {
+        assert_eq!([-2.0, -0.5, 0.0].map(diverging), [[5, 48, 97], [67, 147, 195], [247; 3]]);
+        assert_eq!([0.5, 1.0, f64::NAN].map(diverging), [[214, 96, 77], [103, 0, 31], [128; 3]]);
     }
 
     #[test]

@@ -240,9 +240,9 @@ impl Job {
                 settled: 0,
             });
             block.gates.push(scores.gates.iter().map(|&x| Moments::of(x)).collect());
-            if stage == Stage::Main {
-                block.pixels.push(ImageMoments::of(scores.pixels.clone()));
-            }
+            // Blocks are appended to each other, so that those without an image hold empty ones.
+            let image = if stage == Stage::Main { scores.pixels.clone() } else { Vec::new() };
+            block.pixels.push(ImageMoments::of(image));
         }
         block.tally = Tally {
             cost: scores.cost,

@@ -20,8 +20,6 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
-
 use crate::math::{exp, ln, ln_1p};
 
 /// Stakes of the mixture: large ones for gross defects, small ones for long series.
@@ -165,33 +163,6 @@ pub fn calibrated(p: f64) -> f64 {
     -0.5 * ln(p) - ln(2.0)
 }
 
-/// What one night adds to what earlier nights have found of one test.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Night {
-    /// A hash of the code under test.
-    pub code: String,
-    /// ln of the night's e-value.
-    pub log_evidence: f64,
-}
-
-/// The evidence of the nights since the code last changed: evidence against other code is no evidence
-/// against this. Nights must have streams of their own.
-pub fn accumulated(nights: &[Night]) -> Evidence {
-    let is_current = |night: &&Night| nights.last().is_some_and(|last| night.code == last.code);
-    let first = nights.len() - nights.iter().rev().take_while(is_current).count();
-    let mut evidence = Evidence::NONE;
-    for night in &nights[first..] {
-        evidence.now(evidence.log + night.log_evidence);
-    }
-    evidence
-}
-
-/// The alpha of each of `tests` tests that keeps the probability of any alarm below `level` (Bonferroni).
-pub fn share_of_level(level: f64, tests: usize) -> f64 {
-    level / tests.max(1) as f64
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -263,16 +234,8 @@ mod tests {
     }
 
     #[test]
-    fn nights_multiply_until_the_code_changes() {
-        let night = |code: &str, p: f64| Night { code: code.to_string(), log_evidence: calibrated(p) };
+    fn p_values_become_e_values() {
         close(calibrated(1e-6), 500f64.ln(), 1e-12);
-        let mut nights = vec![night("a", 1e-6), night("a", 1e-4), night("b", 1e-2), night("b", 1.0)];
-        let found = accumulated(&nights);
-        close(found.log, (5.0f64 * 0.5).ln(), 1e-12);
-        close(found.peak, 5f64.ln(), 1e-12);
-        nights.push(night("a", 1.0));
-        close(accumulated(&nights).log, 0.5f64.ln(), 1e-12);
-        assert_eq!(accumulated(&[]), Evidence { log: 0.0, peak: 0.0 });
-        assert_eq!(share_of_level(1e-3, 300), 1e-3 / 300.0);
+        close(calibrated(1.0), 0.5f64.ln(), 1e-12);
     }
 }

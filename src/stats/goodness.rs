@@ -171,8 +171,7 @@ pub fn pearson(cells: &[Cell]) -> Result<Goodness, Refusal> {
     let sum: f64 = cells.iter().map(|c| c.mass).sum();
     let rounding = cells.len() as f64 * f64::EPSILON;
     let bound = cells.iter().map(|c| c.error).sum::<f64>() + rounding;
-    // Written so that a NaN is refused too.
-    if !((sum - 1.0).abs() <= bound) {
+    if (sum - 1.0).abs() > bound {
         return Err(Refusal::NotNormalised { sum, bound });
     }
     let thin = cells.iter().position(|c| is_possible(&c) && n * c.mass < LEAST_EXPECTED);
@@ -187,6 +186,7 @@ pub fn pearson(cells: &[Cell]) -> Result<Goodness, Refusal> {
 
 fn resolved(lambda: f64, dof: f64) -> Result<(), Refusal> {
     let limit = LARGEST_SHIFT * (2.0 * dof).sqrt();
+    // A NaN is refused too.
     if lambda <= limit { Ok(()) } else { Err(Refusal::Unresolved { lambda, limit }) }
 }
 
@@ -298,8 +298,7 @@ pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<Contrast,
     }
     let n = values.n as f64;
     let skew = values.skewness().abs() / n.sqrt();
-    // Written so that a NaN is refused too.
-    if !(skew <= LARGEST_SKEW) {
+    if skew.is_nan() || skew > LARGEST_SKEW {
         return Err(Refusal::Skewed { skew });
     }
     let shift = error / values.std_error();

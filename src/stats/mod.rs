@@ -2,6 +2,8 @@
 
 /// Tests of acceptance by optical depth, and enumeration of discrete choices.
 pub mod acceptance;
+/// Tests of values against a continuous distribution.
+pub mod continuous;
 /// Two estimators at equal cost.
 pub mod efficiency;
 /// E-values: evidence that accumulates.
@@ -14,6 +16,10 @@ pub mod hypothesis;
 pub mod moments;
 /// Many tests under one error rate.
 pub mod multiplicity;
+/// Ratios of positive estimates.
+pub mod ratio;
+/// Sums of symmetric terms.
+pub mod signs;
 /// Survival functions and their inverses.
 pub mod tails;
 /// The fixed dyadic reduction over passes.

@@ -385,11 +385,13 @@ mod tests {
         }
     }
 
-    /// Every row of the table, and the worst relative error of each distribution, also among the
-    /// probabilities from 1e-12 on.
-    fn worst_errors(tail: impl Fn(&str, f64, f64, f64) -> f64) -> BTreeMap<String, (usize, f64, f64)> {
+    /// Rows, worst relative error, and that among probabilities from 1e-12 on, of every distribution.
+    type Worst = BTreeMap<String, (usize, f64, f64)>;
+
+    /// Reads every row of the table.
+    fn worst_errors(tail: impl Fn(&str, f64, f64, f64) -> f64) -> Worst {
         let table = include_str!("../../tests/data/tails.csv");
-        let mut worst: BTreeMap<String, (usize, f64, f64)> = BTreeMap::new();
+        let mut worst = Worst::new();
         for line in table.lines().skip(1) {
             let (name, numbers) = line.split_once(',').expect("a distribution");
             let numbers: Vec<f64> = numbers.split(',').map(|x| x.parse().expect("a number")).collect();
@@ -420,7 +422,8 @@ mod tests {
     // The table sees what it is for: a lost digit in the tail, a cdf taken from 1, a wrong edge.
     #[test]
     fn the_table_catches_planted_tails() {
-        let defects: [(&str, fn(f64, f64, f64) -> f64); 4] = [
+        type Tail = fn(f64, f64, f64) -> f64;
+        let defects: [(&str, Tail); 4] = [
             ("normal_upper", |_, _, z| 1.0 - normal_upper(-z)),
             ("student_two_sided", |dof, _, t| student_two_sided(t, dof + 1e-3)),
             ("binomial_upper", |n, p, k| binomial_upper(k as u64 + 1, n as u64, p)),

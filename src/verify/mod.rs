@@ -1,6 +1,10 @@
 //! Claims and records in, verdicts out, and a list of what wants a second look. Pure: a verdict is a
 //! function of records and levels.
 
+/// Two records of one experiment: what changed.
+pub mod difference;
+/// Images rendered elsewhere against a record.
+pub mod foreign;
 /// From comparisons to verdicts.
 pub mod judge;
 /// The error rates of a whole verification.
@@ -18,8 +22,13 @@ pub mod efficiency;
 /// What counts of work cost.
 pub mod weights;
 
+/// Evidence that adds up over nights.
+pub mod nights;
+
 /// Claims that a record comes out again.
 mod reproduction;
 
+/// Tests under one family-wise level.
+mod family;
 /// What one comparison shows by itself.
 mod trial;

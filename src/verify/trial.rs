@@ -20,10 +20,10 @@ const SKEWNESS_LIMIT: f64 = 0.1;
 /// Limit of one batch's share of the variance between batches. Of 64 normal batches, one holds more
 /// than a half with probability below 1e-13; with more, one score decides, and hides every other
 /// difference behind its own error.
-const SHARE_LIMIT: f64 = 0.5;
+pub(super) const SHARE_LIMIT: f64 = 0.5;
 
 /// Sampling errors and deviations below this, relative to the value, are rounding.
-const ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-12;
 
 /// Kinds of claims.
 const KINDS: [&str; 6] = ["equals", "agree", "differs", "reproduces", "faster", "not_slower"];
@@ -124,15 +124,15 @@ pub(super) struct Trial {
 }
 
 /// One side of a comparison.
-struct Arm<'a> {
-    run: &'a EstimatorRun,
-    batches: Vec<Moments>,
-    all: Moments,
-    mean: Estimate,
+pub(super) struct Arm<'a> {
+    pub run: &'a EstimatorRun,
+    pub batches: Vec<Moments>,
+    pub all: Moments,
+    pub mean: Estimate,
 }
 
 impl<'a> Arm<'a> {
-    fn of(stored: &'a Stored, quantity: &Quantity) -> Option<Arm<'a>> {
+    pub fn of(stored: &'a Stored, quantity: &Quantity) -> Option<Arm<'a>> {
         let (run, batches) = (stored.run(quantity)?, stored.batches(quantity)?);
         let all = total(batches.iter().copied())?;
         let mean = Estimate::of_batches(&batches);
@@ -140,7 +140,7 @@ impl<'a> Arm<'a> {
     }
 
     /// Why no statement about this arm's mean is worth anything.
-    fn objection(&self) -> Option<String> {
+    pub fn objection(&self) -> Option<String> {
         let name = &self.run.estimator;
         let anomaly =
             self.run.anomalies.iter().find(|(kind, n)| **n > 0 && !STATED.contains(&kind.as_str()));
@@ -158,7 +158,7 @@ impl<'a> Arm<'a> {
     }
 
     /// Why its mean is not nearly normal.
-    fn tail_objection(&self) -> Option<String> {
+    pub fn tail_objection(&self) -> Option<String> {
         let name = &self.run.estimator;
         if self.batches.len() < MIN_BATCHES {
             let n = self.batches.len();
@@ -323,7 +323,7 @@ fn whole(stored: &Stored, quantity: &Quantity) -> Option<f64> {
     Some(total(batches)?.mean.abs())
 }
 
-fn same_passes(a: &[Moments], b: &[Moments]) -> bool {
+pub(super) fn same_passes(a: &[Moments], b: &[Moments]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.n == b.n)
 }
 
@@ -350,6 +350,7 @@ pub(super) fn blank(record: &Record, claim: &Claim) -> Verdict {
         dof: f64::NAN,
         second_p: f64::NAN,
         note: String::new(),
+        control: claim.expect != Expect::Pass,
     }
 }
 

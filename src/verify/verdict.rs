@@ -43,7 +43,8 @@ pub struct Verdict {
     pub estimators: String,
     /// The claim's name, or its kind and place in the file.
     pub claim: String,
-    /// The test: `t`, `welch t`, `paired t`, `identity`, `stated error`, `sum of z^2`; empty for none.
+    /// The test: `t`, `welch t`, `paired t`, `identity`, `stated error`, `sum of z^2`; of `judge` also `t of
+    /// seeds`, `t of pixels`, `squared bias`; of `compare` `identical`, `sum of errors`; empty for none.
     pub test: String,
     /// Its statistic; for an identity the relative deviation.
     pub statistic: f64,
@@ -72,6 +73,8 @@ pub struct Verdict {
     pub second_p: f64,
     /// The reason for the outcome, as a sentence.
     pub note: String,
+    /// It expects something else than agreement.
+    pub control: bool,
 }
 
 /// Columns of `verdicts.csv`.

@@ -1,0 +1,147 @@
+//! `scatterproof compare`.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use crate::error::{Error, Result};
+use crate::report::number::significant;
+use crate::report::table::{Table, verdict_table};
+use crate::results::store::RecordFolder;
+use crate::verify::difference::{Compared, Terms, Work, compare};
+use crate::verify::judge::FAMILY_LEVEL;
+use crate::verify::junit;
+use crate::verify::verdict::Verdict;
+
+/// Compare two records of one experiment: what was changed, and whether a mean differs.
+///
+/// Says what differs between the two experiments, then compares every observable that both records hold,
+/// per cell, estimator and band: `identical` where every bit is the same, else by a t test (paired pass
+/// by pass where both played the same random numbers), all of them as one family at --level.
+///
+/// Exit code 0: no mean differs. 1: a mean differs, or the work per pass grew by more than --max-slowdown.
+/// 2: bad usage. 3: nothing can be compared, or the first observable of an estimator cannot be judged.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// The results folder to compare with, such as a baseline kept in git.
+    #[arg(value_name = "BEFORE")]
+    before: PathBuf,
+    /// The results folder that is compared with it.
+    #[arg(value_name = "AFTER")]
+    after: PathBuf,
+    /// Probability of any false alarm in the whole comparison.
+    #[arg(long, value_name = "P", default_value_t = FAMILY_LEVEL, value_parser = super::probability)]
+    level: f64,
+    /// Also fail (exit code 3, underpowered) where a change of this fraction of an estimator's first
+    /// observable could go unseen.
+    #[arg(long, value_name = "FRACTION", value_parser = super::positive)]
+    detect: Option<f64>,
+    /// Also fail (exit code 1) where a counter of work per pass (paths, rays, events) grew by more than this
+    /// factor. Counters are exact and the same on every machine, where seconds are neither.
+    #[arg(long, value_name = "FACTOR", value_parser = super::positive)]
+    max_slowdown: Option<f64>,
+    /// Write the verdicts as JUnit XML.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Print every verdict; without it those that are not green.
+    #[arg(long, short)]
+    verbose: bool,
+}
+
+/// Compares, and says so.
+///
+/// # Errors
+/// No record, a damaged one, nothing in common, I/O.
+pub fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
+    let [before, after] = [&args.before, &args.after].map(|path| RecordFolder::new(path).read());
+    let terms = Terms { level: args.level, detect: args.detect, max_slowdown: args.max_slowdown };
+    let compared = compare(&before?, &after?, &terms).ok_or_else(|| {
+        let words =
+            "nothing can be compared: no cell, estimator, observable and band is in both records";
+        Error::record(&args.after, words)
+    })?;
+    if let Some(path) = &args.junit {
+        let xml = junit::to_junit(&compared.verdicts);
+        crate::results::atomic::write(path, xml.as_bytes(), "write the JUnit file")?;
+    }
+    tell(&compared, args, out).map_err(Error::io(&PathBuf::from("standard output"), "write"))?;
+    Ok(compared.exit_code())
+}
+
+fn tell(compared: &Compared, args: &Args, out: &mut impl Write) -> std::io::Result<()> {
+    if !compared.changes.is_empty() {
+        writeln!(out, "not the same in the two records:")?;
+        compared.changes.iter().try_for_each(|change| writeln!(out, "  {change}"))?;
+        writeln!(out)?;
+    }
+    let shown = compared.verdicts.iter().filter(|v| args.verbose || !v.is_green());
+    let shown: Vec<Verdict> = shown.cloned().collect();
+    if !shown.is_empty() {
+        // Every row is of the same claim.
+        let rows: Vec<Verdict> =
+            shown.into_iter().map(|v| Verdict { claim: String::new(), ..v }).collect();
+        writeln!(out, "{}", verdict_table(&rows).to_text())?;
+    }
+    let all = compared.verdicts.len();
+    let identical = compared.verdicts.iter().filter(|v| v.test == "identical").count();
+    let green = compared.verdicts.iter().filter(|v| v.is_green()).count();
+    if identical == all {
+        writeln!(out, "identical: all {all} quantities, bit for bit")?;
+    } else {
+        let work = work_table(&compared.work).to_text();
+        writeln!(out, "work and variance, after over before:\n{work}")?;
+        writeln!(
+            out,
+            "{green} of {all} quantities are green, {identical} of them identical bit for bit; \
+             family-wise level {:e} (Holm)",
+            args.level
+        )?;
+        if let Some(worst) = coarsest(compared) {
+            writeln!(
+                out,
+                "largest change of a first observable that could have gone unseen (99 % power): {} %",
+                significant(100.0 * worst, 2)
+            )?;
+        }
+    }
+    for work in compared.work.iter().filter(|work| work.too_slow.is_some()) {
+        let name = work.too_slow.as_deref().unwrap_or_default();
+        writeln!(
+            out,
+            "too slow: {} {}: {name} per pass grew to {} times",
+            work.cell,
+            work.estimator,
+            significant(work.counts[name], 4)
+        )?;
+    }
+    Ok(())
+}
+
+/// The largest detectable of the runs' first observables.
+fn coarsest(compared: &Compared) -> Option<f64> {
+    let tested = compared.verdicts.iter().filter(|v| v.expected != 0.0 && v.detectable.is_finite());
+    tested.filter(|v| compared.is_first(v)).map(|v| v.detectable).max_by(f64::total_cmp)
+}
+
+/// Per run: counts per pass, variance of a pass of the first observable, and variance times rays.
+fn work_table(work: &[Work]) -> Table {
+    let mut names: Vec<&str> = work.iter().flat_map(|w| w.counts.keys().map(String::as_str)).collect();
+    names.sort_unstable();
+    names.dedup();
+    let mut header = vec!["cell", "estimator"];
+    header.extend(&names);
+    header.extend(["variance", "variance x rays"]);
+    let mut table = Table::new(&header);
+    for w in work {
+        let mut row = vec![w.cell.clone(), w.estimator.clone()];
+        let count = |name: &&str| significant(w.counts.get(*name).copied().unwrap_or(f64::NAN), 4);
+        row.extend(names.iter().map(count));
+        let rays = w.counts.get("rays").copied().unwrap_or(f64::NAN);
+        let list = |factor: f64| {
+            let each = w.variance.iter().map(|v| significant(v * factor, 3));
+            each.collect::<Vec<_>>().join(" ")
+        };
+        row.extend([list(1.0), list(rays)]);
+        table.push(row);
+    }
+    table.without_empty_columns()
+}
