@@ -109,9 +109,13 @@ fn rivals_that_were_interrupted_go_on_to_the_same_bytes() {
 #[ignore = "measures CPU time: for the night"]
 fn cpu_time_follows_the_counters() {
     let experiments = concat!(env!("CARGO_MANIFEST_DIR"), "/experiments/compare/nine-cells.toml");
-    let work = Work::new();
-    work.run(&format!("run {experiments} -q --threads 1 --set name=x")).exits(0);
-    let runs = timed(&stored(&work, "results"));
+    let mut runs = Vec::new();
+    for albedo in ["0.99", "0.8", "0.3"] {
+        let work = Work::new();
+        let set = format!("--set name=x --set object.medium.coefficients.albedo={albedo}");
+        work.run(&format!("run {experiments} -q --threads 1 {set}")).exits(0);
+        runs.extend(timed(&stored(&work, "results")));
+    }
     for ((name, weight), fitted) in WEIGHTS.iter().zip(fit(&runs)) {
         println!("{name:>16} {weight:6} ns, fitted {fitted:7.1} ns");
     }
@@ -119,7 +123,7 @@ fn cpu_time_follows_the_counters() {
         let predicted: f64 = fit(&runs).iter().zip(run.counts).map(|(w, n)| w * n).sum();
         println!("{:?} {:.3} of the time", run.counts, predicted / run.nanoseconds);
     }
-    let drift = drift(&runs).expect("nine runs");
+    let drift = drift(&runs).expect("27 runs");
     println!("drift {:.1} %", 100.0 * drift);
     assert!(drift < DRIFT_LIMIT, "the weights are off by {:.1} %", 100.0 * drift);
 }

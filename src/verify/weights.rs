@@ -5,20 +5,24 @@ use crate::results::record::EstimatorRun;
 use crate::results::store::Stored;
 
 /// Weights of the counters, in nanoseconds on the machine that they were measured on; only their ratios
-/// matter. From a regression of CPU time on counters over the nine cells (rounded), which this prints:
+/// matter. From a regression of CPU time on counters over the nine cells at three albedos (rounded), which
+/// this prints:
 ///
 /// ```text
 /// cargo test --release --test integration -- --ignored --nocapture cpu_time_follows_the_counters
 /// ```
 ///
-/// They predict costs together; one by one they mean little, because nearly every event comes with a ray.
-/// They are those of the unit sphere: a ray costs more in a mesh of many triangles.
+/// What they are worth: they predicted the CPU time of each of those 27 runs to 15 %; a rough boundary under
+/// a sky costs more than they say, because light samples below the horizon are not counted. They predict
+/// together; one by one they mean little, because in a path tracer rays are paths, medium events and
+/// boundary events together: of the fits that are equally good this one charges the rays. They are those of
+/// the unit sphere: a ray costs more in a mesh of many triangles.
 pub const WEIGHTS: [(&str, f64); 5] = [
-    ("paths", 100.0),
-    ("rays", 30.0),
-    ("shadow_rays", 60.0),
-    ("medium_events", 50.0),
-    ("boundary_events", 50.0),
+    ("paths", 0.0),
+    ("rays", 50.0),
+    ("shadow_rays", 240.0),
+    ("medium_events", 0.0),
+    ("boundary_events", 5.0),
 ];
 
 /// CPU time may drift by this much from the weights before they want measuring again.
@@ -159,7 +163,7 @@ mod tests {
     fn weights_come_out_again_on_any_machine() {
         let fitted = fit(&runs(3.0, [1.0; 5]));
         for (fitted, (name, weight)) in fitted.iter().zip(WEIGHTS) {
-            assert!((fitted / (3.0 * weight) - 1.0).abs() < 1e-6, "{name}: {fitted}");
+            assert!((fitted - 3.0 * weight).abs() < 1e-4, "{name}: {fitted}");
         }
         assert!(drift(&runs(3.0, [1.0; 5])).expect("a drift") < 1e-6);
         assert!(drift(&runs(1.0, [1.0; 5])[..4]).is_none());
@@ -167,7 +171,7 @@ mod tests {
 
     #[test]
     fn a_drift_is_seen() {
-        let drift = drift(&runs(1.0, [1.0, 1.0, 1.0, 3.0, 1.0])).expect("a drift");
+        let drift = drift(&runs(1.0, [1.0, 1.0, 3.0, 1.0, 1.0])).expect("a drift");
         assert!(drift > DRIFT_LIMIT, "{drift}");
     }
 
@@ -175,7 +179,7 @@ mod tests {
     fn negative_weights_are_not_fitted() {
         let mut runs = runs(1.0, [1.0; 5]);
         // Time falls with the paths.
-        runs.iter_mut().for_each(|run| run.nanoseconds -= 150.0 * run.counts[0].min(2e6));
+        runs.iter_mut().for_each(|run| run.nanoseconds -= 15.0 * run.counts[0].min(2e6));
         assert!(fit(&runs).iter().all(|w| *w >= 0.0), "{:?}", fit(&runs));
     }
 
