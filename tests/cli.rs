@@ -233,7 +233,7 @@ fn plan_check_list_schema_completions() {
     work.run("list estimators").exits(0).says("path").says("roulette");
     let ran = work.run("schema");
     let schema: serde_json::Value = serde_json::from_str(&ran.exits(0).stdout()).expect("JSON");
-    assert!(schema["properties"]["object"].is_object(), "{schema:#}");
+    assert!(schema["else"]["properties"]["object"].is_object(), "{schema:#}");
     let ran = work.run("completions bash");
     std::fs::write(work.path("completions"), ran.exits(0).stdout()).expect("a file");
     work.shell("bash -n completions && source ./completions && complete -p scatterproof").exits(0);

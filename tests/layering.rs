@@ -14,7 +14,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
     ("math", &[]),
     ("sampling", &["math"]),
     ("optics", &["math"]),
-    ("geometry", &["math"]),
+    ("geometry", &["math", "sampling"]),
     ("scene", &["math", "sampling", "optics", "geometry"]),
     ("estimators", &["math", "sampling", "optics", "geometry", "scene"]),
     ("samplers", &["math", "sampling", "optics", "geometry", "scene"]),

@@ -10,5 +10,6 @@ mod judging;
 mod layering;
 mod looks;
 mod reproducibility;
+mod samplers;
 mod tokens;
 mod work;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::counted;
 use crate::error::{Error, Result};
 use crate::experiment::build::Builder;
-use crate::experiment::{Experiment, LoadOptions, Registry, load};
+use crate::experiment::{LoadOptions, Loaded, Registry, load_any};
 
 /// Validate experiment files and say everything that is wrong with them.
 ///
@@ -33,13 +33,11 @@ pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> 
     for path in &args.files {
         let options = LoadOptions { sets: args.sets.clone(), setting: args.setting.clone() };
         let load_setting = |setting: &String| {
-            load(path, &LoadOptions { setting: Some(setting.clone()), ..options.clone() }, registry)
+            load_any(path, &LoadOptions { setting: Some(setting.clone()), ..options.clone() }, registry)
         };
-        let checked = load(path, &options, registry).and_then(|experiment| {
-            // Meshes, maps and the sensor's place show only when they are built.
-            let mut builder = Builder::new(&experiment);
-            experiment.cells.iter().try_for_each(|cell| builder.scene(cell).map(|_| ()))?;
-            let others: &[String] = if args.setting.is_some() { &[] } else { &experiment.settings };
+        let checked = load_any(path, &options, registry).and_then(|experiment| {
+            build(&experiment, registry)?;
+            let others: &[String] = if args.setting.is_some() { &[] } else { experiment.settings() };
             others.iter().try_for_each(|setting| load_setting(setting).map(|_| ()))?;
             Ok(experiment)
         });
@@ -55,7 +53,30 @@ pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> 
     if findings.is_empty() { Ok(()) } else { Err(Error::Input(findings)) }
 }
 
-fn summary(experiment: &Experiment) -> String {
+/// Meshes, maps and the sensor's place show only when they are built.
+fn build(experiment: &Loaded, registry: &Registry) -> Result<()> {
+    match experiment {
+        Loaded::Scene(experiment) => {
+            let mut builder = Builder::new(experiment);
+            experiment.cells.iter().try_for_each(|cell| builder.scene(cell).map(|_| ()))
+        }
+        Loaded::Samplers(experiment) => crate::run::samplers::build_all(experiment, registry),
+    }
+}
+
+fn summary(experiment: &Loaded) -> String {
+    let experiment = match experiment {
+        Loaded::Scene(experiment) => experiment,
+        Loaded::Samplers(experiment) => {
+            let file = &experiment.file;
+            return [
+                counted(file.sampler.len(), "sampler"),
+                format!("{} draws each", file.samples),
+                counted(file.claim.len(), "claim"),
+            ]
+            .join(", ");
+        }
+    };
     let file = &experiment.file;
     [
         counted(experiment.cells.len(), "cell"),

@@ -23,6 +23,8 @@ pub struct Args {
 pub enum Topic {
     /// Kinds of `[[estimator]]` and their options.
     Estimators,
+    /// Kinds of `[[sampler]]` and their options, in experiments on samplers.
+    Samplers,
     /// Measured media, for `medium.preset`.
     Materials,
     /// Glasses, for `eta = { material = NAME }`.
@@ -73,6 +75,7 @@ fn lines(topic: Topic, registry: &Registry) -> String {
     };
     match topic {
         Topic::Estimators => estimators(registry),
+        Topic::Samplers => samplers(registry),
         Topic::Materials => table(&materials::MATERIALS.map(|m| (m.name.to_string(), numbers(&m)))),
         Topic::Glasses => {
             table(&dispersion::GLASSES.map(|g| (g.name.to_string(), g.source.to_string())))
@@ -84,12 +87,23 @@ fn lines(topic: Topic, registry: &Registry) -> String {
         Topic::Sensors => schema(&["sensor"]),
         Topic::Lights => kinds(&["light", "0"]),
         Topic::Budgets => schema(&["budget"]),
-        Topic::Claims => kinds(&["claim", "0"]),
+        Topic::Claims => {
+            let of_samplers = "what the claim on samplers is, in an experiment on samplers";
+            kinds(&["claim", "0"]) + &table(&[("sampler".into(), of_samplers.into())])
+        }
     }
 }
 
 fn estimators(registry: &Registry) -> String {
     let entries = registry.entries.iter().map(|entry| {
+        let options = indented(&table(&entry.option_docs()));
+        format!("{}  {}\n{options}", entry.kind, entry.doc)
+    });
+    entries.collect()
+}
+
+fn samplers(registry: &Registry) -> String {
+    let entries = registry.samplers.iter().map(|entry| {
         let options = indented(&table(&entry.option_docs()));
         format!("{}  {}\n{options}", entry.kind, entry.doc)
     });

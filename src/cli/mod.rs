@@ -12,6 +12,7 @@ pub mod run;
 pub mod schema;
 pub mod verify;
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -99,7 +100,12 @@ impl Working {
 /// Reads the process's arguments, does what they say with the estimators of `registry`, prints errors,
 /// and returns the exit code: all that a program of one's own needs.
 pub fn main(registry: &Registry) -> ExitCode {
-    let command = Command::parse(); // usage errors exit with 2
+    main_with(registry, std::env::args_os())
+}
+
+/// [`main`] with these arguments, the first of them the program's name.
+pub fn main_with(registry: &Registry, arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let command = Command::parse_from(arguments); // usage errors exit with 2
     let out = &mut std::io::stdout();
     let outcome = match &command.action {
         Action::Run(args) => run::run(args, registry),

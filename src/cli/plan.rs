@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use super::{Reading, counted};
 use crate::error::Result;
-use crate::experiment::load;
 use crate::experiment::registry::Registry;
 use crate::experiment::schema::Budget;
+use crate::experiment::{Loaded, SamplerExperiment, load_any};
 use crate::report::table::Table;
 use crate::run::memory::{available, readable};
 use crate::run::{self, estimate_seconds};
@@ -32,16 +32,14 @@ pub struct Args {
 /// # Errors
 /// Bad input.
 pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
-    let experiment = load(&args.file, &args.reading.options(), registry)?;
+    let experiment = match load_any(&args.file, &args.reading.options(), registry)? {
+        Loaded::Scene(experiment) => experiment,
+        Loaded::Samplers(experiment) => return plan_samplers(args, &experiment, registry),
+    };
     let plan = run::plan(&experiment, registry)?;
     let threads = args.threads.unwrap_or_else(|| run::Options::new("").threads);
 
-    println!("values and where they come from");
-    let mut values = Table::new(&["key", "value", "from"]);
-    for (key, value, origin) in &experiment.origins {
-        values.push(vec![key.clone(), value.clone(), origin.clone()]);
-    }
-    println!("{}", values.to_text());
+    print_origins(&experiment.origins);
 
     let budget = match &experiment.file.budget {
         Budget::Passes(n) => format!("{n} passes"),
@@ -84,5 +82,39 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
         readable(memory.working)
     );
     memory.check(available())?;
+    Ok(0)
+}
+
+fn print_origins(origins: &[(String, String, String)]) {
+    println!("values and where they come from");
+    let mut values = Table::new(&["key", "value", "from"]);
+    for (key, value, origin) in origins {
+        values.push(vec![key.clone(), value.clone(), origin.clone()]);
+    }
+    println!("{}", values.to_text());
+}
+
+/// What would be drawn; without `--dry` a few chunks of each sampler are, for their time.
+fn plan_samplers(args: &Args, experiment: &SamplerExperiment, registry: &Registry) -> Result<u8> {
+    print_origins(&experiment.origins);
+    let threads = args.threads.unwrap_or_else(|| run::Options::new("").threads);
+    let file = &experiment.file;
+    println!("{}, {} draws each", counted(file.sampler.len(), "sampler"), file.samples);
+    let mut table = Table::new(&["sampler", "kind", "CPU time"]);
+    let mut total = 0.0;
+    let times = run::samplers::estimate_seconds(experiment, registry, args.dry)?;
+    for (entry, seconds) in file.sampler.iter().zip(times) {
+        let kind = entry.choice().map_or("", |(kind, _)| kind);
+        total += seconds.unwrap_or(0.0);
+        let time = seconds.map_or("-".into(), |seconds| format!("{seconds:.2} s"));
+        table.push(vec![entry.name.clone(), kind.into(), time]);
+    }
+    print!("{}", table.to_text());
+    if !args.dry {
+        println!(
+            "about {:.0} s on {threads} threads, and some tenths of a second a sampler for masses",
+            total / threads as f64
+        );
+    }
     Ok(0)
 }

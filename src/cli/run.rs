@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::{Reading, Working, listen};
 use crate::error::Result;
-use crate::experiment::load;
+use crate::experiment::load_any;
 use crate::experiment::registry::Registry;
 use crate::report::{self, terminal};
 
@@ -29,12 +29,13 @@ pub struct Args {
 pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     let interrupt = listen()?;
     let options = args.working.options();
-    let read = |file: &PathBuf| load(file, &args.reading.options(), registry);
+    let read = |file: &PathBuf| load_any(file, &args.reading.options(), registry);
     let experiments = args.files.iter().map(read).collect::<Result<Vec<_>>>()?;
     for experiment in &experiments {
-        let (folder, _) = crate::run::run(experiment, registry, &options, &interrupt)?;
+        let (folder, _) = crate::run::run_any(experiment, registry, &options, &interrupt)?;
         let material = report::write(&folder)?;
         print!("{}", terminal::run_table(&material).to_text());
+        print!("{}", terminal::sampler_table(&material).to_text());
         if let Some(table) = terminal::efficiency_table(&material) {
             println!("\nefficiency against the first estimator, 95 % interval:\n{}", table.to_text());
         }

@@ -5,18 +5,18 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::experiment::Registry;
-use crate::experiment::schema_json::json_schema;
+use crate::experiment::schema_json::any_schema;
 
 /// Print the JSON Schema of experiment files, from which editors complete and check.
 #[derive(Debug, clap::Args)]
 pub struct Args {}
 
-/// Prints the schema, the registered estimators in it.
+/// Prints the schema, the registered estimators and samplers in it.
 ///
 /// # Errors
 /// The output cannot be written.
 pub fn run(_: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
-    writeln!(out, "{:#}", json_schema(registry)).map_err(Error::io(Path::new("stdout"), "print"))
+    writeln!(out, "{:#}", any_schema(registry)).map_err(Error::io(Path::new("stdout"), "print"))
 }
 
 #[cfg(test)]

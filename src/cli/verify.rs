@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{Reading, Working, listen};
 use crate::error::{Error, Result};
 use crate::experiment::registry::Registry;
-use crate::experiment::{Experiment, LoadOptions, load};
+use crate::experiment::{LoadOptions, Loaded, load_any};
 use crate::report::{self, table::verdict_table};
 use crate::results::record::Quantity;
 use crate::results::store::{RecordFolder, Stored};
@@ -64,7 +64,7 @@ struct Subject {
     main: Stored,
     retest: Option<Stored>,
     /// Absent where a results folder was named.
-    experiment: Option<Experiment>,
+    experiment: Option<Loaded>,
 }
 
 /// Everything that verification of one call works with.
@@ -172,19 +172,19 @@ impl Court<'_> {
                 continue;
             }
             for file in experiment_files(path)? {
-                subjects.push(self.measured(load(&file, &self.reading, self.registry)?)?);
+                subjects.push(self.measured(load_any(&file, &self.reading, self.registry)?)?);
             }
         }
         Ok(subjects)
     }
 
-    fn measured(&self, experiment: Experiment) -> Result<Subject> {
-        let folder = RecordFolder::new(self.working.folder(&experiment.file.name));
-        let main = if crate::run::has_record(&experiment, &self.working.out) {
+    fn measured(&self, experiment: Loaded) -> Result<Subject> {
+        let folder = RecordFolder::new(self.working.folder(experiment.name()));
+        let main = if crate::run::has_record_of(&experiment, &self.working.out) {
             folder.read()?
         } else {
-            eprintln!("running {}", experiment.file.name);
-            crate::run::run(&experiment, self.registry, &self.working, &self.interrupt)?.1
+            eprintln!("running {}", experiment.name());
+            crate::run::run_any(&experiment, self.registry, &self.working, &self.interrupt)?.1
         };
         let retest = folder.retest_of(&main)?;
         Ok(Subject { folder, main, retest, experiment: Some(experiment) })
@@ -196,7 +196,10 @@ impl Court<'_> {
         for (index, subject) in subjects.iter_mut().enumerate() {
             let own = judgement.wanted.iter().filter(|w| w.case == index);
             let wanted: Vec<Quantity> = own.map(|w| w.quantity.clone()).collect();
-            let (false, Some(experiment)) = (wanted.is_empty(), &subject.experiment) else { continue };
+            let (false, Some(Loaded::Scene(experiment))) = (wanted.is_empty(), &subject.experiment)
+            else {
+                continue;
+            };
             eprintln!("second look at {}", experiment.file.name);
             let stored = crate::run::retest(
                 experiment,

@@ -33,7 +33,7 @@ pub fn load_text(
 }
 
 /// Applies the chosen setting, then the `--set` arguments; the keys that they set, and where.
-fn apply(
+pub fn apply(
     root: &mut Node,
     options: &LoadOptions,
     grammar: &Grammar,
@@ -88,7 +88,7 @@ impl Loader<'_> {
         let cells: Option<Vec<CellSpec>> =
             trees.iter().zip(&points).map(|(tree, points)| cell(tree, &axes, points)).collect();
         let first = self.first_cell(&trees[0]);
-        let settings = self.settings();
+        let settings = settings(&self.root);
         match (self.findings.into_sorted(), cells, typed::<ExperimentFile>(&first)) {
             (findings, Some(cells), Some(mut file)) if findings.is_empty() => {
                 file.sweep = resolved::sweep(&axes);
@@ -107,13 +107,6 @@ impl Loader<'_> {
         walk.entry(&self.root, "bands");
         let is_sound = walk.into_findings().is_empty();
         self.root.get("bands").filter(|_| is_sound).and_then(typed)
-    }
-
-    fn settings(&self) -> Vec<String> {
-        match self.root.get("setting").map(|node| &node.value) {
-            Some(Value::Table(settings)) => settings.keys().cloned().collect(),
-            _ => Vec::new(),
-        }
     }
 
     /// Rules of what all cells share.
@@ -187,15 +180,24 @@ impl Loader<'_> {
     }
 }
 
+/// The names of the settings that a file offers.
+pub fn settings(root: &Node) -> Vec<String> {
+    match root.get("setting").map(|node| &node.value) {
+        Some(Value::Table(settings)) => settings.keys().cloned().collect(),
+        _ => Vec::new(),
+    }
+}
+
 /// The findings, of which there must be one where an experiment is refused.
-fn refusal(findings: Vec<Diagnostic>) -> Error {
+pub fn refusal(findings: Vec<Diagnostic>) -> Error {
     match findings.is_empty() {
         true => Error::input("the experiment passed every rule and still does not fit its types"),
         false => Error::Input(findings),
     }
 }
 
-fn typed<T: DeserializeOwned>(node: &Node) -> Option<T> {
+/// A node as its type, where it fits.
+pub fn typed<T: DeserializeOwned>(node: &Node) -> Option<T> {
     serde_json::from_value(node.to_json()).ok()
 }
 

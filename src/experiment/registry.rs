@@ -70,9 +70,23 @@ impl RegistryEntry {
 
     /// Its options with the first line of their documentation.
     pub fn option_docs(&self) -> Vec<(String, String)> {
-        let options = self.options();
-        let keys = grammar::keys(&options).into_iter();
-        keys.map(|key| (key.to_string(), grammar::doc(&options["properties"][key]).to_string()))
-            .collect()
+        option_docs(&self.options())
     }
+}
+
+impl SamplerEntry {
+    /// The schema of its options as JSON, with its own definitions beside it.
+    pub fn options(&self) -> Json {
+        (self.options_schema)().to_value()
+    }
+
+    /// Its options with the first line of their documentation.
+    pub fn option_docs(&self) -> Vec<(String, String)> {
+        option_docs(&self.options())
+    }
+}
+
+fn option_docs(options: &Json) -> Vec<(String, String)> {
+    let keys = grammar::keys(options).into_iter();
+    keys.map(|key| (key.to_string(), grammar::doc(&options["properties"][key]).to_string())).collect()
 }

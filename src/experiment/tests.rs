@@ -41,7 +41,7 @@ pub fn registry() -> Registry {
         RegistryEntry { kind, doc, options_schema, build }
     };
     let entries = vec![entry("path", "Path tracing."), entry("snee", "Specular connections.")];
-    Registry { entries, ..Registry::default() }
+    Registry { entries, samplers: super::samplers::builtin() }
 }
 
 /// The parts of a good experiment; every test replaces one.

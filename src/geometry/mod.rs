@@ -9,6 +9,7 @@ mod mesh;
 mod normals;
 mod obj;
 pub mod procedural;
+mod surface;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -20,6 +21,7 @@ mod triangle;
 pub use mesh::Mesh;
 pub use normals::Normals;
 pub use obj::load_obj;
+pub use surface::{SurfacePoint, SurfaceSampler, Triangle};
 
 use crate::math::DVec3;
 

@@ -1,6 +1,6 @@
 //! Inversion of monotone functions, and of the error function.
 
-use super::{erf, erfc, exp};
+use super::{erf, erfc, exp, exp_m1, ln_1p};
 
 /// The root of an increasing `f` in [lo, hi], where `f(lo) <= 0 <= f(hi)`: `f` gives value and slope;
 /// Newton steps from `start`, bisection wherever a step leaves the bracket. Ends where a step moves x
@@ -23,6 +23,17 @@ pub fn increasing_root(f: impl Fn(f64) -> (f64, f64), lo: f64, hi: f64, start: f
         x = next;
     }
     x
+}
+
+/// The root x >= 0 of a x + ln(1 + x) = e, for a >= 0 and e >= 0: x = W(a exp(a + e)) / a - 1 with the
+/// principal branch W of Lambert's function, here without overflow for large a, without a difference for
+/// small x, and with its limit e^x - 1 at a = 0.
+pub fn lambert_excess(a: f64, e: f64) -> f64 {
+    // ln(1 + x) >= 0 and a x >= 0 bound the root from above; ln(1 + x) <= x from below. The function is
+    // concave, so that Newton's steps approach the root from below.
+    let above = exp_m1(e).min(e / a);
+    let root = |x: f64| (a * x + ln_1p(x) - e, a + 1.0 / (1.0 + x));
+    increasing_root(root, 0.0, above, e / (1.0 + a))
 }
 
 /// Inverse of `erf` on (-1, 1); +-infinity at +-1.
@@ -70,4 +81,33 @@ mod tests {
         let root = increasing_root(|x| (x * x * x - 2.0, 3.0 * x * x), 0.0, 2.0, 1.0);
         assert!((root - super::super::cbrt(2.0)).abs() < 2e-15);
     }
+
+    /// Against W to 30 digits (mpmath 1.3: `lambertw(a * exp(a + e)) / a - 1`), and against its own
+    /// equation where a and e range over all sizes.
+    #[test]
+    fn lambert_excess_solves_its_equation() {
+        for (a, e, expected) in LAMBERT {
+            let x = lambert_excess(a, e);
+            assert!((x / expected - 1.0).abs() < 4e-15, "{a} {e}: {x} {expected}");
+        }
+        for a in [0.0, 1e-12, 1e-3, 0.4, 1.0, 30.0, 1e6] {
+            for e in [1e-17, 1e-9, 1e-2, 1.0, 10.0, 36.7] {
+                let x = lambert_excess(a, e);
+                assert!(((a * x + ln_1p(x)) / e - 1.0).abs() < 1e-14, "{a} {e}: {x}");
+            }
+            assert_eq!(lambert_excess(a, 0.0), 0.0);
+        }
+    }
+
+    const LAMBERT: [(f64, f64, f64); 9] = [
+        (1e-6, 0.001, 0.0010004991652081774),
+        (0.25, 1e-8, 8.0000000256e-09),
+        (0.25, 3.0, 4.900113588167485),
+        (1.0, 1.0, 0.5571455989976114),
+        (1.0, 30.0, 26.67931463003277),
+        (7.5, 0.3, 0.03536600148883067),
+        (40.0, 36.0, 0.8841629089466799),
+        (300.0, 0.01, 3.322259319554195e-05),
+        (1e-3, 20.0, 10720.03684905815),
+    ];
 }

@@ -22,6 +22,14 @@ const RULE: [(f64, f64, f64); 8] = [
     (0.0, 0.209_482_141_084_727_83, 0.417_959_183_673_469_4),
 ];
 
+/// The 15 nodes on [-1, 1], with the weights of the Kronrod rule and of the embedded Gauss rule.
+pub fn gauss_kronrod() -> [(f64, f64, f64); 15] {
+    std::array::from_fn(|i| {
+        let (node, kronrod, gauss) = RULE[if i < 8 { i } else { 14 - i }];
+        (if i < 8 { -node } else { node }, kronrod, gauss)
+    })
+}
+
 fn rule(f: &mut dyn FnMut(f64) -> f64, a: f64, b: f64) -> Integral {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     let (mut kronrod, mut gauss) = (0.0, 0.0);

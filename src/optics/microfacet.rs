@@ -3,7 +3,7 @@
 
 use std::f64::consts::FRAC_1_PI;
 
-use crate::math::{DVec3, erf_inv, erfc, exp, increasing_root, sin_cos_turns};
+use crate::math::{DVec3, erf_inv, erfc, exp, increasing_root, ln_1p, sin_cos_turns};
 
 /// Shape of the distribution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +61,26 @@ impl Microfacets {
             }
         };
         1.0 / (1.0 + lambda)
+    }
+
+    /// Density of [`Self::sample_normal`] per solid angle: D(h) h.z.
+    #[inline]
+    pub fn pdf_normal(&self, h: DVec3) -> f64 {
+        self.d(h) * h.z
+    }
+
+    /// A normal in proportion to the projected area of its facets, without a view (Walter et al. 2007,
+    /// eq. 28, 35): the slope s = tan(theta) / alpha has the distribution function 1 - e^(-s^2)
+    /// (Beckmann), s^2 / (1 + s^2) (GGX).
+    #[inline]
+    pub fn sample_normal(&self, u: [f64; 2]) -> DVec3 {
+        let slope2 = match self.kind {
+            MicrofacetKind::Ggx => u[0] / (1.0 - u[0]),
+            MicrofacetKind::Beckmann => -ln_1p(-u[0]),
+        };
+        let tan = self.alpha * slope2.sqrt();
+        let (sin_phi, cos_phi) = sin_cos_turns(u[1]);
+        DVec3::new(tan * cos_phi, tan * sin_phi, 1.0).normalize()
     }
 
     /// Density of normals as seen from `v` (v.z > 0), per solid angle:
@@ -214,6 +234,41 @@ mod tests {
                         let product = du.cross(dv).length() * facets.pdf_visible(v, h);
                         assert!((product - 1.0).abs() < 2e-5, "{facets:?} cos {cos} u {u:?}: {product}");
                     }
+                }
+            }
+        }
+    }
+
+    /// D1 for the normals without a view: the slope's distribution function, ends included.
+    #[test]
+    fn plain_normals_invert() {
+        for facets in all() {
+            let end = 1.0 / f64::from(1 << 24);
+            for u in (0..4096).map(|i| (f64::from(i) + 0.5) / 4096.0).chain([end, 1.0 - end]) {
+                let h = facets.sample_normal([u, 0.3]);
+                let slope2 = (h.x * h.x + h.y * h.y) / (h.z * h.z * facets.alpha * facets.alpha);
+                let back = match facets.kind {
+                    MicrofacetKind::Ggx => slope2 / (1.0 + slope2),
+                    MicrofacetKind::Beckmann => -crate::math::exp_m1(-slope2),
+                };
+                assert!((back - u).abs() < 1e-12, "{facets:?} {u}: {back}");
+            }
+        }
+    }
+
+    /// D2 for the normals without a view. D7 is `projected_area_is_one`.
+    #[test]
+    fn plain_density_is_the_inverse_jacobian() {
+        for facets in all() {
+            for i in 0..20 {
+                for j in 0..20 {
+                    let u = [(f64::from(i) + 0.5) / 20.0, (f64::from(j) + 0.37) / 20.0];
+                    let e = 1e-6;
+                    let at = |a: f64, b: f64| facets.sample_normal([u[0] + a, u[1] + b]);
+                    let du = (at(e, 0.0) - at(-e, 0.0)) / (2.0 * e);
+                    let dv = (at(0.0, e) - at(0.0, -e)) / (2.0 * e);
+                    let product = du.cross(dv).length() * facets.pdf_normal(at(0.0, 0.0));
+                    assert!((product - 1.0).abs() < 2e-5, "{facets:?} u {u:?}: {product}");
                 }
             }
         }

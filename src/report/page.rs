@@ -13,10 +13,14 @@ use crate::verify::weights::{self, DRIFT_LIMIT};
 /// The page of one record.
 pub(super) fn page(material: &Material) -> Document {
     let mut blocks = claims(material);
-    blocks.extend(measured(material));
-    blocks.extend(efficiency(material));
-    blocks.extend(cost(material));
-    blocks.extend(notes(material));
+    if material.stored.record.samplers.is_empty() {
+        blocks.extend(measured(material));
+        blocks.extend(efficiency(material));
+        blocks.extend(cost(material));
+        blocks.extend(notes(material));
+    } else {
+        blocks.extend(samplers(material));
+    }
     blocks.extend(origin(material));
     Document { title: material.stored.record.experiment.clone(), blocks }
 }
@@ -45,6 +49,34 @@ fn claims(material: &Material) -> Vec<Block> {
     let (summary, verdicts) =
         (Block::Table(claim_table(verdicts)), Block::Table(verdict_table(&ordered)));
     vec![heading("Claims"), Block::Text(text), summary, heading("Verdicts"), verdicts]
+}
+
+/// What was drawn, and how exactly it is known what should have been.
+fn samplers(material: &Material) -> Vec<Block> {
+    let text = "Draws are counted in cells chosen by the density alone (coarse + fine). \"detectable\" is \
+                the relative error of the density, of one size in all coarse cells, that would have been \
+                found with 99 % probability. Seconds are of this machine and this run.";
+    let table = super::terminal::sampler_table(material);
+    let mut masses = Table::new(&["sampler", "kind", "total mass - 1", "bound", "evaluations", "note"]);
+    for run in &material.stored.record.samplers {
+        masses.push(vec![
+            run.sampler.clone(),
+            run.kind.clone(),
+            format!("{:.1e}", run.total - 1.0),
+            format!("{:.1e}", run.total_bound),
+            run.evaluations.to_string(),
+            if run.exhausted { "the budget of evaluations was spent".into() } else { String::new() },
+        ]);
+    }
+    let quadrature = "The masses of the cells, by quadrature of the density.";
+    vec![
+        heading("Samplers"),
+        Block::Text(text.into()),
+        Block::Table(table),
+        heading("Expected masses"),
+        Block::Text(quadrature.into()),
+        Block::Table(masses.without_empty_columns()),
+    ]
 }
 
 fn measured(material: &Material) -> Vec<Block> {

@@ -39,8 +39,12 @@ impl Table {
         self
     }
 
-    /// Aligned plain text: columns two spaces apart, numbers to the right.
+    /// Aligned plain text: columns two spaces apart, numbers to the right. Nothing of a table without
+    /// columns.
     pub fn to_text(&self) -> String {
+        if self.header.is_empty() {
+            return String::new();
+        }
         let columns = self.columns();
         let rule: Vec<String> = columns.iter().map(|c| "-".repeat(c.width)).collect();
         let lines = [&self.header, &rule].into_iter().chain(&self.rows);

@@ -1,7 +1,7 @@
 //! What `run` prints when it is done: a row per measurement, short enough for a terminal.
 
 use super::Material;
-use super::number::{significant, with_error};
+use super::number::{per_cent, significant, with_error};
 use super::table::{Table, comparison_table};
 use crate::results::measurements::Measurement;
 use crate::verify::comparisons::Row;
@@ -30,7 +30,37 @@ pub fn run_table(material: &Material) -> Table {
             table.push(row);
         }
     }
-    table
+    if table.rows.is_empty() { Table::default() } else { table }
+}
+
+/// One row per sampler: how many of its tests came out how, and the smallest defect that they would have
+/// found.
+pub fn sampler_table(material: &Material) -> Table {
+    let record = &material.stored.record;
+    let header = ["sampler", "draws", "cells", "tests", "green", "detectable", "CPU s", "draws/s/core"];
+    let mut table = Table::new(&header);
+    for run in &record.samplers {
+        let own =
+            || material.verdicts.iter().filter(|v| v.estimators == run.sampler && v.class.is_empty());
+        let green = own().filter(|v| v.is_green()).count();
+        let coarse = own().find(|v| v.test == "chi2 coarse");
+        let cells = [Some(&run.coarse), run.fine.as_ref()].into_iter().flatten();
+        let cells = cells.filter_map(|path| material.stored.cells(path));
+        let cells: Vec<String> = cells.map(|cells| (cells.mass.len() - 1).to_string()).collect();
+        let cost = material.timing.as_ref().and_then(|t| t.of("", &run.sampler));
+        let rate = cost.and_then(|c| c.paths_per_second());
+        table.push(vec![
+            run.sampler.clone(),
+            run.samples.to_string(),
+            cells.join(" + "),
+            own().count().to_string(),
+            green.to_string(),
+            coarse.map_or(String::new(), |v| per_cent(v.detectable)),
+            cost.map_or(String::new(), |c| significant(c.cpu_seconds, 3)),
+            rate.map_or(String::new(), |rate| significant(rate, 3)),
+        ]);
+    }
+    if table.rows.is_empty() { Table::default() } else { table.without_empty_columns() }
 }
 
 /// Efficiencies of all classes together, where there are two estimators to compare.

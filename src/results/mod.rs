@@ -22,6 +22,8 @@ pub mod record;
 /// A small made-up record.
 #[cfg(test)]
 pub mod sample;
+/// What a record holds of samplers.
+pub mod sampler;
 /// A record's folder.
 pub mod store;
 /// What it cost in time.

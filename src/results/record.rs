@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::sampler::SamplerRun;
+
 /// Version of this layout; a reader refuses others.
 pub const SCHEMA_VERSION: u32 = 2;
 
@@ -39,6 +41,9 @@ pub struct Record {
     pub bands: Vec<Band>,
     /// The cells in the order of the sweep.
     pub cells: Vec<Cell>,
+    /// What was drawn from each sampler.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub samplers: Vec<SamplerRun>,
     /// blake3 of every array file, hex, by its path relative to the record's folder.
     pub checksums: BTreeMap<String, String>,
 }

@@ -40,6 +40,7 @@ pub fn stored(noise: f64) -> Stored {
         replays: vec![],
         bands: vec![band("R", [1.0, 0.0, 0.0]), band("G", [0.0, 1.0, 0.0])],
         cells: vec![cell],
+        samplers: vec![],
         checksums: BTreeMap::new(),
     };
     Stored { record, arrays, timing: None }

@@ -4,6 +4,7 @@
 //! record/record.json              everything but the arrays (see results::record)
 //! record/record.json.b3           its hash, as b3sum writes and checks it
 //! record/cells/<NNN>/<estimator>.gates.npy, <estimator>.costs.npy, <estimator>.pixels.npy
+//! record/samplers/<NNN>.coarse.npy, .fine.npy, .serial.npy
 //! timing.json, provenance.json    beside the record, never byte-identical
 //! ```
 //! and beside those the derived views. The record appears whole or not at all.
@@ -101,7 +102,7 @@ impl Stored {
                 return Some(format!("pixels of {} have shape {shape:?}", run.estimator));
             }
         }
-        None
+        super::sampler::defect(&self.record, &self.arrays)
     }
 }
 

@@ -81,6 +81,7 @@ pub fn assemble(
         replays,
         bands: plan.bands.clone(),
         cells,
+        samplers: Vec::new(),
         checksums: BTreeMap::new(),
     };
     Ok(Assembled { record, arrays, timing })

@@ -6,7 +6,7 @@ use crate::results::json::{canonical, hash_bytes};
 use crate::sampling::stream::StreamKey;
 
 /// Version of what enters a key; raising it re-rolls every experiment's dice.
-const KEY_VERSION: u32 = 1;
+pub const KEY_VERSION: u32 = 1;
 
 /// What a sequence of passes is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,15 +3,19 @@
 //! experiment -> jobs (scene + estimator + streams) -> blocks of passes, in any order, on any threads
 //! -> moments in the order of passes -> record, timing, provenance.
 
+pub mod cells;
 pub mod checkpoint;
 pub mod clock;
 pub mod comparisons;
+pub mod count;
 pub mod interrupt;
 pub mod job;
 pub mod keys;
+pub mod masses;
 pub mod memory;
 pub mod pilot;
 pub mod progress;
+pub mod samplers;
 pub mod workers;
 
 mod assemble;
@@ -22,8 +26,8 @@ mod retest;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::experiment::Experiment;
 use crate::experiment::registry::Registry;
+use crate::experiment::{Experiment, Loaded};
 use crate::results::provenance::{self, Provenance};
 use crate::results::record::Replay;
 use crate::results::store::{RecordFolder, Stored};
@@ -74,6 +78,30 @@ pub fn run(
 ) -> Result<(RecordFolder, Stored)> {
     let plan = plan(experiment, registry)?;
     play(experiment, &plan, &options.folder(&experiment.file.name), options, interrupt)
+}
+
+/// Runs an experiment of either sort.
+///
+/// # Errors
+/// As [`run`] and [`samplers::run`].
+pub fn run_any(
+    loaded: &Loaded,
+    registry: &Registry,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<(RecordFolder, Stored)> {
+    match loaded {
+        Loaded::Scene(experiment) => run(experiment, registry, options, interrupt),
+        Loaded::Samplers(experiment) => samplers::run(experiment, registry, options, interrupt),
+    }
+}
+
+/// Whether the folder holds a record of exactly this experiment, its claims included, by this build.
+pub fn has_record_of(loaded: &Loaded, out: &Path) -> bool {
+    match loaded {
+        Loaded::Scene(experiment) => has_record(experiment, out),
+        Loaded::Samplers(experiment) => samplers::has_record(experiment, out),
+    }
 }
 
 /// Plays a plan into the results folder `root`.

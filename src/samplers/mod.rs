@@ -7,8 +7,19 @@
 //! the chart and not taken from the sampler). What a sampler draws and what its density says come from
 //! different functions of the code under test, so that each is held against the other.
 
+pub mod boundary;
+pub mod discrete;
+pub mod distance;
+pub mod facets;
+pub mod light;
 pub mod phase;
+pub mod radial;
+pub mod surface;
+pub mod towards;
 
+use std::f64::consts::TAU;
+
+use crate::math::{atan2, sin_cos_turns};
 use crate::sampling::stream::Stream;
 
 /// One sampler with its parameters: what it draws, and the distribution that it claims to draw from.
@@ -113,6 +124,27 @@ pub struct Contrast {
     /// Its mean by definition (g for the mean cosine of a phase function); by quadrature of the density
     /// without it.
     pub expected: Option<f64>,
+}
+
+impl Contrast {
+    /// A function of the chart coordinates of the only piece.
+    pub fn of(
+        name: &'static str,
+        expected: Option<f64>,
+        of: impl Fn([f64; 2]) -> f64 + Send + Sync + 'static,
+    ) -> Contrast {
+        Contrast { name, of: Box::new(move |_, at| of(at)), expected }
+    }
+
+    /// The cosine of an azimuth that is the second coordinate, in turns, and uniform.
+    pub fn azimuth() -> Contrast {
+        Contrast::of("cos azimuth", Some(0.0), |[_, turns]| sin_cos_turns(turns).1)
+    }
+}
+
+/// The azimuth of (x, y), in turns, from 0 to 1.
+pub fn turns(x: f64, y: f64) -> f64 {
+    (atan2(y, x) / TAU).rem_euclid(1.0)
 }
 
 impl Axis {

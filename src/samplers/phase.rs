@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::{Axis, Contrast, Draw, Piece, Sampler};
-use crate::math::{DVec3, Frame, atan2, exp_m1, ln_1p};
+use super::{Axis, Contrast, Draw, Piece, Sampler, turns};
+use crate::math::{DVec3, Frame, exp_m1, ln_1p};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::Stream;
 
@@ -36,12 +36,12 @@ impl HenyeyGreensteinSampler {
     }
 
     /// 1 - |cosine to the peak| at a chart coordinate.
-    fn distance_to_pole(&self, x: f64) -> f64 {
+    fn below_pole(&self, x: f64) -> f64 {
         (self.scale * exp_m1(self.length * x)).min(2.0)
     }
 
     fn mu(&self, x: f64) -> f64 {
-        let mu = 1.0 - self.distance_to_pole(x);
+        let mu = 1.0 - self.below_pole(x);
         if self.phase.g < 0.0 { -mu } else { mu }
     }
 }
@@ -53,10 +53,9 @@ impl Sampler for HenyeyGreensteinSampler {
         let from_pole = 0.5 * (next - self.pole()).length_squared();
         let x = (ln_1p(from_pole / self.scale) / self.length).clamp(0.0, 1.0);
         let local = self.about.to_local(next);
-        let turns = (atan2(local.y, local.x) / TAU).rem_euclid(1.0);
         let pdf = self.phase.pdf(next.dot(self.dir));
         let density = pdf * TAU * self.length * (self.scale + from_pole);
-        Draw::Point { piece: 0, at: [x, turns], density }
+        Draw::Point { piece: 0, at: [x, turns(local.x, local.y)], density }
     }
 
     fn pieces(&self) -> Vec<Piece> {
@@ -64,22 +63,25 @@ impl Sampler for HenyeyGreensteinSampler {
     }
 
     fn density(&self, _piece: usize, [x, _]: [f64; 2]) -> f64 {
-        self.phase.pdf(self.mu(x)) * TAU * self.length * (self.scale + self.distance_to_pole(x))
+        self.phase.pdf(self.mu(x)) * TAU * self.length * (self.scale + self.below_pole(x))
     }
 
     fn contrasts(&self) -> Vec<Contrast> {
         let g = self.phase.g;
         let poles = HenyeyGreensteinSampler::new(g);
-        let mean_cosine = Contrast {
-            name: "mean cosine",
-            of: Box::new(move |_, [x, _]| poles.mu(x)),
-            expected: Some(g),
-        };
-        let cosine = Contrast {
-            name: "cos azimuth",
-            of: Box::new(|_, [_, turns]| crate::math::sin_cos_turns(turns).1),
-            expected: Some(0.0),
-        };
-        vec![mean_cosine, cosine]
+        let mean_cosine = Contrast::of("mean cosine", Some(g), move |[x, _]| poles.mu(x));
+        let poles = HenyeyGreensteinSampler::new(g);
+        let is_forward = move |[x, _]: [f64; 2]| if poles.mu(x) > 0.0 { 1.0 } else { 0.0 };
+        let forward = Contrast::of("forward share", Some(forward_share(g)), is_forward);
+        vec![mean_cosine, forward, Contrast::azimuth()]
     }
+}
+
+/// The probability of mu > 0: int_0^1 (1 - g^2) / (2 (1 + g^2 - 2 g mu)^(3/2)) dmu
+/// = (1 - g^2) / (2g) (1 / (1 - g) - 1 / sqrt(1 + g^2)), and 1/2 + 3g/4 + O(g^3) near 0.
+fn forward_share(g: f64) -> f64 {
+    if g.abs() < 1e-4 {
+        return 0.5 + 0.75 * g;
+    }
+    (1.0 - g * g) / (2.0 * g) * (1.0 / (1.0 - g) - 1.0 / (1.0 + g * g).sqrt())
 }

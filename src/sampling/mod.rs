@@ -1,11 +1,20 @@
 //! Random streams, warps with their pdf twins, distances, MIS. Sampling code takes uniform numbers,
 //! never a generator, so that it can be enumerated and integrated; only estimators hold a stream.
 
-/// Flight distances.
+/// One index of many.
+pub mod discrete;
+
+/// Distances along a ray.
 pub mod distance;
+
+/// Points of a plane about the origin.
+pub mod radial;
 
 /// The keyed random streams.
 pub mod stream;
+
+/// Points of a volume by direction and distance towards a given point.
+pub mod towards;
 
 /// Maps from the unit square, each beside its density.
 pub mod warp;

@@ -45,6 +45,16 @@ pub fn pdf_cosine_hemisphere(cos: f64) -> f64 {
     cos.max(0.0) * FRAC_1_PI
 }
 
+/// Barycentric coordinates of a point of a triangle, uniform per area: density 1 / area. The first is
+/// 1 - sqrt(u0) (the part of the triangle beyond a parallel to the opposite side grows as the square of
+/// its height), u1 divides the parallel. Their sum is 1.
+#[inline]
+pub fn square_to_triangle(u: [f64; 2]) -> [f64; 3] {
+    let s = u[0].sqrt();
+    let t = s * u[1];
+    [1.0 - s, s - t, t]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -79,5 +89,23 @@ mod tests {
             assert!((jacobian(cosine, u) * pdf_cosine_hemisphere(cosine(u).z) - 1.0).abs() < 1e-6);
             assert!((cosine(u).length() - 1.0).abs() < 1e-15);
         }
+    }
+
+    /// D2 for the triangle: uniform over one of area 3/2 in the plane, whose corners it reaches.
+    #[test]
+    fn triangle_is_uniform() {
+        let corners = [DVec3::ZERO, DVec3::new(3.0, 0.0, 0.0), DVec3::new(1.0, 1.0, 0.0)];
+        let point = |u| {
+            let [a, b, c] = square_to_triangle(u);
+            corners[0] * a + corners[1] * b + corners[2] * c
+        };
+        for u in grid() {
+            assert!((jacobian(point, u) / 1.5 - 1.0).abs() < 1e-6, "{u:?}");
+            let weights = square_to_triangle(u);
+            assert!(
+                weights.iter().all(|w| *w > 0.0) && (weights.iter().sum::<f64>() - 1.0).abs() < 1e-15
+            );
+        }
+        assert_eq!([[0.0, 0.3], [1.0, 0.0], [1.0, 1.0]].map(point), corners);
     }
 }

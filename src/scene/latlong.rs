@@ -2,8 +2,8 @@
 //!
 //! Radiance is constant inside a texel, so that its density can be exactly proportional to it: texel k
 //! of row r subtends (cos theta_r - cos theta_{r+1}) 2 pi / width. A texel is drawn with probability
-//! radiance * solid angle over their sum S (alias table, Walker 1977, in Vose's 1991 form), a direction
-//! uniformly inside it, and the density of direction w is radiance(w) / S: no sine, no pole.
+//! radiance * solid angle over their sum S (alias table), a direction uniformly inside it, and the density
+//! of direction w is radiance(w) / S: no sine, no pole.
 //!
 //! +z is up (first row); the middle column looks along +x and azimuth grows towards the left edge,
 //! as seen from inside, counter-clockwise from above.
@@ -11,6 +11,7 @@
 use std::f64::consts::PI;
 
 use crate::math::{DVec3, atan2, cos, sin_cos_turns};
+use crate::sampling::discrete::AliasTable;
 
 /// A map of radiance.
 #[derive(Debug)]
@@ -27,8 +28,7 @@ struct BandMap {
     radiance: Vec<f64>,
     /// S of the module's comment.
     strength: f64,
-    /// Alias table: probability to stay, and the other texel.
-    alias: Vec<(f64, u32)>,
+    alias: AliasTable,
 }
 
 impl LatLong {
@@ -49,7 +49,7 @@ impl LatLong {
                     radiance[k] * (edges[row] - edges[row + 1]) * 2.0 * PI / width as f64
                 };
                 let weights: Vec<f64> = (0..radiance.len()).map(texel).collect();
-                BandMap { strength: weights.iter().sum(), alias: alias_table(&weights), radiance }
+                BandMap { strength: weights.iter().sum(), alias: AliasTable::new(&weights), radiance }
             })
             .collect();
         LatLong { width, height, bands, edges }
@@ -62,15 +62,7 @@ impl LatLong {
             return (DVec3::Z, 0.0, 1.0);
         }
         // One number chooses the texel; what is left of it places the direction inside the row.
-        let scaled = u[0] * map.alias.len() as f64;
-        let slot = (scaled as usize).min(map.alias.len() - 1);
-        let rest = scaled - slot as f64;
-        let (stay, other) = map.alias[slot];
-        let (texel, v) = if rest < stay {
-            (slot, rest / stay)
-        } else {
-            (other as usize, (rest - stay) / (1.0 - stay))
-        };
+        let (texel, v) = map.alias.sample(u[0]);
         let (row, column) = (texel / self.width, texel % self.width);
         let z = self.edges[row] + v * (self.edges[row + 1] - self.edges[row]);
         let turns = 0.5 - (column as f64 + u[1]) / self.width as f64;
@@ -92,44 +84,14 @@ impl LatLong {
 
     /// Memory that the map holds, bytes.
     pub fn memory_bytes(&self) -> usize {
-        let texel = size_of::<f64>() + size_of::<(f64, u32)>();
-        self.bands.len() * self.width * self.height * texel
+        let bytes = |map: &BandMap| size_of_val(&*map.radiance) + map.alias.heap_bytes();
+        self.bands.iter().map(bytes).sum()
     }
 
     /// Radiance integrated over directions.
     pub fn strength(&self, band: usize) -> f64 {
         self.bands[band].strength
     }
-}
-
-/// Vose's alias table of weights that are not all 0: slot k keeps its own index with the probability
-/// in it, else gives the other one.
-fn alias_table(weights: &[f64]) -> Vec<(f64, u32)> {
-    let total: f64 = weights.iter().sum();
-    let n = weights.len();
-    let mut table: Vec<(f64, u32)> = (0..n).map(|k| (1.0, k as u32)).collect();
-    if total == 0.0 {
-        return table;
-    }
-    let mut share: Vec<f64> = weights.iter().map(|w| w / total * n as f64).collect();
-    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&k| share[k] < 1.0);
-    while let (Some(&s), Some(&l)) = (small.last(), large.last()) {
-        small.pop();
-        table[s] = (share[s], l as u32);
-        share[l] -= 1.0 - share[s];
-        if share[l] < 1.0 {
-            large.pop();
-            small.push(l);
-        }
-    }
-    // Rounding can leave a small slot without a partner: it keeps itself, unless it has no weight.
-    for s in small {
-        if weights[s] == 0.0 {
-            table[s] =
-                (0.0, (0..n).max_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap_or(s) as u32);
-        }
-    }
-    table
 }
 
 #[cfg(test)]

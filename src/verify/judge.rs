@@ -59,7 +59,9 @@ pub fn judge(cases: &[Case], looks: Looks) -> Judgement {
         let paired = !main.record.resolved["pair"].is_null();
         let tables = if paired { vec![] } else { table_trials(&own) };
         let reproduced = super::reproduction::trials(main);
-        trials.extend(own.into_iter().chain(tables).chain(reproduced).map(|trial| (case, trial)));
+        let samplers = super::sampler::trials(main);
+        let all = own.into_iter().chain(tables).chain(reproduced).chain(samplers);
+        trials.extend(all.map(|trial| (case, trial)));
     }
     conclude(cases, trials, looks)
 }
@@ -144,13 +146,18 @@ fn conclude(cases: &[Case], trials: Vec<(usize, Trial)>, looks: Looks) -> Judgem
                 SecondLook::Missing
             }
             Some(Evidence::None(reason)) => SecondLook::Invalid(reason),
-            Some(Evidence::Identity { holds }) => SecondLook::Taken(if holds { 1.0 } else { 0.0 }),
             Some(Evidence::Efficiency(_)) => SecondLook::Invalid("efficiencies have one look".into()),
-            Some(Evidence::Bits(_)) => SecondLook::Invalid("a question of bits".into()),
-            Some(Evidence::Test { test, .. } | Evidence::Sum { test }) if test.p_value.is_nan() => {
+            Some(Evidence::Identity { holds } | Evidence::Exact { holds, .. }) => {
+                SecondLook::Taken(if holds { 1.0 } else { 0.0 })
+            }
+            Some(Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. })
+                if test.p_value.is_nan() =>
+            {
                 SecondLook::Invalid("the test has no p-value".into())
             }
-            Some(Evidence::Test { .. } | Evidence::Sum { .. }) => SecondLook::Taken(adjusted_p),
+            Some(Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }) => {
+                SecondLook::Taken(adjusted_p)
+            }
         };
         second_looks.insert(i, look);
     }
@@ -181,7 +188,7 @@ fn second(case: &Case, first: &Trial) -> Option<Trial> {
         Item::Comparison(index) if quantities(case, first).all(|q| held(&q)) => {
             Some(trial(retest, index, &case.main.record.comparisons[index]))
         }
-        Item::Comparison(_) | Item::Table => None,
+        Item::Comparison(_) | Item::Table | Item::Sampler => None,
     }
 }
 
@@ -189,7 +196,7 @@ fn second(case: &Case, first: &Trial) -> Option<Trial> {
 fn quantities<'a>(case: &Case<'a>, trial: &Trial) -> impl Iterator<Item = Quantity> + use<'a> {
     let comparison = match trial.item {
         Item::Comparison(index) => Some(&case.main.record.comparisons[index]),
-        Item::Table => None,
+        Item::Table | Item::Sampler => None,
     };
     comparison.into_iter().flat_map(|c| {
         let other = match &c.against {
@@ -218,7 +225,8 @@ fn state(
     tests: f64,
 ) -> Verdict {
     let Trial { claim, evidence, detect, one_look, reference, mut verdict, .. } = trial;
-    if let Evidence::Test { test, .. } | Evidence::Sum { test } = &evidence {
+    if let Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. } = &evidence
+    {
         (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
         verdict.adjusted_p = adjusted_p;
     }
@@ -228,6 +236,9 @@ fn state(
         let test = &shown.test;
         (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
         (verdict.adjusted_p, verdict.detectable) = (adjusted_p, shown.detectable(own_level));
+    }
+    if let Evidence::Fit { fit, .. } = &evidence {
+        verdict.detectable = fit.detectable(own_level, POWER);
     }
     if let Evidence::Test { difference, .. } = &evidence {
         let reference = reference.unwrap_or(verdict.expected.abs());
@@ -243,18 +254,20 @@ fn state(
             let levels = (looks.at_once(), own_level);
             shown.outcome(verdict.adjusted_p, levels, detect, claim.expect == Expect::Fails)
         }
-        (Evidence::Identity { holds: true } | Evidence::Bits(None), _) => Outcome::Pass,
-        (Evidence::Identity { holds: false } | Evidence::Bits(Some(_)), _) => Outcome::Fail,
+        (Evidence::Identity { holds: true } | Evidence::Exact { holds: true, .. }, _) => Outcome::Pass,
+        (Evidence::Identity { holds: false } | Evidence::Exact { holds: false, .. }, _) => Outcome::Fail,
         (_, Some(SecondLook::Missing)) => Outcome::Fail,
         (_, Some(SecondLook::Invalid(reason))) => Outcome::Invalid(format!("second look: {reason}")),
         (_, Some(SecondLook::Taken(p))) if *p < SECOND_LOOK => Outcome::Fail,
         // Not `adjusted_p < level`: a NaN must not pass.
-        (Evidence::Test { .. } | Evidence::Sum { .. }, _) => match verdict.adjusted_p {
-            p if p.is_nan() => Outcome::Invalid("the test has no p-value".into()),
-            p if p < looks.at_once() => Outcome::Fail,
-            _ if detect.is_some_and(|d| verdict.detectable > d) => Outcome::Underpowered,
-            _ => Outcome::Pass,
-        },
+        (Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }, _) => {
+            match verdict.adjusted_p {
+                p if p.is_nan() => Outcome::Invalid("the test has no p-value".into()),
+                p if p < looks.at_once() => Outcome::Fail,
+                _ if detect.is_some_and(|d| verdict.detectable > d) => Outcome::Underpowered,
+                _ => Outcome::Pass,
+            }
+        }
     };
     verdict.note = match &evidence {
         Evidence::Efficiency(shown) => shown.note(&found, own_level),
@@ -287,8 +300,8 @@ fn note(found: &Outcome, evidence: &Evidence, detect: Option<f64>, verdict: &Ver
         (Outcome::Fail, Evidence::Identity { .. }) => {
             format!("no sampling error, and a relative deviation of {:.1e}", verdict.statistic)
         }
-        (Outcome::Fail, Evidence::Bits(Some(why))) => why.clone(),
-        (Outcome::Pass, Evidence::Bits(_)) => "the same bits".into(),
+        (Outcome::Pass | Outcome::Fail, Evidence::Exact { said, .. }) => said.clone(),
+        (Outcome::Fail, Evidence::Fit { said, .. }) => said.clone(),
         (Outcome::Fail, Evidence::Sum { .. }) => "the table as a whole deviates".into(),
         (Outcome::Fail, _) => {
             let difference = verdict.value - verdict.expected;
@@ -330,11 +343,11 @@ fn expected_outcome(claim: &Claim, found: Outcome, note: &mut String) -> Outcome
 impl Evidence {
     fn p_value(&self) -> Option<f64> {
         match self {
-            Evidence::Test { test, .. } | Evidence::Sum { test } => {
+            Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. } => {
                 Some(test.p_value).filter(|p| !p.is_nan())
             }
             Evidence::Efficiency(shown) => Some(shown.test.p_value).filter(|p| !p.is_nan()),
-            Evidence::None(_) | Evidence::Identity { .. } | Evidence::Bits(_) => None,
+            Evidence::None(_) | Evidence::Identity { .. } | Evidence::Exact { .. } => None,
         }
     }
 }

@@ -24,7 +24,9 @@ pub fn to_junit(verdicts: &[Verdict]) -> String {
 }
 
 fn case(v: &Verdict) -> String {
-    let parts = [&v.cell, &v.band, &v.observable, &v.class, &v.estimators];
+    // Of a sampler, the test says what is tested.
+    let what = if v.observable.is_empty() { &v.test } else { &v.observable };
+    let parts = [&v.cell, &v.band, what, &v.class, &v.estimators];
     let name: Vec<&str> =
         parts.iter().map(|part| part.as_str()).filter(|part| !part.is_empty()).collect();
     let head = format!(

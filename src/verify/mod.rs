@@ -30,5 +30,7 @@ mod reproduction;
 
 /// Tests under one family-wise level.
 mod family;
+/// What a sampler's record shows.
+mod sampler;
 /// What one comparison shows by itself.
 mod trial;

@@ -43,8 +43,7 @@ pub(super) fn trials(stored: &Stored) -> Vec<Trial> {
             let found = stored.numbers();
             let differs =
                 format!("the record's numbers have the checksum {found}, the claim wants {numbers}");
-            let evidence =
-                if found == numbers { Evidence::Bits(None) } else { Evidence::Bits(Some(differs)) };
+            let evidence = bits((found != numbers).then_some(differs));
             trials.push(trial(verdict, evidence));
         }
     }
@@ -55,7 +54,12 @@ fn missing() -> Evidence {
     Evidence::None("nothing was played again: the claim came after the run".into())
 }
 
+/// The same bits, or why not.
+fn bits(differs: Option<String>) -> Evidence {
+    Evidence::Exact { holds: differs.is_none(), said: differs.unwrap_or("the same bits".into()) }
+}
+
 fn compared(replay: &Replay) -> Evidence {
     let differs = || format!("the first {} passes came out with other bits", replay.passes);
-    Evidence::Bits((replay.recorded != replay.replayed).then(differs))
+    bits((replay.recorded != replay.replayed).then(differs))
 }

@@ -5,6 +5,7 @@ use super::levels::SHARED_ERROR;
 use super::verdict::{Outcome, Verdict};
 use crate::results::record::{Against, Bias, Comparison, EstimatorRun, Observable, Quantity, Record};
 use crate::results::store::Stored;
+use crate::stats::goodness::{Goodness, Proportion};
 use crate::stats::hypothesis::{Estimate, Spread, Test};
 use crate::stats::moments::Moments;
 use crate::stats::tree::total;
@@ -26,7 +27,7 @@ pub(super) const SHARE_LIMIT: f64 = 0.5;
 pub(super) const ROUNDING: f64 = 1e-12;
 
 /// Kinds of claims.
-const KINDS: [&str; 6] = ["equals", "agree", "differs", "reproduces", "faster", "not_slower"];
+const KINDS: [&str; 7] = ["equals", "agree", "differs", "reproduces", "sampler", "faster", "not_slower"];
 
 /// Kinds of claims that rest on the agreement of two means.
 const AGREEING: [&str; 3] = ["agree", "faster", "not_slower"];
@@ -91,8 +92,33 @@ pub(super) enum Evidence {
     Efficiency(Box<Shown>),
     /// A test of many comparisons at once.
     Sum { test: Test },
-    /// Bits that had to be the same, and why they are not.
-    Bits(Option<String>),
+    /// Counts against probabilities.
+    Fit { fit: Fit, test: Test, said: String },
+    /// A statement without chance: it holds, or it does not.
+    Exact { holds: bool, said: String },
+}
+
+/// Counts against probabilities: what knows the smallest defect that it would have found.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Fit {
+    /// Of many cells.
+    Cells(Goodness),
+    /// Of one outcome.
+    Share(Proportion),
+}
+
+impl Fit {
+    /// The smallest relative error of the density, or of the probability, that is rejected at `level`
+    /// with probability `power`.
+    pub fn detectable(&self, level: f64, power: f64) -> f64 {
+        match self {
+            Fit::Cells(found) => found.detectable(level, power).relative,
+            Fit::Share(found) => {
+                let (below, above) = found.detectable(level, power);
+                (found.mass - below).max(above - found.mass) / found.mass
+            }
+        }
+    }
 }
 
 /// What a trial is about, the same in the record of a second look.
@@ -102,6 +128,8 @@ pub(super) enum Item {
     Comparison(usize),
     /// Many of them.
     Table,
+    /// A sampler.
+    Sampler,
 }
 
 /// One comparison and what it shows.

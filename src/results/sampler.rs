@@ -1,0 +1,139 @@
+//! What a record holds of samplers: counts, and the masses that their densities give the same cells.
+
+use serde::{Deserialize, Serialize};
+
+use super::npy::Array;
+use super::record::Record;
+use super::store::{Arrays, Stored};
+
+/// One sampler's draws, held beside its density.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SamplerRun {
+    /// The name the experiment gives it.
+    pub sampler: String,
+    /// Its kind.
+    pub kind: String,
+    /// Number of draws.
+    pub samples: u64,
+    /// Path of the coarse cells, `[3][cells]` f64: draws counted, mass, bound of the mass's error.
+    pub coarse: String,
+    /// The same for the fine cells, where there are more of them.
+    pub fine: Option<String>,
+    /// The same for pairs of consecutive draws by groups of coarse cells, `[3][groups][groups]`; a pair
+    /// with a draw that is in no cell is not counted. None where there are not draws enough.
+    pub serial: Option<String>,
+    /// Discrete outcomes.
+    pub deltas: Vec<Delta>,
+    /// Draws that returned nothing.
+    pub nulls: u64,
+    /// How often that should be.
+    pub null: NullMass,
+    /// Draws where the density is 0 or not finite, or outside the chart: none can be right.
+    pub outside: u64,
+    /// Draws whose own density differs from the density function's there by more than [`OWN_DENSITY`].
+    pub own_density_differs: u64,
+    /// The largest such relative difference; at most 1e300.
+    pub own_density_largest: f64,
+    /// Integral of the density over all pieces, plus the discrete masses and a stated null.
+    pub total: f64,
+    /// Bound of its quadrature error.
+    pub total_bound: f64,
+    /// Evaluations of the density that the masses took.
+    pub evaluations: u64,
+    /// Evaluations of the density that were negative or not finite; they count as 0.
+    pub senseless: u64,
+    /// Values of contrasts of draws that were not finite; they are not in the moments.
+    pub senseless_contrasts: u64,
+    /// Whether the budget of evaluations ended before the masses were as exact as was wanted.
+    pub exhausted: bool,
+    /// Directed contrasts.
+    pub contrasts: Vec<ContrastRun>,
+}
+
+/// Relative difference between a draw's own density and the density function's that counts.
+pub const OWN_DENSITY: f64 = 1e-9;
+
+/// A discrete outcome.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Delta {
+    /// Its name.
+    pub name: String,
+    /// Its probability.
+    pub mass: f64,
+    /// Draws of it.
+    pub observed: u64,
+    /// Those whose value was not what it has to be.
+    pub inexact: u64,
+}
+
+/// How often a sampler returns nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NullMass {
+    /// Never.
+    Never,
+    /// With this probability.
+    Stated(f64),
+    /// With what the densities leave of 1.
+    Remainder,
+}
+
+/// The mean of a bounded function over all draws.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContrastRun {
+    /// Its name.
+    pub name: String,
+    /// Count, mean, and the sums of second, third and fourth powers of deviations from the mean.
+    pub moments: [f64; 5],
+    /// Its mean by definition or by quadrature.
+    pub expected: f64,
+    /// Bound of the quadrature's error; 0 where it is known by definition.
+    pub bound: f64,
+}
+
+/// Cells of a run: one row each of what was counted, masses, bounds.
+#[derive(Clone, Copy, Debug)]
+pub struct Cells<'a> {
+    /// Draws, or pairs.
+    pub observed: &'a [f64],
+    /// Masses, which sum to 1 where the density is one.
+    pub mass: &'a [f64],
+    /// Bounds of the errors of the masses.
+    pub bound: &'a [f64],
+}
+
+impl Stored {
+    /// The cells that stand at `path`.
+    pub fn cells(&self, path: &str) -> Option<Cells<'_>> {
+        let array = self.arrays.get(path)?;
+        let n = array.data.len() / 3;
+        let row = |i: usize| &array.data[i * n..(i + 1) * n];
+        (array.shape.first() == Some(&3)).then(|| Cells {
+            observed: row(0),
+            mass: row(1),
+            bound: row(2),
+        })
+    }
+}
+
+/// Where the cells of sampler number `index` stand, relative to the record's folder.
+pub fn cells_path(index: usize, which: &str) -> String {
+    format!("samplers/{index:03}.{which}.npy")
+}
+
+/// What does not fit together in the record of a sampler, as a sentence.
+pub(super) fn defect(record: &Record, arrays: &Arrays) -> Option<String> {
+    record.samplers.iter().find_map(|run| {
+        let paths = [Some(&run.coarse), run.fine.as_ref(), run.serial.as_ref()];
+        let wrong = |array: Option<&Array>| match array.map(|a| &a.shape[..]) {
+            Some([3, n]) => *n == 0,
+            Some([3, a, b]) => a != b || *a == 0,
+            _ => true,
+        };
+        let bad = paths.into_iter().flatten().find(|path| wrong(arrays.get(*path)))?;
+        Some(format!("cells of {} have no usable array at {bad}", run.sampler))
+    })
+}

@@ -1,0 +1,481 @@
+//! The catalogue of planted defects: where each stands, and which tests are expected to see it.
+
+use std::sync::OnceLock;
+
+/// What may be wrong. Every place that can hold a defect asks for its own by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Defect {
+    /// Nothing: the sham, which must be green.
+    None,
+    CosineMissing,
+    EtaSquaredMissingInEval,
+    EtaSquaredMissingOnEntry,
+    EtaSquaredMissingBothWays,
+    EtaInvertedInHalfVector,
+    FresnelSideSwapped,
+    ReflectionJacobian,
+    SampleCountMissing,
+    LightChoiceMissing,
+    LightForgotten,
+    MisOmitsInterface,
+    MisSampleCountWrong,
+    FlightDensity,
+    RouletteUncompensated,
+    ContributionClamped,
+    PhaseFlipped,
+    PhaseNormalisation,
+    FailuresRedrawn,
+    TotalReflectionDropped,
+    DepthCutOff,
+    ShadingNormal,
+    ShadowIgnored,
+    AbsoluteEpsilon,
+    SinglePrecision,
+    PathDropped,
+    PathTwice,
+    PassesShareStream,
+    PurposesShareStream,
+    OtherBand,
+    BandMissing,
+    SineMissing,
+    EnvironmentScaled,
+    NotANumber,
+    ClassesSwapped,
+    ScoresScaled,
+    // Samplers.
+    DensityTilted,
+    DensityDoubled,
+    SamplerFlipped,
+    DrawFlipped,
+    Untruncated,
+    ShareMissing,
+    BoundSign,
+    Unnormalised,
+    ComponentDensity,
+    LobeNumberReused,
+    MassOff,
+    DeltaLeaks,
+    NullsRedrawn,
+    SamplerSineMissing,
+    NeighboursAlike,
+    // The verifier.
+    VarianceByDifference,
+    DeviationForError,
+    OneSided,
+    PixelsForPasses,
+}
+
+/// Where a defect stands, and so what is played to find it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// In the path tracer.
+    Tracer,
+    /// In a sampler.
+    Sampler,
+    /// In the verifier's arithmetic.
+    Verifier,
+    /// Nowhere.
+    Sham,
+}
+
+/// One row of the catalogue.
+#[derive(Clone, Copy, Debug)]
+pub struct Planted {
+    /// Its name on the command line and in tables.
+    pub name: &'static str,
+    /// The defect.
+    pub defect: Defect,
+    /// Where it stands.
+    pub family: Family,
+    /// What is wrong, in one line.
+    pub what: &'static str,
+    /// The tests, `experiment.claim`, `samplers.TEST` or `identity NAME`, of which each is expected to see it.
+    pub expected: &'static [&'static str],
+}
+
+const fn row(
+    name: &'static str,
+    defect: Defect,
+    what: &'static str,
+    expected: &'static [&'static str],
+) -> Planted {
+    Planted { name, defect, family: Family::Tracer, what, expected }
+}
+
+const fn of(family: Family, row: Planted) -> Planted {
+    Planted { family, ..row }
+}
+
+/// Every defect of the path tracer.
+pub const TRACER: &[Planted] = &[
+    row(
+        "cosine-missing",
+        Defect::CosineMissing,
+        "light samples at a rough surface lack the cosine",
+        &["rough.sun", "identity sample-weight"],
+    ),
+    row(
+        "eta2-missing-in-eval",
+        Defect::EtaSquaredMissingInEval,
+        "the value of rough refraction lacks radiance's eta^2, its sampling has it",
+        &["rough.sun", "identity reciprocity", "identity sample-weight"],
+    ),
+    row(
+        "eta2-missing-on-entry",
+        Defect::EtaSquaredMissingOnEntry,
+        "refraction into the body lacks radiance's eta^2, refraction out of it has it",
+        &["furnace.smooth", "slab.UR1", "slab.UT1", "rough.sun", "identity reciprocity"],
+    ),
+    row(
+        "eta2-missing-both-ways",
+        Defect::EtaSquaredMissingBothWays,
+        "radiance's eta^2 is missing at every refraction: it cancels for a sensor and a light outside",
+        &["identity reciprocity"],
+    ),
+    row(
+        "eta-inverted",
+        Defect::EtaInvertedInHalfVector,
+        "the half vector of rough refraction is made with 1/eta",
+        &["rough.sun", "identity sample-density"],
+    ),
+    row(
+        "fresnel-side-swapped",
+        Defect::FresnelSideSwapped,
+        "reflectance is computed with the index of the other side",
+        &["slab.UR1", "slab.UT1", "rough.sun", "identity fresnel"],
+    ),
+    row(
+        "reflection-jacobian",
+        Defect::ReflectionJacobian,
+        "the density of rough refraction has reflection's Jacobian 1 / (4 w.h)",
+        &["rough.sun", "identity sample-density"],
+    ),
+    row(
+        "sample-count-missing",
+        Defect::SampleCountMissing,
+        "two light samples a vertex are added up, not averaged",
+        &["rough.sun", "matched.sun"],
+    ),
+    row(
+        "light-choice-missing",
+        Defect::LightChoiceMissing,
+        "light samples are not divided by the probability of the light",
+        &["rough.sun", "rough.lamp", "matched.sun"],
+    ),
+    row(
+        "light-forgotten",
+        Defect::LightForgotten,
+        "the last light is never chosen",
+        &["rough.lamp", "matched.sky"],
+    ),
+    row(
+        "mis-omits-interface",
+        Defect::MisOmitsInterface,
+        "the MIS denominator of light samples lacks the interface's (the phase function's) density",
+        &["rough.lamp", "matched.sky", "furnace.matched"],
+    ),
+    row(
+        "mis-sample-count",
+        Defect::MisSampleCountWrong,
+        "MIS weighs interface samples as if one light sample were drawn, not two",
+        &["rough.lamp", "matched.sky", "furnace.matched"],
+    ),
+    row(
+        "flight-density",
+        Defect::FlightDensity,
+        "a flight to the boundary has the density sigma_t T in MIS, not the probability T",
+        &["furnace.matched"],
+    ),
+    row(
+        "roulette-uncompensated",
+        Defect::RouletteUncompensated,
+        "survivors of roulette are not divided by their probability",
+        &["slab.UR1", "rough.multiple"],
+    ),
+    row(
+        "contribution-clamped",
+        Defect::ContributionClamped,
+        "no contribution is above a third of the light's strength",
+        &["rough.sun"],
+    ),
+    row(
+        "phase-flipped",
+        Defect::PhaseFlipped,
+        "the phase function scatters about -g",
+        &["slab.UR1", "matched.single"],
+    ),
+    row(
+        "phase-normalisation",
+        Defect::PhaseNormalisation,
+        "the phase function's density has 1/(2 pi) for 1/(4 pi)",
+        &["matched.sun", "furnace.matched"],
+    ),
+    row(
+        "failures-redrawn",
+        Defect::FailuresRedrawn,
+        "microfacet samples that fail are drawn again",
+        &["sky.sphere"],
+    ),
+    row(
+        "tir-dropped",
+        Defect::TotalReflectionDropped,
+        "totally reflected paths end",
+        &["furnace.smooth", "slab.UR1"],
+    ),
+    row("depth-cut-off", Defect::DepthCutOff, "paths end after 32 scattering events", &["slab.UT1"]),
+    row(
+        "shading-normal",
+        Defect::ShadingNormal,
+        "the side of a direction is asked of the shading normal alone",
+        &["sky.bumpy"],
+    ),
+    row(
+        "shadow-ignored",
+        Defect::ShadowIgnored,
+        "light samples are not tested for occlusion by the body",
+        &["sky.cavity"],
+    ),
+    row(
+        "absolute-epsilon",
+        Defect::AbsoluteEpsilon,
+        "rays start 1e-4 mm off their surface",
+        &["scale.same"],
+    ),
+    row("single-precision", Defect::SinglePrecision, "scores add up in f32", &["furnace.smooth"]),
+    row("path-dropped", Defect::PathDropped, "one path a pass is not scored", &["furnace.smooth"]),
+    row("path-twice", Defect::PathTwice, "one path a pass is scored twice", &["furnace.smooth"]),
+    row(
+        "passes-share-stream",
+        Defect::PassesShareStream,
+        "every pass has the random numbers of the first",
+        &["rough.sun", "slab.UR1"],
+    ),
+    row(
+        "purposes-share-stream",
+        Defect::PurposesShareStream,
+        "light samples have the random numbers of the walk: a short flight chooses the sun",
+        &["matched.single"],
+    ),
+    row("other-band", Defect::OtherBand, "every band has the albedo of the first", &["rough.multiple"]),
+    row("band-missing", Defect::BandMissing, "the last of several bands is not played", &["rough.sun"]),
+    row(
+        "sine-missing",
+        Defect::SineMissing,
+        "the density of a latitude-longitude map lacks its sine",
+        &["map.sky"],
+    ),
+    row(
+        "environment-scaled",
+        Defect::EnvironmentScaled,
+        "light that a path meets by itself counts 0.1 % too much",
+        &["furnace.smooth"],
+    ),
+    row(
+        "not-a-number",
+        Defect::NotANumber,
+        "one path in a thousand scores NaN",
+        &["rough.sun", "slab.UR1"],
+    ),
+    row(
+        "scores-scaled",
+        Defect::ScoresScaled,
+        "every score is 5 % too high: as much as furnace.matched claims to detect",
+        &["furnace.matched", "furnace.smooth"],
+    ),
+    row(
+        "classes-swapped",
+        Defect::ClassesSwapped,
+        "single and multiple scattering change names",
+        &["rough.single", "rough.multiple", "matched.single"],
+    ),
+];
+
+/// Every defect of a sampler.
+pub const SAMPLERS: &[Planted] = &[
+    sampler(
+        "density-tilted",
+        Defect::DensityTilted,
+        "a density is off by what the claim says it detects",
+        &["samplers.chi2 coarse"],
+    ),
+    sampler(
+        "density-doubled",
+        Defect::DensityDoubled,
+        "1/(2 pi) for 1/(4 pi) in a phase function",
+        &["samplers.identity D7"],
+    ),
+    sampler(
+        "sampler-flipped",
+        Defect::SamplerFlipped,
+        "draws and density are those of -g",
+        &["samplers.contrast mean cosine"],
+    ),
+    sampler(
+        "draw-flipped",
+        Defect::DrawFlipped,
+        "draws are those of -g",
+        &["samplers.chi2 coarse", "samplers.contrast mean cosine"],
+    ),
+    sampler(
+        "untruncated",
+        Defect::Untruncated,
+        "draws go beyond the end that the density has",
+        &["samplers.outside"],
+    ),
+    sampler(
+        "share-missing",
+        Defect::ShareMissing,
+        "a truncated density is not divided by its share",
+        &["samplers.identity D7"],
+    ),
+    sampler(
+        "bound-sign",
+        Defect::BoundSign,
+        "the sign of an equiangular bound is wrong",
+        &["samplers.chi2 coarse", "samplers.identity D7"],
+    ),
+    sampler(
+        "unnormalised",
+        Defect::Unnormalised,
+        "equiangular draws along a direction 1.1 long",
+        &["samplers.chi2 coarse"],
+    ),
+    sampler(
+        "component-density",
+        Defect::ComponentDensity,
+        "a lobe's density is told for the mixture's",
+        &["samplers.identity D5"],
+    ),
+    sampler(
+        "lobe-number-reused",
+        Defect::LobeNumberReused,
+        "the number that chose a lobe is not rescaled",
+        &["samplers.chi2 coarse"],
+    ),
+    sampler(
+        "mass-off",
+        Defect::MassOff,
+        "a delta lobe is drawn 10 % too often",
+        &["samplers.delta delta"],
+    ),
+    sampler(
+        "delta-leaks",
+        Defect::DeltaLeaks,
+        "a delta lobe's mass leaks into the density",
+        &["samplers.identity D7"],
+    ),
+    sampler("nulls-redrawn", Defect::NullsRedrawn, "failed draws are drawn again", &["samplers.null"]),
+    sampler(
+        "sampler-sine-missing",
+        Defect::SamplerSineMissing,
+        "theta is uniform, the density is not",
+        &["samplers.chi2 coarse", "samplers.contrast cos^2"],
+    ),
+    sampler(
+        "neighbours-alike",
+        Defect::NeighboursAlike,
+        "every other draw nearly repeats the last",
+        &["samplers.serial"],
+    ),
+];
+
+const fn sampler(
+    name: &'static str,
+    defect: Defect,
+    what: &'static str,
+    expected: &'static [&'static str],
+) -> Planted {
+    of(Family::Sampler, row(name, defect, what, expected))
+}
+
+/// Every defect of the verifier's arithmetic.
+pub const VERIFIER: &[Planted] = &[
+    verifier(
+        "variance-by-difference",
+        Defect::VarianceByDifference,
+        "variance as E[x^2] - E[x]^2 in f32",
+        &["calibration fixed-data"],
+    ),
+    verifier(
+        "deviation-for-error",
+        Defect::DeviationForError,
+        "the standard deviation is taken for the standard error",
+        &["calibration false-alarms"],
+    ),
+    verifier("one-sided", Defect::OneSided, "a one-sided p-value", &["calibration false-alarms"]),
+    verifier(
+        "pixels-for-passes",
+        Defect::PixelsForPasses,
+        "pixels of a pass are counted as independent",
+        &["calibration false-alarms"],
+    ),
+];
+
+const fn verifier(
+    name: &'static str,
+    defect: Defect,
+    what: &'static str,
+    expected: &'static [&'static str],
+) -> Planted {
+    of(Family::Verifier, row(name, defect, what, expected))
+}
+
+/// Defects that stand where this program cannot plant them, and the test of the library that holds the code
+/// to the opposite.
+pub const UNIT_TESTED: &[(&str, &str)] = &[
+    (
+        "a block is dropped or counted twice in the merge",
+        "stats::tree::tests::a_missing_block_is_noticed",
+    ),
+    (
+        "a record holds fewer passes than it says",
+        "verify::judge::tests::what_a_test_cannot_rest_on_is_invalid",
+    ),
+    (
+        "the order of blocks enters a sum",
+        "tests/reproducibility.rs::threads_blocks_and_folders_change_no_byte",
+    ),
+    (
+        "streams of neighbouring ids are correlated",
+        "sampling::stream::tests::neighbouring_streams_are_independent",
+    ),
+    (
+        "two passes or pixels share a stream",
+        "sampling::stream::tests::no_two_streams_of_a_run_start_alike",
+    ),
+    (
+        "a false alarm is more frequent than its level",
+        "stats::hypothesis::tests::false_alarms_have_their_level",
+    ),
+];
+
+/// No defect: everything has to be green.
+pub const SHAM: Planted = of(Family::Sham, row("sham", Defect::None, "nothing is wrong", &[]));
+
+/// The sham, then every defect.
+pub fn all() -> Vec<Planted> {
+    let planted = [TRACER, SAMPLERS, VERIFIER].into_iter().flatten();
+    std::iter::once(SHAM).chain(planted.copied()).collect()
+}
+
+/// All names.
+pub fn names() -> Vec<&'static str> {
+    all().iter().map(|row| row.name).collect()
+}
+
+/// The row of a name.
+pub fn named(name: &str) -> Option<Planted> {
+    all().into_iter().find(|row| row.name == name)
+}
+
+static PLANTED: OnceLock<Defect> = OnceLock::new();
+
+/// Plants a defect in this process, once and for all.
+pub fn plant(defect: Defect) {
+    assert!(PLANTED.set(defect).is_ok(), "one defect a process");
+}
+
+/// The defect of this process.
+pub fn planted() -> Defect {
+    *PLANTED.get().unwrap_or(&Defect::None)
+}

@@ -1,0 +1,154 @@
+//! Plays of defects: child processes, as many at once as there are cores, and what their verdicts were.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+use std::time::Instant;
+
+use scatterproof::results::exr_file::write_exr;
+use scatterproof::results::image::Picture;
+use scatterproof::results::npy::Array;
+use scatterproof::results::record::Band;
+
+use super::defects::{Family, Planted};
+
+/// What `verify` said of one defect with one seed.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Exit code; -1 where a signal ended it.
+    pub exit: i32,
+    /// Tests, and what each saw: the worst of its verdicts.
+    pub tests: BTreeMap<String, Seen>,
+    /// What it wrote, for people.
+    pub said: String,
+    /// Wall time, seconds.
+    pub seconds: f64,
+}
+
+/// What a test saw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Seen {
+    /// Nothing.
+    Green,
+    /// Nothing, and too little for what its claim wants: no evidence of a defect either.
+    Underpowered,
+    /// A failure, or that the record is worth nothing.
+    Defect,
+}
+
+impl Outcome {
+    /// The tests that saw a defect.
+    pub fn caught(&self) -> BTreeSet<&str> {
+        let caught = self.tests.iter().filter(|(_, seen)| **seen == Seen::Defect);
+        caught.map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// `verify` came to a verdict, whatever it is.
+    pub fn is_verdict(&self) -> bool {
+        matches!(self.exit, 0 | 1 | 3) && !self.tests.is_empty()
+    }
+
+    /// Every test is green.
+    pub fn is_green(&self) -> bool {
+        !self.tests.is_empty() && self.tests.values().all(|seen| *seen == Seen::Green)
+    }
+}
+
+/// The experiments of this folder, and the family of defects that each is to find.
+const EXPERIMENTS: [(Family, &str, &str); 8] = [
+    (Family::Tracer, "furnace.toml", include_str!("furnace.toml")),
+    (Family::Tracer, "map.toml", include_str!("map.toml")),
+    (Family::Tracer, "matched.toml", include_str!("matched.toml")),
+    (Family::Tracer, "rough.toml", include_str!("rough.toml")),
+    (Family::Tracer, "scale.toml", include_str!("scale.toml")),
+    (Family::Tracer, "sky.toml", include_str!("sky.toml")),
+    (Family::Tracer, "slab.toml", include_str!("slab.toml")),
+    (Family::Sampler, "samplers.toml", include_str!("samplers.toml")),
+];
+
+/// A sky of 8 x 4 texels, dim but for one next to the zenith.
+fn write_sky(path: &Path) {
+    let bands = [Band { name: "R".into(), range_nm: None, display_rgb: [1.0; 3] }];
+    let mut texels = vec![0.1; 64];
+    texels[1] = 3.0;
+    write_exr(path, &Picture::new(&bands, &Array::new(vec![2, 4, 8, 1], texels)), &[]).expect("a sky");
+}
+
+/// Plays every (defect, number of the seed), and tells of each as it ends.
+pub fn all(plays: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcome)) {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (_, name, text) in EXPERIMENTS {
+        fs::write(folder.path().join(name), text).expect("an experiment");
+    }
+    write_sky(&folder.path().join("sky.exr"));
+    let next = AtomicUsize::new(0);
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    let (send, receive) = mpsc::channel();
+    let send = Mutex::new(send);
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            let send = send.lock().expect("a sender").clone();
+            let (next, folder) = (&next, folder.path());
+            scope.spawn(move || {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some((row, seed)) = plays.get(index) else { return };
+                    let outcome = play(row, *seed, folder, index);
+                    send.send((index, outcome)).expect("somebody listens");
+                }
+            });
+        }
+        drop(send);
+        for (index, outcome) in receive {
+            let (row, seed) = &plays[index];
+            tell(row, *seed, &outcome);
+        }
+    });
+}
+
+/// One play: in a child process `verify` on the experiments of the defect's family, and its identities.
+fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
+    let out = folder.join(format!("play-{index}"));
+    let verdicts = out.with_extension("csv");
+    let mut command = Command::new(std::env::current_exe().expect("this program"));
+    command.args(["defect", row.name]);
+    if row.family != Family::Verifier {
+        command.args(["verify", "--quiet", "--threads", "1", "--out"]).arg(&out);
+        command.arg("--csv").arg(&verdicts).arg("--fresh-seed").arg(format!("{}/{number}", row.name));
+        let mine = |family| row.family == Family::Sham || row.family == family;
+        let files = EXPERIMENTS.iter().filter(|(family, ..)| mine(*family));
+        command.args(files.map(|(_, name, _)| folder.join(name)));
+    }
+    let begun = Instant::now();
+    let output = command.stdin(Stdio::null()).output().expect("this program starts");
+    let seconds = begun.elapsed().as_secs_f64();
+    let mut tests = seen_in(&fs::read_to_string(&verdicts).unwrap_or_default());
+    let seen = |broken| if broken { Seen::Defect } else { Seen::Green };
+    tests.extend(super::identities(row).into_iter().map(|(name, broken)| (name, seen(broken))));
+    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    let _ = fs::remove_dir_all(&out); // thousands of records would fill the disc
+    Outcome { exit: output.status.code().unwrap_or(-1), tests, said: said.into_owned(), seconds }
+}
+
+/// Test -> the worst of its verdicts, from the table that `verify --csv` writes. A test is named
+/// `experiment.claim`; one claim on samplers is many tests, which are named `samplers.test`.
+fn seen_in(table: &str) -> BTreeMap<String, Seen> {
+    let mut reader = csv::Reader::from_reader(table.as_bytes());
+    let mut tests = BTreeMap::new();
+    for row in reader.deserialize::<BTreeMap<String, String>>() {
+        let row = row.expect("a row of verdicts");
+        let seen = match row["outcome"].as_str() {
+            "pass" => Seen::Green,
+            "underpowered" => Seen::Underpowered,
+            _ => Seen::Defect,
+        };
+        let of = if row["experiment"] == "samplers" { "test" } else { "claim" };
+        let worst = tests.entry(format!("{}.{}", row["experiment"], row[of])).or_insert(seen);
+        *worst = seen.max(*worst);
+    }
+    tests
+}
