@@ -4,6 +4,7 @@ mod calibration;
 mod cli;
 mod damage;
 mod docs;
+mod efficiency;
 mod interruption;
 mod judging;
 mod layering;

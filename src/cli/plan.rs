@@ -61,7 +61,7 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
             };
         table.push(vec![
             experiment.cells[job.cell].label.clone(),
-            experiment.file.estimator[job.estimator_index].name.clone(),
+            job.name.clone(),
             job.layout.observables().len().to_string(),
             passes,
             time,

@@ -124,7 +124,7 @@ impl Loader<'_> {
         }
         let names = estimators.map(Node::items).unwrap_or_default();
         let names = names.iter().filter_map(|entry| entry.get("name")?.as_str()).collect();
-        let known = Known { estimators: names, axes };
+        let known = Known { estimators: names, axes, budget: at.typed("budget") };
         let claims = at.to("claim");
         for (i, entry) in self.root.get("claim").map(Node::items).unwrap_or_default().iter().enumerate()
         {

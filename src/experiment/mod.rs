@@ -13,6 +13,9 @@ pub mod build;
 /// A TOML text as a tree with places.
 pub mod document;
 
+/// Claims of efficiency.
+mod duel;
+
 /// The estimators that come with the program.
 pub mod estimators;
 

@@ -8,6 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+pub use super::duel::{CONTROL, CostMeasure, Duel, Faster, NotSlower};
+
 /// One experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -621,7 +623,7 @@ pub struct SmallValues {
 /// One claim: exactly one kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{ "required": ["equals"] }, { "required": ["agree"] }, { "required": ["differs"] }, { "required": ["reproduces"] }]))]
+#[schemars(extend("oneOf" = [{ "required": ["equals"] }, { "required": ["agree"] }, { "required": ["differs"] }, { "required": ["reproduces"] }, { "required": ["faster"] }, { "required": ["not_slower"] }]))]
 pub struct ClaimEntry {
     /// Label in verdict tables.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -641,6 +643,12 @@ pub struct ClaimEntry {
     /// The record comes out again, bit for bit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reproduces: Option<Reproduces>,
+    /// An estimator is more efficient than another.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub faster: Option<Faster>,
+    /// An estimator is not much less efficient than another.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_slower: Option<NotSlower>,
 }
 
 /// Outcomes that controls expect.
@@ -649,6 +657,8 @@ pub struct ClaimEntry {
 pub enum Expect {
     /// The test must find a difference.
     Differs,
+    /// The claim must be found not to hold.
+    Fails,
     /// The test must be refused as statistically invalid.
     Invalid,
 }

@@ -11,6 +11,7 @@ use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::timing::Timing;
 use crate::results::{atomic, json::canonical};
+use crate::verify::comparisons;
 use crate::verify::judge::{Case, Looks, judge};
 use crate::verify::verdict::{self, Verdict};
 
@@ -41,6 +42,8 @@ pub struct Material {
     pub verdicts: Vec<Verdict>,
     /// Everything that was measured.
     pub rows: Vec<Measurement>,
+    /// Efficiencies of pairs of estimators.
+    pub comparisons: Vec<comparisons::Row>,
     /// The pictures, in the order of cells and estimators.
     pub figures: Vec<Figure>,
 }
@@ -59,7 +62,7 @@ pub struct Figure {
     pub caption: String,
 }
 
-/// Makes every derived view of a results folder: `measurements.csv`, `verdicts.csv`, `summary.json`,
+/// Makes every derived view of a results folder: `measurements.csv`, `comparisons.csv`, `verdicts.csv`, `summary.json`,
 /// `images/`, `report.md` and `report.html`. The record is judged by itself, with the second look that a
 /// verification may have left beside it.
 pub fn write(folder: &RecordFolder) -> Result<Material> {
@@ -75,10 +78,13 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     let (timing, provenance) = (folder.read_timing()?, folder.read_provenance()?);
     let rows = measurements(&stored, timing.as_ref());
     let figures = write_figures(folder, &stored)?;
-    let material = Material { stored, timing, provenance, verdicts, rows, figures };
+    let stored = Stored { timing: timing.clone(), ..stored };
+    let comparisons = comparisons::comparisons(&stored);
+    let material = Material { stored, timing, provenance, verdicts, rows, comparisons, figures };
     let page = page::page(&material);
     let views = [
         ("measurements.csv", measurements::to_csv(&material.rows)),
+        ("comparisons.csv", comparisons::to_csv(&material.comparisons)),
         ("verdicts.csv", verdict::to_csv(&material.verdicts)),
         ("summary.json", canonical(&summary(&material))),
         ("report.md", page.to_markdown()),

@@ -4,16 +4,18 @@
 use super::Material;
 use super::document::{Block, Document, FigureBlock};
 use super::number::significant;
-use super::table::{Table, claim_table, measurement_table, verdict_table};
+use super::table::{Table, claim_table, comparison_table, measurement_table, verdict_table};
 use crate::results::measurements::Measurement;
 use crate::verify::levels::FAMILY_LEVEL;
 use crate::verify::verdict::Outcome;
+use crate::verify::weights::{self, DRIFT_LIMIT};
 
 /// The page of one record.
 pub(super) fn page(material: &Material) -> Document {
     let mut blocks = claims(material);
     if material.stored.record.samplers.is_empty() {
         blocks.extend(measured(material));
+        blocks.extend(efficiency(material));
         blocks.extend(cost(material));
         blocks.extend(notes(material));
     } else {
@@ -105,6 +107,27 @@ fn figure_block(figure: &super::Figure) -> FigureBlock {
         title: figure.estimator.clone(),
         caption: figure.caption.clone(),
     }
+}
+
+fn efficiency(material: &Material) -> Vec<Block> {
+    if material.comparisons.is_empty() {
+        return Vec::new();
+    }
+    let text = "Variance of a pass times its cost, of the first estimator over the other: above 1 the other is the \
+                better. In brackets the 95 % interval. By counters the cost is a weighted sum of counts, the same on \
+                every machine; by CPU time it is this machine's, and fair only where the two were timed side by side. \
+                A ratio is quoted where the two means agree; it is not resolved where more passes would still move \
+                it or a single pass may make it.";
+    let table = Block::Table(comparison_table(&material.comparisons));
+    let mut blocks = vec![heading("Efficiency"), Block::Text(text.into()), table];
+    if let Some(drift) = weights::drift(&weights::timed(&material.stored)).filter(|d| *d > DRIFT_LIMIT) {
+        blocks.push(Block::Text(format!(
+            "CPU times of these runs deviate by up to {:.0} % from what the counters' weights predict: measure the \
+             weights again, or compare by CPU time.",
+            100.0 * drift
+        )));
+    }
+    blocks
 }
 
 fn cost(material: &Material) -> Vec<Block> {

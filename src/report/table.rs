@@ -3,6 +3,8 @@
 use super::number::{per_cent, significant, with_error};
 use crate::results::csv_text;
 use crate::results::measurements::Measurement;
+use crate::results::record::CostMeasure;
+use crate::verify::comparisons::{Row, measure_name};
 use crate::verify::verdict::Verdict;
 
 /// A header and rows of text.
@@ -166,6 +168,57 @@ pub fn claim_table(verdicts: &[Verdict]) -> Table {
         table.push(row);
     }
     table
+}
+
+/// Efficiencies: a row for each pair, class and measure of cost.
+pub fn comparison_table(rows: &[Row]) -> Table {
+    let mut table = Table::new(&[
+        "cell",
+        "candidate",
+        "against",
+        "band",
+        "class",
+        "cost",
+        "efficiency",
+        "variance",
+        "kurtosis",
+        "note",
+    ]);
+    for row in rows {
+        let number = |x: f64| significant(x, 3);
+        let efficiency = match row.efficiency_ratio.is_nan() {
+            true => String::new(),
+            false => {
+                format!(
+                    "{} [{}, {}]",
+                    number(row.efficiency_ratio),
+                    number(row.ci_low),
+                    number(row.ci_high)
+                )
+            }
+        };
+        let cost = match (row.cost, row.side_by_side) {
+            (CostMeasure::Cpu, false) => "cpu, one after the other",
+            (cost, _) => measure_name(cost),
+        };
+        let kurtosis = match row.kurtosis_candidate.is_nan() {
+            true => String::new(),
+            false => format!("{}, {}", number(row.kurtosis_candidate), number(row.kurtosis_baseline)),
+        };
+        table.push(vec![
+            row.cell.clone(),
+            row.candidate.clone(),
+            row.baseline.clone(),
+            row.band.clone(),
+            row.class.clone(),
+            cost.into(),
+            efficiency,
+            number(row.variance_ratio),
+            kurtosis,
+            row.note.clone(),
+        ]);
+    }
+    table.without_empty_columns()
 }
 
 /// Measurements: a row for each estimator, observable and class, a column for each band.

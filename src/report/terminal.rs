@@ -2,8 +2,9 @@
 
 use super::Material;
 use super::number::{per_cent, significant, with_error};
-use super::table::Table;
+use super::table::{Table, comparison_table};
 use crate::results::measurements::Measurement;
+use crate::verify::comparisons::Row;
 
 /// One row per cell and estimator: the sensor's first observable in every band, passes, CPU time, speed.
 pub fn run_table(material: &Material) -> Table {
@@ -60,6 +61,12 @@ pub fn sampler_table(material: &Material) -> Table {
         ]);
     }
     if table.rows.is_empty() { Table::default() } else { table.without_empty_columns() }
+}
+
+/// Efficiencies of all classes together, where there are two estimators to compare.
+pub fn efficiency_table(material: &Material) -> Option<Table> {
+    let rows: Vec<Row> = material.comparisons.iter().filter(|row| row.class == "all").cloned().collect();
+    (!rows.is_empty()).then(|| comparison_table(&rows))
 }
 
 /// Notes of estimators and counts of anomalies, each once with the cells that it concerns.

@@ -96,6 +96,9 @@ pub struct Cell {
 pub struct EstimatorRun {
     /// The name the experiment gives it.
     pub estimator: String,
+    /// The estimator that this is a second arm of, for comparisons of CPU time: the same on streams of its
+    /// own, so that the two differ by chance and by the machine's noise alone.
+    pub control_of: Option<String>,
     /// Its kind, as `path`.
     pub kind: String,
     /// What it promises of its mean.
@@ -109,6 +112,9 @@ pub struct EstimatorRun {
     /// Path of the gate moments, `[batch][observable][band][5]` f64: count, mean, and the sums of
     /// second, third and fourth powers of deviations from the mean.
     pub gates: String,
+    /// Path of the counts of work, `[batch][counter]` f64: the batches of `gates`, the counters in the order
+    /// of `cost`'s names. Their sums over batches are `cost`.
+    pub costs: String,
     /// The image, where the sensor has pixels.
     pub image: Option<Image>,
     /// Deterministic counts of work done, summed over bands and passes.
@@ -200,4 +206,24 @@ pub enum Against {
         /// True where both were played on the same random streams, pass by pass.
         paired: bool,
     },
+    /// Another estimator of the same integral, by efficiency: the baseline's variance times cost over this
+    /// quantity's must exceed a bound.
+    Efficiency {
+        /// The same quantity of the baseline.
+        baseline: Quantity,
+        /// The bound of the ratio.
+        exceeds: f64,
+        /// What costs.
+        cost: CostMeasure,
+    },
+}
+
+/// What an estimator's work is measured by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CostMeasure {
+    /// A weighted sum of the record's counters: exactly reproducible.
+    Counters,
+    /// CPU time, of `timing.json`.
+    Cpu,
 }

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::npy::Array;
 use super::record::*;
-use super::store::{Arrays, Stored, gates_path, pixels_path};
+use super::store::{Arrays, Stored, costs_path, gates_path, pixels_path};
 use crate::stats::moments::Moments;
 use crate::stats::tree::{Counter, batch_level};
 
@@ -43,7 +43,7 @@ pub fn stored(noise: f64) -> Stored {
         samplers: vec![],
         checksums: BTreeMap::new(),
     };
-    Stored { record, arrays }
+    Stored { record, arrays, timing: None }
 }
 
 /// Band `band` of the observable `mean` of all classes of an estimator.
@@ -71,15 +71,19 @@ fn run(e: usize, name: &str, noise: f64, arrays: &mut Arrays) -> EstimatorRun {
     arrays.insert(gates_path(0, name), gates(PASSES, score));
     let pixels = (0..24).map(|i| if i < 12 { 0.1 * i as f64 } else { 0.01 }).collect();
     arrays.insert(pixels_path(0, name), Array::new(vec![2, 2, 3, 2], pixels));
+    let costs = (0..PASSES / 4).map(|_| 16.0).collect(); // batches of 4 passes, 4 rays each
+    arrays.insert(costs_path(0, name), Array::new(vec![PASSES as usize / 4, 1], costs));
     let observable = |class: &str| Observable { name: "mean".into(), class: class.into() };
     EstimatorRun {
         estimator: name.into(),
+        control_of: None,
         kind: "path".into(),
         bias: Bias::Unbiased,
         notes: vec![],
         passes: PASSES,
         observables: vec![observable("all"), observable("single")],
         gates: gates_path(0, name),
+        costs: costs_path(0, name),
         image: Some(Image { width: 3, height: 2, pixels: pixels_path(0, name) }),
         cost: BTreeMap::from([("rays".into(), 1024)]),
         anomalies: BTreeMap::new(),

@@ -3,7 +3,7 @@
 //! ```text
 //! record/record.json              everything but the arrays (see results::record)
 //! record/record.json.b3           its hash, as b3sum writes and checks it
-//! record/cells/<NNN>/<estimator>.gates.npy, <estimator>.pixels.npy
+//! record/cells/<NNN>/<estimator>.gates.npy, <estimator>.costs.npy, <estimator>.pixels.npy
 //! record/samplers/<NNN>.coarse.npy, .fine.npy, .serial.npy
 //! timing.json, provenance.json    beside the record, never byte-identical
 //! ```
@@ -33,11 +33,18 @@ pub struct Stored {
     pub record: Record,
     /// Its arrays.
     pub arrays: Arrays,
+    /// What it cost in time, where that was measured; no part of the record, and nothing guards it.
+    pub timing: Option<Timing>,
 }
 
 /// Where a run's gate moments stand, relative to the record's folder.
 pub fn gates_path(cell: usize, estimator: &str) -> String {
     format!("cells/{cell:03}/{estimator}.gates.npy")
+}
+
+/// Where a run's counts of work stand, relative to the record's folder.
+pub fn costs_path(cell: usize, estimator: &str) -> String {
+    format!("cells/{cell:03}/{estimator}.costs.npy")
 }
 
 /// Where a run's pixels stand, relative to the record's folder.
@@ -84,6 +91,11 @@ impl Stored {
             if !matches!(shape, Some(&[_, o, b, 5]) if o == run.observables.len() && b == bands) {
                 return Some(format!("gates of {} have shape {shape:?}", run.estimator));
             }
+            let batches = shape.map(|shape| shape[0]);
+            let shape = self.arrays.get(&run.costs).map(|a| &a.shape[..]);
+            if !matches!(shape, Some(&[b, c]) if Some(b) == batches && c == run.cost.len()) {
+                return Some(format!("costs of {} have shape {shape:?}", run.estimator));
+            }
             let Some(image) = &run.image else { continue };
             let shape = self.arrays.get(&image.pixels).map(|a| &a.shape[..]);
             if shape != Some(&[2, image.height, image.width, bands][..]) {
@@ -121,7 +133,7 @@ impl RecordFolder {
     pub fn write(&self, mut record: Record, arrays: Arrays) -> Result<Stored> {
         let checksums = arrays.iter().map(|(name, array)| (name.clone(), hash_hex(&array.to_npy())));
         record.checksums = checksums.collect();
-        let stored = Stored { record, arrays };
+        let stored = Stored { record, arrays, timing: None };
         if let Some(defect) = stored.defect() {
             return Err(Error::record(&self.root, format!("will not write a record whose {defect}")));
         }
@@ -149,7 +161,7 @@ impl RecordFolder {
         for (name, checksum) in &record.checksums {
             arrays.insert(name.clone(), read_array(&dir, name, checksum)?);
         }
-        let stored = Stored { record, arrays };
+        let stored = Stored { record, arrays, timing: self.read_timing()? };
         match stored.defect() {
             Some(defect) => Err(Error::record(&path, format!("inconsistent: {defect}"))),
             None => Ok(stored),

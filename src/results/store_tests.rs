@@ -9,7 +9,7 @@ use super::*;
 fn written() -> (TempDir, RecordFolder, Stored) {
     let temp = tempfile::tempdir().expect("a folder");
     let folder = RecordFolder::new(temp.path().join("sample"));
-    let Stored { record, arrays } = sample::stored(0.5);
+    let Stored { record, arrays, .. } = sample::stored(0.5);
     let stored = folder.write(record, arrays).expect("a written record");
     (temp, folder, stored)
 }

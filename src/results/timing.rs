@@ -10,6 +10,22 @@ use serde::{Deserialize, Serialize};
 pub struct Timing {
     /// Cell label -> estimator -> cost.
     pub cells: BTreeMap<String, BTreeMap<String, Cost>>,
+    /// Cell label -> estimator -> CPU time by batch of the record.
+    #[serde(default)]
+    pub batches: BTreeMap<String, BTreeMap<String, Batches>>,
+}
+
+/// CPU time by batch of the record, in the order of the batches.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Batches {
+    /// Number of processes that played them: more than one where a run was stopped and went on.
+    pub processes: u64,
+    /// CPU seconds of a batch.
+    pub cpu_seconds: Vec<f64>,
+    /// Was the whole batch timed side by side with its rivals, by a worker that was warm? A claim on CPU time
+    /// rests on such batches alone.
+    pub settled: Vec<bool>,
 }
 
 /// Time spent on one estimator in one cell, all bands together.
@@ -34,6 +50,16 @@ impl Timing {
         sum.wall_seconds += cost.wall_seconds;
         sum.passes += cost.passes;
         sum.paths += cost.paths;
+    }
+
+    /// Puts down the batches of one estimator in one cell.
+    pub fn set_batches(&mut self, cell: &str, estimator: &str, batches: Batches) {
+        self.batches.entry(cell.into()).or_default().insert(estimator.into(), batches);
+    }
+
+    /// CPU time by batch of one estimator in one cell.
+    pub fn batches_of(&self, cell: &str, estimator: &str) -> Option<&Batches> {
+        self.batches.get(cell)?.get(estimator)
     }
 
     /// What was measured of one estimator in one cell.

@@ -15,7 +15,7 @@ use crate::results::json::hash_json;
 use crate::results::npy::Array;
 use crate::results::provenance::fingerprint;
 use crate::results::record::{Bias, Cell, EstimatorRun, Image, Record, Replay, SCHEMA_VERSION};
-use crate::results::store::{Arrays, gates_path, pixels_path};
+use crate::results::store::{Arrays, costs_path, gates_path, pixels_path};
 use crate::results::timing::{self, Timing};
 
 /// A record before it is written.
@@ -53,16 +53,18 @@ pub fn assemble(
     for (job, block) in plan.jobs.iter().zip(finished) {
         let late = (0..job.claims.len()).filter(|&i| !block.origin.claims.contains(&job.claims[i]));
         post_hoc.extend(late);
-        let name = &experiment.file.estimator[job.estimator_index].name;
         let cost = timing::Cost {
             cpu_seconds: block.tally.cpu_seconds,
             wall_seconds: block.tally.wall_seconds,
             passes: block.tally.passes,
             paths: block.tally.cost[Cost::Paths as usize],
         };
-        timing.add(&cells[job.cell].label, name, cost);
+        let label = &cells[job.cell].label;
+        timing.add(label, &job.name, cost);
+        timing.set_batches(label, &job.name, batches(&block));
         let kind = &plan.kinds[job.estimator_index];
-        cells[job.cell].runs.push(estimator_run(job, name, kind, block, &mut arrays));
+        let entry = &experiment.file.estimator[job.estimator_index];
+        cells[job.cell].runs.push(estimator_run(job, &entry.name, kind, block, &mut arrays));
     }
     let claims = serde_json::to_value(&experiment.file.claim).unwrap_or(Value::Null);
     let record = Record {
@@ -85,9 +87,19 @@ pub fn assemble(
     Ok(Assembled { record, arrays, timing })
 }
 
+/// CPU time by batch.
+fn batches(finished: &Finished) -> timing::Batches {
+    let passes = finished.batches.iter().map(|moments| moments.first().map_or(0, |m| m.n));
+    timing::Batches {
+        processes: finished.tally.processes,
+        cpu_seconds: finished.work.iter().map(|work| work.cpu_seconds).collect(),
+        settled: finished.work.iter().zip(passes).map(|(work, n)| work.settled == n).collect(),
+    }
+}
+
 fn estimator_run(
     job: &Job,
-    name: &str,
+    entry: &str,
     kind: &str,
     finished: Finished,
     arrays: &mut Arrays,
@@ -96,8 +108,16 @@ fn estimator_run(
     let batches = &finished.batches;
     let shape = vec![batches.len(), observables, bands, 5];
     let data = batches.iter().flatten().flat_map(|moments| moments.to_array()).collect();
+    let name = &job.name;
     let gates = gates_path(job.cell, name);
     arrays.insert(gates.clone(), Array::new(shape, data));
+
+    let mut counters = Cost::ALL;
+    counters.sort_by_key(|counter| counter.name());
+    let counted = finished.work.iter().flat_map(|work| counters.map(|c| work.cost[c as usize] as f64));
+    let costs = costs_path(job.cell, name);
+    arrays
+        .insert(costs.clone(), Array::new(vec![finished.work.len(), counters.len()], counted.collect()));
 
     let image = job.layout.image().filter(|_| job.stage == Stage::Main);
     let image = image.map(|(width, height)| {
@@ -112,7 +132,8 @@ fn estimator_run(
         names.into_iter().map(str::to_string).zip(values.iter().copied()).collect()
     };
     EstimatorRun {
-        estimator: name.into(),
+        estimator: name.clone(),
+        control_of: job.is_control.then(|| entry.into()),
         kind: kind.into(),
         bias: match job.estimator.bias() {
             estimators::Bias::Unbiased => Bias::Unbiased,
@@ -123,6 +144,7 @@ fn estimator_run(
         passes: finished.passes,
         observables: named(&job.layout),
         gates,
+        costs,
         image,
         cost: counts(Cost::ALL.map(Cost::name).into(), &finished.tally.cost),
         anomalies: counts(Anomaly::ALL.map(Anomaly::name).into(), &finished.tally.anomalies),

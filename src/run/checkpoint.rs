@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::job::{Block, Origin, Tally};
+use super::job::{Block, Origin, Tally, Work};
 use crate::error::Result;
 use crate::results::atomic;
 use crate::results::json::{canonical, hash_bytes};
@@ -23,6 +23,8 @@ struct Header {
     gates: Vec<(u32, usize)>,
     /// Level, passes and number of values of every image node.
     pixels: Vec<(u32, u64, usize)>,
+    /// Level and value of every node of work.
+    work: Vec<(u32, Work)>,
 }
 
 /// Path of a job's state in an experiment's results folder.
@@ -40,6 +42,7 @@ pub fn save(path: &Path, identity: &str, block: &Block) -> Result<()> {
         tally: block.tally,
         gates: gates.iter().map(|n| (n.level, n.value.len())).collect(),
         pixels: pixels.iter().map(|n| (n.level, n.value.n, n.value.mean.len())).collect(),
+        work: block.work.nodes().iter().map(|n| (n.level, n.value)).collect(),
     };
     let header = canonical(&header);
     let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
@@ -93,14 +96,25 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
         let (mean, m2) = (take(length)?, take(length)?);
         block.pixels.push_node(level, ImageMoments { n, mean, m2 });
     }
+    for (level, work) in header.work {
+        if level > keep_level {
+            return None;
+        }
+        block.work.push_node(level, work);
+    }
     block.tally = header.tally;
     block.origin = header.origin;
-    (block.gates.next_pass() == block.pixels.next_pass()).then_some(block)
+    let ends = [block.pixels.next_pass(), block.work.next_pass()];
+    ends.iter().all(|end| *end == block.gates.next_pass()).then_some(block)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn work(pass: u64) -> Work {
+        Work { cost: [pass; 5], cpu_seconds: 0.25 * pass as f64, settled: pass % 2 }
+    }
 
     fn block(passes: u64, keep_level: u32) -> Block {
         let mut block = Block::empty(0, keep_level);
@@ -108,6 +122,7 @@ mod tests {
             let x = 1.0 / (pass as f64 + 3.0);
             block.gates.push(vec![Moments::of(x), Moments::of(-x)]);
             block.pixels.push(ImageMoments::of(vec![x, 2.0 * x, x * x]));
+            block.work.push(work(pass));
         }
         block.tally.cost[0] = 7;
         block
@@ -143,10 +158,12 @@ mod tests {
             let x = 1.0 / (pass as f64 + 3.0);
             later.gates.push(vec![Moments::of(x), Moments::of(-x)]);
             later.pixels.push(ImageMoments::of(vec![x, 2.0 * x, x * x]));
+            later.work.push(work(pass));
         }
         save(&path, "me", &block(11, 0)).expect("saved");
         let mut resumed = load(&path, "me", 3).expect("a state");
         resumed.append(later);
         assert_eq!((resumed.gates, resumed.pixels), (whole.gates, whole.pixels));
+        assert_eq!(resumed.work, whole.work);
     }
 }

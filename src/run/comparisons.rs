@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
-use crate::experiment::schema::{Agree, ClaimEntry, Differs, Equals};
+use crate::experiment::schema::{Agree, ClaimEntry, CostMeasure, Differs, Duel, Equals};
 use crate::experiment::{CellSpec, Experiment};
-use crate::results::record::{Against, Band, Comparison, Observable, Quantity};
+use crate::results::record::{self, Against, Band, Comparison, Observable, Quantity};
 
 /// Names every observable, or every class.
 const EACH: &str = "each";
@@ -74,6 +74,9 @@ impl Scope<'_> {
         if let Some(equals) = &claim.equals {
             return self.equals(index, equals);
         }
+        if let Some(duel) = claim.duel() {
+            return self.duel(index, &duel);
+        }
         match (&claim.agree, &claim.differs) {
             (Some(agree), _) => self.pairs(index, &Pairs::from(agree)),
             (_, Some(differs)) => self.pairs(index, &Pairs::from(differs)),
@@ -107,6 +110,27 @@ impl Scope<'_> {
                         detect: words.detect,
                     });
                 }
+            }
+        }
+        Ok(comparisons)
+    }
+
+    fn duel(&self, claim: usize, duel: &Duel) -> Result<Vec<Comparison>> {
+        let cost = match duel.cost {
+            CostMeasure::Counters => record::CostMeasure::Counters,
+            CostMeasure::Cpu => record::CostMeasure::Cpu,
+        };
+        let mut comparisons = Vec::new();
+        for cell in self.cells(duel.only) {
+            let observable = self.observable(claim, cell, duel.observable, duel.class)?;
+            for band in 0..self.bands.len() {
+                let baseline = quantity(cell, duel.baseline, &observable, band);
+                comparisons.push(Comparison {
+                    claim,
+                    quantity: quantity(cell, duel.candidate, &observable, band),
+                    against: Against::Efficiency { baseline, exceeds: duel.exceeds, cost },
+                    detect: duel.detect,
+                });
             }
         }
         Ok(comparisons)
@@ -168,9 +192,7 @@ impl Scope<'_> {
     }
 
     fn cells(&self, only: &BTreeMap<String, String>) -> Vec<usize> {
-        let chosen =
-            |spec: &CellSpec| only.iter().all(|(axis, label)| spec.axes.get(axis) == Some(label));
-        (0..self.experiment.cells.len()).filter(|&i| chosen(&self.experiment.cells[i])).collect()
+        (0..self.experiment.cells.len()).filter(|&i| is_in(&self.experiment.cells[i], only)).collect()
     }
 
     /// The observables that the names choose; `each` is all that the cell has.
@@ -226,6 +248,11 @@ impl Scope<'_> {
             )
         })
     }
+}
+
+/// Is the cell one of those that a claim's `where` chooses?
+pub(super) fn is_in(cell: &CellSpec, only: &BTreeMap<String, String>) -> bool {
+    only.iter().all(|(axis, label)| cell.axes.get(axis) == Some(label))
 }
 
 fn quantity(cell: usize, estimator: &str, observable: &Observable, band: usize) -> Quantity {

@@ -9,7 +9,7 @@ use super::keys::Stage;
 use crate::estimators::{Anomaly, BandUse, Cost, Estimator, Layout, Scores};
 use crate::sampling::stream::StreamKey;
 use crate::stats::moments::{ImageMoments, Moments};
-use crate::stats::tree::Counter;
+use crate::stats::tree::{Counter, Merge};
 
 /// A built estimator with its streams.
 pub struct Job {
@@ -17,6 +17,12 @@ pub struct Job {
     pub cell: usize,
     /// Estimator index in the experiment file.
     pub estimator_index: usize,
+    /// Name of the run: the estimator's, or that of its control.
+    pub name: String,
+    /// A second arm of the same estimator, on streams of its own.
+    pub is_control: bool,
+    /// Number of the group of jobs that are timed side by side.
+    pub side_by_side: Option<usize>,
     /// What people call it: cell and estimator.
     pub label: String,
     /// Hash of all that its result depends on but the number of passes, hex.
@@ -54,6 +60,8 @@ pub struct Block {
     pub gates: Counter<Vec<Moments>>,
     /// Moments of `[pixel][band]`.
     pub pixels: Counter<ImageMoments>,
+    /// Work and time, kept by batch like the gates.
+    pub work: Counter<Work>,
     /// Work and time.
     pub tally: Tally,
     /// What stood before the first of these passes was played.
@@ -72,6 +80,27 @@ pub struct Origin {
     pub passes: u64,
 }
 
+/// Work and time of some passes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Work {
+    /// By [`Cost`].
+    pub cost: [u64; Cost::ALL.len()],
+    /// CPU time of the passes alone, seconds.
+    pub cpu_seconds: f64,
+    /// How many of them were timed side by side with their rivals, by a worker that was warm.
+    pub settled: u64,
+}
+
+impl Merge for Work {
+    fn merge(mut self, later: Work) -> Work {
+        self.cost.iter_mut().zip(later.cost).for_each(|(a, b)| *a += b);
+        self.cpu_seconds += later.cpu_seconds;
+        self.settled += later.settled;
+        self
+    }
+}
+
 /// Counts and time, which add up in any order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
@@ -85,6 +114,8 @@ pub struct Tally {
     pub cpu_seconds: f64,
     /// Wall time, seconds.
     pub wall_seconds: f64,
+    /// Processes that played some of the passes.
+    pub processes: u64,
 }
 
 impl Tally {
@@ -95,6 +126,7 @@ impl Tally {
         self.passes += other.passes;
         self.cpu_seconds += other.cpu_seconds;
         self.wall_seconds += other.wall_seconds;
+        self.processes += other.processes;
     }
 }
 
@@ -112,6 +144,7 @@ impl Block {
         Block {
             gates: Counter::new(start, keep_level),
             pixels: Counter::new(start, Counter::<ImageMoments>::MERGE_ALL),
+            work: Counter::new(start, keep_level),
             tally: Tally::default(),
             origin: Origin::default(),
         }
@@ -122,10 +155,20 @@ impl Block {
         self.gates.next_pass()
     }
 
+    /// Marks all passes as timed side by side with their rivals; `keep_level` is the block's own.
+    pub fn settle(&mut self, keep_level: u32) {
+        let mut settled = Counter::new(self.work.start(), keep_level);
+        for node in self.work.nodes() {
+            settled.push_node(node.level, Work { settled: 1 << node.level, ..node.value });
+        }
+        self.work = settled;
+    }
+
     /// Appends the passes that follow.
     pub fn append(&mut self, later: Block) {
         self.gates.append(later.gates);
         self.pixels.append(later.pixels);
+        self.work.append(later.work);
         self.tally.add(&later.tally);
     }
 }
@@ -139,6 +182,8 @@ pub struct Finished {
     pub batches: Vec<Vec<Moments>>,
     /// Moments of `[pixel][band]` over all passes.
     pub image: ImageMoments,
+    /// Work and time by batch.
+    pub work: Vec<Work>,
     /// Work and time.
     pub tally: Tally,
     /// What stood before the first pass.
@@ -152,6 +197,7 @@ impl Block {
             passes: self.next_pass(),
             batches: self.gates.batches(),
             image: self.pixels.finish().unwrap_or_default(),
+            work: self.work.batches(),
             tally: self.tally,
             origin: self.origin,
         }
@@ -177,6 +223,7 @@ impl Job {
                 return None;
             }
             scores.clear();
+            let counted = scores.cost;
             let before = thread_cpu_time();
             for group in &self.groups {
                 let key = match stage {
@@ -185,7 +232,13 @@ impl Job {
                 };
                 self.estimator.pass(&group.bands, &key.pass(pass), &mut scores);
             }
-            cpu += thread_cpu_time().saturating_sub(before);
+            let spent = thread_cpu_time().saturating_sub(before);
+            cpu += spent;
+            block.work.push(Work {
+                cost: std::array::from_fn(|i| scores.cost[i] - counted[i]),
+                cpu_seconds: spent.as_secs_f64(),
+                settled: 0,
+            });
             block.gates.push(scores.gates.iter().map(|&x| Moments::of(x)).collect());
             // Blocks are appended to each other, so that those without an image hold empty ones.
             let image = if stage == Stage::Main { scores.pixels.clone() } else { Vec::new() };
@@ -197,6 +250,7 @@ impl Job {
             passes: end - start,
             cpu_seconds: cpu.as_secs_f64(),
             wall_seconds: wall.elapsed().as_secs_f64(),
+            processes: 0,
         };
         Some(block)
     }

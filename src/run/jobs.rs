@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::estimators::Layout;
 use crate::experiment::build::{self, Builder};
 use crate::experiment::registry::Registry;
-use crate::experiment::schema::Budget;
+use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure};
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::json::hash_json;
 use crate::results::provenance;
@@ -65,6 +65,7 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
     let mut observables = Vec::new();
     let mut kinds = Vec::new();
     let mut known: BTreeMap<String, &str> = BTreeMap::new();
+    let timed = Timed::new(experiment);
     for (index, cell) in experiment.cells.iter().enumerate() {
         if let Some(twin) = known.insert(hash_json(&cell.content()), &cell.label) {
             return Err(Error::input_help(
@@ -93,40 +94,47 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
             if index == 0 {
                 kinds.push(kind.clone());
             }
-            let estimator = (registered.build)(options, Arc::clone(&scene))?;
-            let groups = band_groups(estimator.band_use(), bands.len());
-            let groups = groups
-                .into_iter()
-                .map(|group| streams(experiment, cell, &bands, &entry.name, group, stage));
-            let label = match cell.label.as_str() {
-                "" => entry.name.clone(),
-                cell => format!("{cell} / {}", entry.name),
-            };
-            let identity = json!({
-                "build": provenance::build(),
-                "experiment": experiment.file.name,
-                "seed": experiment.file.seed,
-                "fresh": experiment.file.fresh,
-                "stage": stage.name(),
-                "bands": bands,
-                "content": cell.content(),
-                "pair": experiment.file.pair,
-                "inputs": inputs,
-                "estimator": entry,
-            });
-            jobs.push(Job {
-                cell: index,
-                estimator_index,
-                label,
-                identity: hash_json(&identity),
-                stage,
-                passes: None,
-                groups: groups.collect(),
-                estimator,
-                layout: layout.clone(),
-                targets: vec![0],
-                claims: claims.clone(),
-            });
+            for arm in timed.arms(cell, &entry.name) {
+                let estimator = (registered.build)(options, Arc::clone(&scene))?;
+                let groups = band_groups(estimator.band_use(), bands.len());
+                let groups = groups
+                    .into_iter()
+                    .map(|group| streams(experiment, cell, &bands, &arm.name, group, stage))
+                    .collect();
+                let label = match cell.label.as_str() {
+                    "" => arm.name.clone(),
+                    cell => format!("{cell} / {}", arm.name),
+                };
+                let identity = json!({
+                    "build": provenance::build(),
+                    "experiment": experiment.file.name,
+                    "seed": experiment.file.seed,
+                    "fresh": experiment.file.fresh,
+                    "stage": stage.name(),
+                    "bands": bands,
+                    "content": cell.content(),
+                    "pair": experiment.file.pair,
+                    "inputs": inputs,
+                    "estimator": entry,
+                    "control": arm.is_control,
+                });
+                jobs.push(Job {
+                    cell: index,
+                    estimator_index,
+                    name: arm.name,
+                    is_control: arm.is_control,
+                    side_by_side: arm.is_timed.then_some(index),
+                    label,
+                    identity: hash_json(&identity),
+                    stage,
+                    passes: None,
+                    groups,
+                    estimator,
+                    layout: layout.clone(),
+                    targets: vec![0],
+                    claims: claims.clone(),
+                });
+            }
         }
     }
     let passes = match experiment.file.budget {
@@ -138,6 +146,44 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
         job.targets = targets(experiment, job, &comparisons, &observables[job.cell]);
     }
     Ok(Plan { bands, jobs, comparisons, kinds, stage, scene_bytes: builder.memory_bytes(), passes })
+}
+
+/// A run of an estimator in a cell.
+struct Arm {
+    name: String,
+    is_control: bool,
+    is_timed: bool,
+}
+
+/// What claims compare by CPU time: estimators that are played side by side, and baselines that are played
+/// twice, because the same estimator against itself shows what the machine adds.
+struct Timed<'a> {
+    /// Where, candidate, baseline.
+    duels: Vec<(&'a BTreeMap<String, String>, &'a str, &'a str)>,
+}
+
+impl<'a> Timed<'a> {
+    fn new(experiment: &'a Experiment) -> Timed<'a> {
+        let duels = experiment.file.claim.iter().filter_map(ClaimEntry::duel);
+        let by_time = duels.filter(|duel| duel.cost == CostMeasure::Cpu);
+        Timed { duels: by_time.map(|duel| (duel.only, duel.candidate, duel.baseline)).collect() }
+    }
+
+    /// The runs of an estimator in a cell.
+    fn arms(&self, cell: &CellSpec, name: &str) -> Vec<Arm> {
+        let here = || {
+            self.duels
+                .iter()
+                .filter(|(only, ..)| comparisons::is_in(cell, only))
+                .map(|(_, a, b)| (*a, *b))
+        };
+        let is_timed = here().any(|(candidate, baseline)| candidate == name || baseline == name);
+        let mut arms = vec![Arm { name: name.into(), is_control: false, is_timed }];
+        if here().any(|(_, baseline)| baseline == name) {
+            arms.push(Arm { name: format!("{name}{CONTROL}"), is_control: true, is_timed });
+        }
+        arms
+    }
 }
 
 fn streams(

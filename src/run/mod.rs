@@ -128,8 +128,9 @@ fn play(
     let replays = replays(experiment, plan, &played, interrupt)?;
     let assembled = assemble::assemble(experiment, plan, played, replays)?;
     let folder = RecordFolder::new(root);
-    let stored = folder.write(assembled.record, assembled.arrays)?;
+    let mut stored = folder.write(assembled.record, assembled.arrays)?;
     folder.write_timing(&assembled.timing)?;
+    stored.timing = Some(assembled.timing);
     folder.write_provenance(&Provenance::collect(options.threads))?;
     Ok((folder, stored))
 }
@@ -144,8 +145,7 @@ fn replays(
     let claims = experiment.file.claim.iter().filter_map(|claim| claim.reproduces.as_ref());
     let Some(passes) = claims.map(|claim| claim.passes).max() else { return Ok(Vec::new()) };
     let again = |(job, finished): (&Job, &Finished)| {
-        let name = &experiment.file.estimator[job.estimator_index].name;
-        replay::replay(job, name, finished, passes, &|| interrupt.raised())
+        replay::replay(job, &job.name, finished, passes, &|| interrupt.raised())
     };
     let replays: Option<Vec<Replay>> = plan.jobs.iter().zip(played).map(again).collect();
     replays.ok_or_else(|| {

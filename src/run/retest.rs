@@ -25,13 +25,10 @@ pub fn retest(
     factor: u64,
 ) -> Result<Stored> {
     let mut plan = plan_stage(experiment, registry, Stage::Retest)?;
-    let name = |estimator: usize| &experiment.file.estimator[estimator].name;
-    plan.jobs.retain(|job| {
-        wanted.iter().any(|q| q.cell == job.cell && q.estimator == *name(job.estimator_index))
-    });
+    plan.jobs.retain(|job| wanted.iter().any(|q| q.cell == job.cell && q.estimator == job.name));
     for job in &mut plan.jobs {
         let runs = main.cells.get(job.cell).map_or(&[][..], |cell| &cell.runs);
-        let first = runs.iter().find(|run| run.estimator == *name(job.estimator_index));
+        let first = runs.iter().find(|run| run.estimator == job.name);
         let first = first.ok_or_else(|| {
             Error::input(format!("the record of `{}` holds no {}", main.experiment, job.label))
         })?;

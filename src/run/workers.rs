@@ -3,6 +3,11 @@
 //! Workers take the next run of passes from a shared source; the collector (the calling thread) appends
 //! finished blocks in the order of their passes, whatever the order in which they arrive. Blocks are
 //! sized by the time they take; the fixed tree over passes makes results independent of that size.
+//!
+//! Jobs that are timed side by side are played by quadruples: one worker plays two batches of every arm in
+//! the order A B .. B A, so that whatever drifts steadily (clock rate, temperature, other load) adds the
+//! same to each arm. A worker's first quadruple of a group warms it up, and one of which an earlier process
+//! had played a part is not in that order: neither counts as timed (`Work::settled`).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -46,26 +51,47 @@ enum Message {
 }
 
 struct Source {
-    next_job: usize,
+    next_group: usize,
     active: Option<Active>,
 }
 
+/// The group of jobs under way: one, or the arms that are timed side by side.
 struct Active {
-    job: usize,
-    passes: u64,
-    next: u64,
+    group: usize,
+    arms: Vec<Arm>,
+    /// Number of the next quadruple of batches.
+    quadruple: u64,
     seconds_per_pass: Option<f64>,
 }
 
-struct Work {
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Arm {
+    job: usize,
+    passes: u64,
+    next: u64,
+}
+
+/// A run of passes of one job.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Span {
     job: usize,
     start: u64,
     end: u64,
     keep_level: u32,
 }
 
+/// What a worker plays in one go.
+struct Unit {
+    group: usize,
+    spans: Vec<Span>,
+    /// These are whole batches of rivals in an order that cancels drift.
+    is_balanced: bool,
+}
+
 struct Pool<'a> {
     jobs: &'a [Job],
+    /// Indices of jobs that are played together.
+    groups: Vec<Vec<usize>>,
     budget: &'a Budget,
     settings: &'a Settings<'a>,
     source: Mutex<Source>,
@@ -74,8 +100,8 @@ struct Pool<'a> {
 /// Plays every job and returns their blocks in the order of the jobs. Where the run is interrupted, all
 /// states are saved first.
 pub fn play_all(jobs: &[Job], budget: &Budget, settings: &Settings) -> Result<Vec<Finished>> {
-    let source = Mutex::new(Source { next_job: 0, active: None });
-    let pool = Pool { jobs, budget, settings, source };
+    let source = Mutex::new(Source { next_group: 0, active: None });
+    let pool = Pool { jobs, groups: groups(jobs), budget, settings, source };
     // Bounded: blocks with images wait with their workers, not in memory.
     let (sender, receiver) = mpsc::sync_channel(settings.threads);
     std::thread::scope(|scope| {
@@ -90,6 +116,34 @@ pub fn play_all(jobs: &[Job], budget: &Budget, settings: &Settings) -> Result<Ve
         }
         collected
     })
+}
+
+/// Jobs that are timed side by side, together; the others one by one.
+fn groups(jobs: &[Job]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (index, job) in jobs.iter().enumerate() {
+        let same = |group: &&mut Vec<usize>| jobs[group[0]].side_by_side == job.side_by_side;
+        match groups.iter_mut().find(same).filter(|_| job.side_by_side.is_some()) {
+            Some(group) => group.push(index),
+            None => groups.push(vec![index]),
+        }
+    }
+    groups
+}
+
+/// Two batches of every arm in the order A B .. B A, without what is played already; and whether nothing of
+/// it was.
+fn quadruple(arms: &[Arm], number: u64) -> (Vec<Span>, bool) {
+    let span = |arm: &Arm, batch: u64| {
+        let keep_level = batch_level(arm.passes);
+        let at = |batch: u64| arm.passes.min(batch << keep_level);
+        Span { job: arm.job, start: at(batch).max(arm.next), end: at(batch + 1), keep_level }
+    };
+    let there = arms.iter().map(|arm| span(arm, 2 * number));
+    let back = arms.iter().rev().map(|arm| span(arm, 2 * number + 1));
+    let spans: Vec<Span> = there.chain(back).collect();
+    let is_whole = spans.iter().all(|span| span.end == span.start + (1 << span.keep_level));
+    (spans.into_iter().filter(|span| span.start < span.end).collect(), is_whole)
 }
 
 /// Stops the other threads where one panics: the run is lost, and they should not play it to its end.
@@ -107,18 +161,26 @@ impl Pool<'_> {
     fn work(&self, sender: &mpsc::SyncSender<Message>) {
         let _guard = StopOnPanic(self.settings.interrupt);
         let stop = || self.settings.interrupt.raised();
-        while let Some(work) = self.next(sender) {
+        let mut warm = None;
+        while let Some(unit) = self.next(sender) {
             let begun = Instant::now();
-            let job = &self.jobs[work.job];
-            let Some(block) = job.play(job.stage, work.start, work.end, work.keep_level, &stop) else {
-                return;
-            };
-            let seconds = begun.elapsed().as_secs_f64() / (work.end - work.start) as f64;
-            // Sent before the lock is asked for, which another worker's pilot may hold for long.
-            if sender.send(Message::Played { job: work.job, block: Box::new(block) }).is_err() {
-                return;
+            let is_settled = unit.is_balanced && warm == Some(unit.group);
+            warm = Some(unit.group);
+            for span in &unit.spans {
+                let job = &self.jobs[span.job];
+                let played = job.play(job.stage, span.start, span.end, span.keep_level, &stop);
+                let Some(mut block) = played else { return };
+                if is_settled {
+                    block.settle(span.keep_level);
+                }
+                // Sent before the lock is asked for, which another worker's pilot may hold for long.
+                if sender.send(Message::Played { job: span.job, block: Box::new(block) }).is_err() {
+                    return;
+                }
             }
-            if let Some(active) = self.lock().active.as_mut().filter(|a| a.job == work.job) {
+            let passes: u64 = unit.spans.iter().map(|span| span.end - span.start).sum();
+            let seconds = begun.elapsed().as_secs_f64() / passes as f64;
+            if let Some(active) = self.lock().active.as_mut().filter(|a| a.group == unit.group) {
                 active.seconds_per_pass = Some(seconds);
             }
         }
@@ -128,30 +190,48 @@ impl Pool<'_> {
         self.source.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The next run of passes; begins the next job where the last one has none left.
-    fn next(&self, sender: &mpsc::SyncSender<Message>) -> Option<Work> {
+    /// The next passes to play; begins the next group where the last one has none left.
+    fn next(&self, sender: &mpsc::SyncSender<Message>) -> Option<Unit> {
         let mut source = self.lock();
         loop {
             if self.settings.interrupt.raised() {
                 return None;
             }
-            if let Some(active) = source.active.as_mut().filter(|a| a.next < a.passes) {
-                let start = active.next;
-                active.next = active.passes.min(start + self.block_length(active));
-                let keep_level = batch_level(active.passes);
-                return Some(Work { job: active.job, start, end: active.next, keep_level });
+            if let Some(unit) = source.active.as_mut().and_then(|active| self.take(active)) {
+                return Some(unit);
             }
-            let job = source.next_job;
-            if job == self.jobs.len() {
-                return None;
-            }
-            source.next_job += 1;
-            source.active = Some(self.begin(job, sender)?);
+            let group = source.next_group;
+            let jobs = self.groups.get(group)?;
+            source.next_group += 1;
+            let arms: Option<Vec<Arm>> = jobs.iter().map(|&job| self.begin(job, sender)).collect();
+            let (quadruple, seconds_per_pass) = (0, None);
+            source.active = Some(Active { group, arms: arms?, quadruple, seconds_per_pass });
         }
     }
 
+    /// The next passes of a group, if it has any left.
+    fn take(&self, active: &mut Active) -> Option<Unit> {
+        let group = active.group;
+        if let [arm] = active.arms[..] {
+            let start = arm.next;
+            let end = arm.passes.min(start + self.block_length(active));
+            active.arms[0].next = end;
+            let span = Span { job: arm.job, start, end, keep_level: batch_level(arm.passes) };
+            return (start < end).then(|| Unit { group, spans: vec![span], is_balanced: false });
+        }
+        let most = active.arms.iter().map(|arm| arm.passes.div_ceil(1 << batch_level(arm.passes))).max();
+        while 2 * active.quadruple < most? {
+            let (spans, is_balanced) = quadruple(&active.arms, active.quadruple);
+            active.quadruple += 1;
+            if !spans.is_empty() {
+                return Some(Unit { group, spans, is_balanced });
+            }
+        }
+        None
+    }
+
     fn block_length(&self, active: &Active) -> u64 {
-        let left = active.passes - active.next;
+        let left = active.arms[0].passes - active.arms[0].next;
         let fair = (left / (2 * self.settings.threads as u64)).max(1);
         let timed = match active.seconds_per_pass {
             Some(seconds) => (BLOCK_SECONDS / seconds.max(1e-9)) as u64,
@@ -161,7 +241,7 @@ impl Pool<'_> {
     }
 
     /// Fixes a job's passes and finds what is done of it. Other workers wait meanwhile.
-    fn begin(&self, index: usize, sender: &mpsc::SyncSender<Message>) -> Option<Active> {
+    fn begin(&self, index: usize, sender: &mpsc::SyncSender<Message>) -> Option<Arm> {
         let job = &self.jobs[index];
         let path = checkpoint::path(self.settings.root, &job.identity);
         let origin = checkpoint::origin(&path, &job.identity);
@@ -180,8 +260,9 @@ impl Pool<'_> {
             .unwrap_or_else(|| Block::empty(0, keep_level));
         done.origin = Origin { claims, budget, passes };
         let next = done.next_pass();
+        done.tally.processes += u64::from(next < passes);
         sender.send(Message::Begin { job: index, passes, done: Box::new(done) }).ok()?;
-        Some(Active { job: index, passes, next, seconds_per_pass: None })
+        Some(Arm { job: index, passes, next })
     }
 }
 
@@ -280,5 +361,44 @@ impl<'a> Collector<'a> {
             None => self.jobs[job].label.clone(),
         };
         self.settings.progress.update(self.finished.len() as f64 + under_way, message);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// (job, first pass, last) of a quadruple.
+    fn order(arms: &[Arm], number: u64) -> (Vec<(usize, u64, u64)>, bool) {
+        let (spans, is_whole) = quadruple(arms, number);
+        (spans.iter().map(|s| (s.job, s.start, s.end)).collect(), is_whole)
+    }
+
+    #[test]
+    fn rivals_are_played_in_an_order_that_cancels_drift() {
+        let arm = |job, next| Arm { job, passes: 300, next };
+        // 300 passes: batches of 4.
+        let arms = [arm(3, 0), arm(5, 0), arm(8, 0)];
+        let (spans, is_whole) = order(&arms, 1);
+        assert!(is_whole);
+        let expected = [(3, 8, 12), (5, 8, 12), (8, 8, 12), (8, 12, 16), (5, 12, 16), (3, 12, 16)];
+        assert_eq!(spans, expected);
+        // With a steady drift, the middle of the passes of every arm is at the same time.
+        for job in [3, 5, 8] {
+            let places = spans.iter().enumerate().filter(|(_, s)| s.0 == job).map(|(i, _)| i);
+            assert_eq!(places.sum::<usize>(), 5);
+        }
+    }
+
+    #[test]
+    fn what_was_played_is_not_played_again() {
+        let arm = |job, next| Arm { job, passes: 300, next };
+        let arms = [arm(0, 10), arm(1, 16)];
+        assert_eq!(order(&arms, 0), (vec![], false));
+        assert_eq!(order(&arms, 1), (vec![(0, 10, 12), (0, 12, 16)], false));
+        assert!(order(&arms, 2).1);
+        // 75 batches: the last quadruple is a half.
+        assert_eq!(order(&arms, 37), (vec![(0, 296, 300), (1, 296, 300)], false));
+        assert!(order(&arms, 38).0.is_empty());
     }
 }

@@ -147,24 +147,26 @@ fn conclude(cases: &[Case], trials: Vec<(usize, Trial)>, looks: Looks) -> Judgem
     let mut wanted = Vec::new();
     for ((&i, second), adjusted_p) in again.iter().zip(seconds).zip(second_adjusted) {
         let (case, first) = &trials[i];
-        let look =
-            match second.map(|t| t.evidence) {
-                None => {
-                    let subjects = measured_by(&cases[*case], first);
-                    wanted.extend(subjects.into_iter().map(|subject| Wanted { case: *case, subject }));
-                    SecondLook::Missing
-                }
-                Some(Evidence::None(reason)) => SecondLook::Invalid(reason),
-                Some(Evidence::Identity { holds } | Evidence::Exact { holds, .. }) => {
-                    SecondLook::Taken(if holds { 1.0 } else { 0.0 })
-                }
-                Some(
-                    Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. },
-                ) if test.p_value.is_nan() => SecondLook::Invalid("the test has no p-value".into()),
-                Some(Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }) => {
-                    SecondLook::Taken(adjusted_p)
-                }
-            };
+        let look = match second.map(|t| t.evidence) {
+            None => {
+                let subjects = measured_by(&cases[*case], first);
+                wanted.extend(subjects.into_iter().map(|subject| Wanted { case: *case, subject }));
+                SecondLook::Missing
+            }
+            Some(Evidence::None(reason)) => SecondLook::Invalid(reason),
+            Some(Evidence::Efficiency(_)) => SecondLook::Invalid("efficiencies have one look".into()),
+            Some(Evidence::Identity { holds } | Evidence::Exact { holds, .. }) => {
+                SecondLook::Taken(if holds { 1.0 } else { 0.0 })
+            }
+            Some(Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. })
+                if test.p_value.is_nan() =>
+            {
+                SecondLook::Invalid("the test has no p-value".into())
+            }
+            Some(Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }) => {
+                SecondLook::Taken(adjusted_p)
+            }
+        };
         second_looks.insert(i, look);
     }
     let tests = p_values.len().max(1) as f64;
@@ -214,7 +216,7 @@ fn measured_by(case: &Case, trial: &Trial) -> Vec<Measured> {
             let comparison = &case.main.record.comparisons[index];
             let other = match &comparison.against {
                 Against::Quantity { other, .. } => Some(other.clone()),
-                Against::Value { .. } => None,
+                Against::Value { .. } | Against::Efficiency { .. } => None,
             };
             let quantities = std::iter::once(comparison.quantity.clone()).chain(other);
             quantities.map(Measured::Quantity).collect()
@@ -249,6 +251,11 @@ fn state(
     }
     // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
     let own_level = looks.first(one_look || claim.expect != Expect::Pass) / tests;
+    if let Evidence::Efficiency(shown) = &evidence {
+        let test = &shown.test;
+        (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
+        (verdict.adjusted_p, verdict.detectable) = (adjusted_p, shown.detectable(own_level));
+    }
     if let Evidence::Fit { fit, .. } = &evidence {
         verdict.detectable = fit.detectable(own_level, POWER);
     }
@@ -262,6 +269,10 @@ fn state(
     }
     let found = match (&evidence, second) {
         (Evidence::None(reason), _) => Outcome::Invalid(reason.clone()),
+        (Evidence::Efficiency(shown), _) => {
+            let levels = (looks.at_once(), own_level);
+            shown.outcome(verdict.adjusted_p, levels, detect, claim.expect == Expect::Fails)
+        }
         (Evidence::Identity { holds: true } | Evidence::Exact { holds: true, .. }, _) => Outcome::Pass,
         (Evidence::Identity { holds: false } | Evidence::Exact { holds: false, .. }, _) => Outcome::Fail,
         (_, Some(SecondLook::Missing)) => Outcome::Fail,
@@ -277,7 +288,10 @@ fn state(
             }
         }
     };
-    verdict.note = note(&found, &evidence, detect, &verdict);
+    verdict.note = match &evidence {
+        Evidence::Efficiency(shown) => shown.note(&found, own_level),
+        _ => note(&found, &evidence, detect, &verdict),
+    };
     match second {
         Some(SecondLook::Missing) => verdict.note += "; wants a second look on fresh streams",
         Some(SecondLook::Taken(_)) if found == Outcome::Pass => {
@@ -333,6 +347,7 @@ fn expected_outcome(claim: &Claim, found: Outcome, note: &mut String) -> Outcome
     let (wanted, green) = match claim.expect {
         Expect::Pass => return found,
         Expect::Differs => ("a difference", found == Outcome::Fail),
+        Expect::Fails => ("a failure", found == Outcome::Fail),
         Expect::Invalid => ("an invalid test", matches!(found, Outcome::Invalid(_))),
     };
     let said = if note.is_empty() { "no difference found".to_string() } else { std::mem::take(note) };
@@ -350,6 +365,7 @@ impl Evidence {
             Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. } => {
                 Some(test.p_value).filter(|p| !p.is_nan())
             }
+            Evidence::Efficiency(shown) => Some(shown.test.p_value).filter(|p| !p.is_nan()),
             Evidence::None(_) | Evidence::Identity { .. } | Evidence::Exact { .. } => None,
         }
     }

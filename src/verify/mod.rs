@@ -15,6 +15,13 @@ pub mod junit;
 /// What verification says.
 pub mod verdict;
 
+/// Efficiencies of all pairs of estimators.
+pub mod comparisons;
+/// Claims of efficiency.
+pub mod efficiency;
+/// What counts of work cost.
+pub mod weights;
+
 /// Evidence that adds up over nights.
 pub mod nights;
 

@@ -1,5 +1,6 @@
 //! What one comparison shows by itself, before it is held against the others.
 
+use super::efficiency::{self, Shown};
 use super::levels::SHARED_ERROR;
 use super::verdict::{Outcome, Verdict};
 use crate::results::record::{Against, Bias, Comparison, EstimatorRun, Observable, Quantity, Record};
@@ -25,6 +26,12 @@ pub(super) const SHARE_LIMIT: f64 = 0.5;
 /// Sampling errors and deviations below this, relative to the value, are rounding.
 pub(super) const ROUNDING: f64 = 1e-12;
 
+/// Kinds of claims.
+const KINDS: [&str; 7] = ["equals", "agree", "differs", "reproduces", "sampler", "faster", "not_slower"];
+
+/// Kinds of claims that rest on the agreement of two means.
+const AGREEING: [&str; 3] = ["agree", "faster", "not_slower"];
+
 /// Anomalies that are counted for the reader and bias nothing: the convention scores them 0.
 const STATED: [&str; 1] = ["wrong_side"];
 
@@ -33,7 +40,7 @@ const STATED: [&str; 1] = ["wrong_side"];
 pub(super) struct Claim {
     /// Its name, or its kind and place in the file.
     pub label: String,
-    /// `equals`, `agree`, `differs`, `reproduces` or `sampler`.
+    /// One of [`KINDS`].
     pub kind: String,
     /// The outcome that makes it green.
     pub expect: Expect,
@@ -48,6 +55,7 @@ pub(super) struct Claim {
 pub(super) enum Expect {
     Pass,
     Differs,
+    Fails,
     Invalid,
 }
 
@@ -56,12 +64,11 @@ impl Claim {
     pub fn of(record: &Record, index: usize) -> Claim {
         let entry = &record.claims[index];
         let text = |key: &str| entry[key].as_str();
-        let kind = ["equals", "agree", "differs", "reproduces", "sampler"]
-            .iter()
-            .find(|kind| !entry[**kind].is_null());
+        let kind = KINDS.iter().find(|kind| !entry[**kind].is_null());
         let kind = kind.map_or("claim", |kind| *kind).to_string();
         let expect = match text("expect") {
             Some("differs") => Expect::Differs,
+            Some("fails") => Expect::Fails,
             Some("invalid") => Expect::Invalid,
             _ if kind == "differs" => Expect::Differs,
             _ => Expect::Pass,
@@ -81,6 +88,8 @@ pub(super) enum Evidence {
     Identity { holds: bool },
     /// A difference that a test judges.
     Test { difference: Estimate, test: Test },
+    /// An efficiency against a bound.
+    Efficiency(Box<Shown>),
     /// A test of many comparisons at once.
     Sum { test: Test },
     /// Counts against probabilities.
@@ -200,11 +209,17 @@ impl<'a> Arm<'a> {
 
 /// Judges comparison `index` of a record by itself.
 pub(super) fn trial(stored: &Stored, index: usize, comparison: &Comparison) -> Trial {
+    if let Against::Efficiency { baseline, exceeds, cost } = &comparison.against {
+        let against = Against::Quantity { other: baseline.clone(), paired: false };
+        let means = trial(stored, index, &Comparison { against, ..comparison.clone() });
+        return efficiency::trial(stored, means, &comparison.quantity, baseline, (*exceeds, *cost));
+    }
     let claim = Claim::of(&stored.record, comparison.claim);
     let a = Arm::of(stored, &comparison.quantity);
     let (other, paired) = match &comparison.against {
         Against::Value { .. } => (None, false),
         Against::Quantity { other, paired } => (Some(other), *paired),
+        Against::Efficiency { baseline, .. } => (Some(baseline), false),
     };
     let b = other.and_then(|other| Arm::of(stored, other));
     let mut verdict = blank_verdict(stored, comparison, &claim);
@@ -213,8 +228,8 @@ pub(super) fn trial(stored: &Stored, index: usize, comparison: &Comparison) -> T
     }
     let expected = match (&comparison.against, &b) {
         (Against::Value { value, error, .. }, _) => Estimate::known(*value, *error),
-        (Against::Quantity { .. }, Some(b)) => b.mean,
-        (Against::Quantity { .. }, None) => Estimate::known(f64::NAN, f64::NAN),
+        (_, Some(b)) => b.mean,
+        (_, None) => Estimate::known(f64::NAN, f64::NAN),
     };
     (verdict.expected, verdict.expected_error) = (expected.value, expected.std_error);
 
@@ -309,7 +324,7 @@ fn stated_error(expected: &Estimate, arms: &[&Arm]) -> f64 {
 
 /// A biased estimator agrees with nothing by right; a control may say that it differs.
 fn bias_objection(claim: &Claim, arms: &[&Arm]) -> Option<String> {
-    if claim.kind != "agree" || claim.expect == Expect::Differs {
+    if !AGREEING.contains(&claim.kind.as_str()) || claim.expect == Expect::Differs {
         return None;
     }
     arms.iter().find_map(|arm| match &arm.run.bias {
@@ -370,7 +385,9 @@ pub(super) fn blank(record: &Record, claim: &Claim) -> Verdict {
 fn blank_verdict(stored: &Stored, comparison: &Comparison, claim: &Claim) -> Verdict {
     let (a, b) = match &comparison.against {
         Against::Value { .. } => (&comparison.quantity, &comparison.quantity),
-        Against::Quantity { other, .. } => (&comparison.quantity, other),
+        Against::Quantity { other, .. } | Against::Efficiency { baseline: other, .. } => {
+            (&comparison.quantity, other)
+        }
     };
     let record = &stored.record;
     let cell = |q: &Quantity| record.cells.get(q.cell).map_or("?", |c| &c.label).to_string();

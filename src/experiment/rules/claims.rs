@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::At;
-use crate::experiment::schema::{ClaimEntry, Equals};
+use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure, Duel, Equals, Expect};
 use crate::experiment::suggest;
 use crate::experiment::sweep::SweepAxis;
 
@@ -13,6 +13,8 @@ pub struct Known<'a> {
     pub estimators: Vec<&'a str>,
     /// The sweep; none where it could not be read.
     pub axes: Option<&'a [SweepAxis]>,
+    /// How much work; none where it could not be read.
+    pub budget: Option<Budget>,
 }
 
 /// The rules of one claim.
@@ -24,12 +26,53 @@ pub fn claim(at: At, claim: &ClaimEntry, known: &Known) {
         let (names, across, only) = (&agree.estimators, &agree.across, &agree.only);
         pairs(at.to("agree"), names, across.as_deref(), only, known);
     }
+    if let Some(words) = &claim.faster {
+        duel(at.to("faster"), &words.into(), known);
+    }
+    if let Some(words) = &claim.not_slower {
+        duel(at.to("not_slower"), &words.into(), known);
+    }
+    if claim.duel().is_some() && claim.expect == Some(Expect::Differs) {
+        at.to("expect").report_help(
+            "`differs` is about means, and this claim is about efficiency",
+            "say `expect = \"fails\"`",
+        );
+    }
     if let Some(differs) = &claim.differs {
         let (names, across, only) = (&differs.estimators, &differs.across, &differs.only);
         pairs(at.to("differs"), names, across.as_deref(), only, known);
         if claim.expect.is_some() {
             at.to("expect").report("`differs` says what is expected already");
         }
+    }
+}
+
+/// A candidate and a baseline; what is compared by CPU time is played side by side, pass for pass.
+fn duel(at: At, duel: &Duel, known: &Known) {
+    estimator(at.to("candidate"), duel.candidate, known);
+    estimator(at.to("baseline"), duel.baseline, known);
+    if duel.candidate == duel.baseline {
+        at.to("candidate").report_help(
+            format!("`{}` is candidate and baseline", duel.candidate),
+            "an estimator is as fast as itself: name two",
+        );
+    }
+    if duel.cost == CostMeasure::Cpu {
+        if known.budget.as_ref().is_some_and(|budget| !matches!(budget, Budget::Passes(_))) {
+            at.to("cost").report_help(
+                "CPU time is compared pass for pass, and this budget may give each estimator another number",
+                "state `budget.passes`, or compare by `counters`",
+            );
+        }
+        for name in known.estimators.iter().filter(|name| name.ends_with(CONTROL)) {
+            at.to("cost").report_help(
+                format!("`{name}` is the name of a control: comparing CPU time adds one of that ending"),
+                "give the estimator another name",
+            );
+        }
+    }
+    if let Some(axes) = known.axes {
+        filter(at, duel.only, axes);
     }
 }
 

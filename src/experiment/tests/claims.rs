@@ -25,7 +25,7 @@ fn estimators_have_unique_names() {
 
 #[test]
 fn a_claim_is_of_one_kind() {
-    let rule = "exactly one of `equals`, `agree`, `differs`, `reproduces` is needed, found none";
+    let rule = "exactly one of `equals`, `agree`, `differs`, `reproduces`, `faster`, `not_slower` is needed, found none";
     holds(&claim("name = \"x\""), rule, "18:1", "");
     let equals = "equals = { value = 1, column = \"r\", source = \"\" }";
     assert!(
@@ -94,4 +94,39 @@ fn pairing_is_over_known_keys() {
     ] {
         good(&format!("{GOOD}[pair]\nover = [\"{key}\"]\n"));
     }
+}
+
+/// The good experiment with a second estimator and a claim of efficiency at line 18 with `words` in it.
+fn duel(words: &str) -> String {
+    let snee = "[[estimator]]\nname = \"snee\"\nsnee = {}\n";
+    errors(&format!("{GOOD}{snee}{SWEEP}[[claim]]\nfaster = {{ {words} }}\n"))
+}
+
+#[test]
+fn claims_of_efficiency_name_two_estimators() {
+    let pair = "candidate = \"snee\", baseline = \"mis\"";
+    let message = duel("candidate = \"sne\", baseline = \"mis\"");
+    holds(&message, "unknown estimator `sne`", "22:24", "did you mean `snee`?");
+    let message = duel("candidate = \"mis\", baseline = \"mis\"");
+    holds(&message, "`mis` is candidate and baseline", "22:24", "an estimator is as fast as itself");
+    let message = duel(&format!("{pair}, ratio = 0"));
+    assert!(message.contains("must be greater than 0"), "{message}");
+    let message = duel(&format!("{pair}, where = {{ depth = \"thn\" }}"));
+    assert!(message.contains("unknown label `thn` of axis `depth`"), "{message}");
+    let message = duel(&format!("{pair} }}\nexpect = \"differs\"\n#"));
+    assert!(message.contains("this claim is about efficiency"), "{message}");
+    accepted(&format!("faster = {{ {pair}, ratio = 2, cost = \"cpu\" }}\nexpect = \"fails\""));
+    accepted(&format!("not_slower = {{ {pair} }}"));
+}
+
+#[test]
+fn cpu_time_is_compared_pass_for_pass() {
+    let snee = "[[estimator]]\nname = \"snee\"\nsnee = {}\n";
+    let claim = "[[claim]]\nnot_slower = { candidate = \"snee\", baseline = \"mis\", cost = \"cpu\" }\n";
+    let text = format!("{GOOD}{snee}{claim}");
+    good(&text);
+    let message = errors(&text.replace("budget.passes = 16", "budget.cpu_seconds = 1"));
+    assert!(message.contains("CPU time is compared pass for pass"), "{message}");
+    let message = errors(&text.replace("\"snee\"", "\"snee (control)\""));
+    assert!(message.contains("`snee (control)` is the name of a control"), "{message}");
 }

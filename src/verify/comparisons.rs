@@ -1,0 +1,326 @@
+//! The table of efficiencies: every estimator of a cell against the first of the experiment file, by
+//! counters and by CPU time.
+//!
+//! Every ratio is the baseline's over the candidate's: above 1 the candidate is the better. An efficiency is
+//! quoted where the means agree, by the test that an `agree` claim would make, at a level of 1e-3 over the
+//! whole table (Bonferroni); its interval is for the reader, at 95 %. Whether it is resolved is judged as
+//! for claims (`verify::efficiency`). Controls stand in the table as candidates, by CPU time alone.
+
+use super::efficiency::{CONFIDENCE, contest};
+use super::trial::{Evidence, trial};
+use super::weights;
+use crate::results::csv_text::{self, number};
+use crate::results::record::{
+    Against, Bias, Cell, Comparison, CostMeasure, EstimatorRun, Observable, Quantity,
+};
+use crate::results::store::Stored;
+use crate::stats::tree::total;
+
+/// Confidence of the intervals shown.
+pub const SHOWN: f64 = 0.95;
+
+/// The probability that any efficiency of a table is withheld although the means are equal.
+const LEVEL: f64 = 1e-3;
+
+/// One row. Numbers that are not quoted are NaN.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Experiment name.
+    pub experiment: String,
+    /// Cell label.
+    pub cell: String,
+    /// Band name.
+    pub band: String,
+    /// Transport class.
+    pub class: String,
+    /// Observable name; its variance is that of one pass.
+    pub metric: String,
+    /// The estimator that the other is held against.
+    pub baseline: String,
+    /// The other.
+    pub candidate: String,
+    /// Variance times cost of the baseline over that of the candidate.
+    pub efficiency_ratio: f64,
+    /// Lower end of its interval.
+    pub ci_low: f64,
+    /// Upper end.
+    pub ci_high: f64,
+    /// Confidence of the interval.
+    pub confidence: f64,
+    /// Variance of a pass, baseline over candidate.
+    pub variance_ratio: f64,
+    /// CPU time of a pass, baseline over candidate; over the whole run.
+    pub cpu_cost_ratio: f64,
+    /// Rays of a pass, baseline over candidate.
+    pub ray_cost_ratio: f64,
+    /// Is the ratio one that more passes would not move out of its interval, and that no single pass makes?
+    pub resolved: bool,
+    /// What counts as cost.
+    pub cost: CostMeasure,
+    /// Were the two timed side by side? By counters it does not matter.
+    pub side_by_side: bool,
+    /// Kurtosis of a pass of the baseline.
+    pub kurtosis_baseline: f64,
+    /// Kurtosis of a pass of the candidate.
+    pub kurtosis_candidate: f64,
+    /// Why there is no ratio.
+    pub note: String,
+}
+
+/// Columns of `comparisons.csv`.
+pub const COLUMNS: [&str; 20] = [
+    "experiment",
+    "cell",
+    "band",
+    "class",
+    "metric",
+    "baseline",
+    "candidate",
+    "efficiency_ratio",
+    "ci_low",
+    "ci_high",
+    "confidence",
+    "variance_ratio",
+    "cpu_cost_ratio",
+    "ray_cost_ratio",
+    "resolved",
+    "cost",
+    "side_by_side",
+    "kurtosis_baseline",
+    "kurtosis_candidate",
+    "note",
+];
+
+/// The rows as CSV text.
+pub fn to_csv(rows: &[Row]) -> String {
+    csv_text::to_text(&COLUMNS, rows.iter().map(Row::fields))
+}
+
+/// What a row compares.
+struct Subject<'a> {
+    cell: &'a Cell,
+    baseline: (&'a EstimatorRun, Quantity),
+    candidate: (&'a EstimatorRun, Quantity),
+    cost: CostMeasure,
+}
+
+/// All rows of a record: by cell, candidate, class, band, measure.
+pub fn comparisons(stored: &Stored) -> Vec<Row> {
+    let subjects = subjects(stored);
+    // Two measures share one test of the means.
+    let level = 2.0 * LEVEL / subjects.len().max(1) as f64;
+    subjects.iter().map(|subject| row(stored, subject, level)).collect()
+}
+
+fn subjects(stored: &Stored) -> Vec<Subject<'_>> {
+    let mut subjects = Vec::new();
+    for (index, cell) in stored.record.cells.iter().enumerate() {
+        let Some(first) = cell.runs.iter().find(|run| run.control_of.is_none()) else { continue };
+        let others = cell.runs.iter().filter(|run| run.estimator != first.estimator);
+        let own = |run: &&EstimatorRun| run.control_of.as_ref().is_none_or(|of| *of == first.estimator);
+        for run in others.filter(own) {
+            let metric = first.observables.first().map(|o| &o.name);
+            for observable in first.observables.iter().filter(|o| Some(&o.name) == metric) {
+                for band in 0..stored.record.bands.len() {
+                    let quantity = |run: &EstimatorRun| Quantity {
+                        cell: index,
+                        estimator: run.estimator.clone(),
+                        observable: observable.clone(),
+                        band,
+                    };
+                    let arms = [(first, quantity(first)), (run, quantity(run))];
+                    if arms.iter().all(|(_, quantity)| is_silent(stored, quantity)) {
+                        continue;
+                    }
+                    for cost in [CostMeasure::Counters, CostMeasure::Cpu] {
+                        if run.control_of.is_some() && cost == CostMeasure::Counters {
+                            continue;
+                        }
+                        let [baseline, candidate] = arms.clone();
+                        subjects.push(Subject { cell, baseline, candidate, cost });
+                    }
+                }
+            }
+        }
+    }
+    subjects
+}
+
+fn is_silent(stored: &Stored, quantity: &Quantity) -> bool {
+    let all = stored.batches(quantity).and_then(total);
+    all.is_none_or(|all| all.mean == 0.0 && all.m2 == 0.0)
+}
+
+fn row(stored: &Stored, subject: &Subject, level: f64) -> Row {
+    let Subject { cell, baseline, candidate, cost } = subject;
+    let Observable { name, class } = &baseline.1.observable;
+    let mut row = Row {
+        experiment: stored.record.experiment.clone(),
+        cell: cell.label.clone(),
+        band: stored.record.bands[baseline.1.band].name.clone(),
+        class: class.clone(),
+        metric: name.clone(),
+        baseline: baseline.0.estimator.clone(),
+        candidate: candidate.0.estimator.clone(),
+        efficiency_ratio: f64::NAN,
+        ci_low: f64::NAN,
+        ci_high: f64::NAN,
+        confidence: SHOWN,
+        variance_ratio: f64::NAN,
+        cpu_cost_ratio: cpu(stored, cell, baseline.0) / cpu(stored, cell, candidate.0),
+        ray_cost_ratio: rays(stored, baseline.0) / rays(stored, candidate.0),
+        resolved: false,
+        cost: *cost,
+        side_by_side: *cost == CostMeasure::Counters,
+        kurtosis_baseline: f64::NAN,
+        kurtosis_candidate: f64::NAN,
+        note: bias_objection(&[baseline.0, candidate.0])
+            .or_else(|| means_objection(stored, &candidate.1, &baseline.1, level))
+            .unwrap_or_default(),
+    };
+    if !row.note.is_empty() {
+        return row;
+    }
+    let at = |confidence| contest(stored, &candidate.1, &baseline.1, *cost, confidence);
+    match (at(SHOWN), at(CONFIDENCE)) {
+        (Ok(shown), Ok(judged)) => {
+            let efficiency = shown.efficiency;
+            row.efficiency_ratio = efficiency.work.ratio();
+            (row.ci_low, row.ci_high) = efficiency.work.interval();
+            row.variance_ratio = efficiency.variance.ratio();
+            row.resolved = judged.efficiency.resolved;
+            row.side_by_side = shown.side_by_side;
+            (row.kurtosis_baseline, row.kurtosis_candidate) =
+                (efficiency.a.kurtosis, efficiency.b.kurtosis);
+            if !row.resolved {
+                row.note = "not resolved".into();
+            }
+        }
+        (Err(why), _) | (_, Err(why)) => row.note = why,
+    }
+    row
+}
+
+/// A biased estimator's variance is not its error.
+fn bias_objection(runs: &[&EstimatorRun]) -> Option<String> {
+    runs.iter().find_map(|run| match &run.bias {
+        Bias::Biased(why) => Some(format!("{} is biased: {why}", run.estimator)),
+        Bias::Unbiased | Bias::Consistent => None,
+    })
+}
+
+/// Why the two cannot be said to estimate one number.
+fn means_objection(
+    stored: &Stored,
+    candidate: &Quantity,
+    baseline: &Quantity,
+    level: f64,
+) -> Option<String> {
+    let against = Against::Quantity { other: baseline.clone(), paired: false };
+    let comparison =
+        Comparison { claim: usize::MAX, quantity: candidate.clone(), against, detect: None };
+    match trial(stored, 0, &comparison).evidence {
+        Evidence::Test { test, .. } if test.p_value >= level => None,
+        Evidence::Test { test, .. } => Some(format!("the means differ, p = {:.1e}", test.p_value)),
+        Evidence::None(reason) => Some(format!("no mean test: {reason}")),
+        _ => Some("no variance".into()),
+    }
+}
+
+/// CPU time of a pass, seconds; NaN where it was not measured.
+fn cpu(stored: &Stored, cell: &Cell, run: &EstimatorRun) -> f64 {
+    let cost = stored.timing.as_ref().and_then(|timing| timing.of(&cell.label, &run.estimator));
+    cost.and_then(|cost| cost.cpu_seconds_per_pass()).unwrap_or(f64::NAN)
+}
+
+/// Closest-hit and occlusion queries of a pass.
+fn rays(stored: &Stored, run: &EstimatorRun) -> f64 {
+    let count =
+        |name: &str| weights::counter(stored, run, name).map(|batches| batches.iter().sum::<f64>());
+    let all = count("rays").map(|rays| rays + count("shadow_rays").unwrap_or(0.0));
+    all.unwrap_or(f64::NAN) / run.passes as f64
+}
+
+/// What a measure is called in tables.
+pub fn measure_name(measure: CostMeasure) -> &'static str {
+    match measure {
+        CostMeasure::Counters => "counters",
+        CostMeasure::Cpu => "cpu",
+    }
+}
+
+impl Row {
+    fn fields(&self) -> Vec<String> {
+        vec![
+            self.experiment.clone(),
+            self.cell.clone(),
+            self.band.clone(),
+            self.class.clone(),
+            self.metric.clone(),
+            self.baseline.clone(),
+            self.candidate.clone(),
+            number(self.efficiency_ratio),
+            number(self.ci_low),
+            number(self.ci_high),
+            number(self.confidence),
+            number(self.variance_ratio),
+            number(self.cpu_cost_ratio),
+            number(self.ray_cost_ratio),
+            self.resolved.to_string(),
+            measure_name(self.cost).into(),
+            self.side_by_side.to_string(),
+            number(self.kurtosis_baseline),
+            number(self.kurtosis_candidate),
+            self.note.clone(),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::sample::{self, set_gates, uniform};
+
+    #[test]
+    fn every_pair_has_a_row_and_a_reason() {
+        let mut stored = sample::stored(0.1);
+        // `snee` has a quarter of the variance at the same counted cost; no time was measured.
+        set_gates(&mut stored, "snee", |i, o, b| {
+            1.0 + 0.05 * uniform(i + 7000 + (1000 * (2 * o + b)) as u64)
+        });
+        let rows = comparisons(&stored);
+        assert_eq!(rows.len(), 2 * 2 * 2, "classes, bands, measures");
+        let counted: Vec<&Row> = rows.iter().filter(|r| r.cost == CostMeasure::Counters).collect();
+        for row in &counted {
+            assert!(row.resolved, "{row:?}");
+            assert!(row.ci_low < 4.0 && row.ci_high > 4.0 && row.ci_low > 2.0, "{row:?}");
+            assert_eq!((row.ray_cost_ratio, row.baseline.as_str()), (1.0, "mis"));
+        }
+        let timed = rows.iter().find(|r| r.cost == CostMeasure::Cpu).expect("a row");
+        assert!(timed.note.contains("no CPU time") && timed.efficiency_ratio.is_nan(), "{timed:?}");
+        let csv = to_csv(&rows);
+        assert!(csv.starts_with(
+            "experiment,cell,band,class,metric,baseline,candidate,efficiency_ratio,ci_low,ci_high,"
+        ));
+        assert_eq!(csv.lines().count(), 9);
+    }
+
+    #[test]
+    fn nothing_is_quoted_where_the_means_differ() {
+        let mut stored = sample::stored(0.1);
+        set_gates(&mut stored, "snee", |i, _, _| 1.1 + 0.05 * uniform(i + 7000));
+        let rows = comparisons(&stored);
+        assert!(rows.iter().all(|r| r.note.contains("the means differ") && r.efficiency_ratio.is_nan()));
+        assert!(rows.iter().all(|r| r.variance_ratio.is_nan() && !r.resolved));
+    }
+
+    #[test]
+    fn silent_classes_have_no_row() {
+        let mut stored = sample::stored(0.1);
+        for name in ["mis", "snee"] {
+            set_gates(&mut stored, name, |i, o, _| if o == 1 { 0.0 } else { 1.0 + 0.1 * uniform(i) });
+        }
+        let rows = comparisons(&stored);
+        assert!(!rows.is_empty() && rows.iter().all(|r| r.class == "all"));
+    }
+}

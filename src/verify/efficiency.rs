@@ -1,0 +1,320 @@
+//! Claims of efficiency: `faster` and `not_slower`.
+//!
+//! With V the variance of a pass and c its cost (all bands together: what a pass costs, whatever it scores),
+//! the efficiency ratio of a candidate A against a baseline B is E = V_B c_B / (V_A c_A). Both claims say
+//! that E exceeds a bound e: `faster` e = ratio, `not_slower` e = 1 / margin, because the ratio of inverse
+//! efficiencies is 1 / E. ln E has a Student interval from a jackknife over blocks (`stats::efficiency`).
+//!
+//! Before any number is quoted
+//!   the two means agree: the test that an `agree` claim would make. An objection to it voids the claim;
+//!   E is resolved: it moved by no more than its 99.9 % interval when the passes doubled, and no pass may
+//!   hold more than 5 % of an arm's sum of squares;
+//!   by CPU time, the blocks are quadruples played side by side, A B .. B A, and the baseline against its own
+//!   control arm has 1 in the 99.9 % intervals of both E and the cost ratio. Quadruples that warmed a worker
+//!   up or were played in parts are left out whole: which ones they are has nothing to do with the scores.
+//!
+//! Then the claim
+//!   fails, where the p-value 2 min(p_mean, p_slow) is rejected in the family of all tests (Holm), with
+//!   p_mean two-sided for equal means and p_slow one-sided for E >= e (Bonferroni over the two: both are
+//!   true where the claim is). One look: streams anew would be timed under other conditions;
+//!   passes, where it does not fail and the two-sided 99.9 % interval of E lies above e: a claim that E > e
+//!   is false and passes with probability at most 1 in 2000, claim by claim;
+//!   is underpowered otherwise. `detectable` is the smallest shortfall of E below e, relative to e, that
+//!   would have failed with 99 % probability.
+
+use super::judge::POWER;
+use super::trial::{Evidence, Trial};
+use super::verdict::Outcome;
+use super::weights;
+use crate::results::record::{CostMeasure, EstimatorRun, Quantity};
+use crate::results::store::Stored;
+use crate::stats::efficiency::{Block, Efficiency, LogRatio, compare};
+use crate::stats::hypothesis::{Estimate, Test};
+use crate::stats::moments::Moments;
+use crate::stats::tree::Merge;
+
+/// Confidence of the intervals that decide.
+pub const CONFIDENCE: f64 = 0.999;
+
+/// The fewest quadruples that a ratio of CPU times may rest on.
+const LEAST_QUADRUPLES: usize = 16;
+
+/// Two arms at equal cost.
+pub struct Contest {
+    /// Baseline over candidate: above 1 where the candidate is the better.
+    pub efficiency: Efficiency,
+    /// Were they timed side by side? Always so by counters.
+    pub side_by_side: bool,
+}
+
+/// Compares two quantities of a record at `confidence`.
+///
+/// # Errors
+/// As a sentence: something is missing, or the ratio does not exist.
+pub fn contest(
+    stored: &Stored,
+    candidate: &Quantity,
+    baseline: &Quantity,
+    measure: CostMeasure,
+    confidence: f64,
+) -> Result<Contest, String> {
+    let (a, b) = (Side::of(stored, candidate, measure)?, Side::of(stored, baseline, measure)?);
+    let (side_by_side, a, b) = match measure {
+        CostMeasure::Counters => (true, a.blocks(), b.blocks()),
+        CostMeasure::Cpu => {
+            let (a_quadruples, b_quadruples) = quadruples(&a, &b);
+            if a_quadruples.len() >= LEAST_QUADRUPLES {
+                (true, a_quadruples, b_quadruples)
+            } else {
+                (false, a.blocks(), b.blocks())
+            }
+        }
+    };
+    let efficiency = compare(&b, &a, confidence).map_err(|why| why.to_string())?;
+    Ok(Contest { efficiency, side_by_side })
+}
+
+/// The batches of one arm.
+struct Side {
+    batches: Vec<Moments>,
+    costs: Vec<f64>,
+    settled: Vec<bool>,
+}
+
+impl Side {
+    fn of(stored: &Stored, quantity: &Quantity, measure: CostMeasure) -> Result<Side, String> {
+        let name = &quantity.estimator;
+        let missing = || format!("the record does not hold this quantity of {name}");
+        let run = stored.run(quantity).ok_or_else(missing)?;
+        let batches = stored.batches(quantity).ok_or_else(missing)?;
+        let (costs, settled) = match measure {
+            CostMeasure::Counters => {
+                let costs = weights::counted(stored, run)?;
+                let settled = vec![true; costs.len()];
+                (costs, settled)
+            }
+            CostMeasure::Cpu => {
+                let cell = stored.record.cells.get(quantity.cell).map_or("", |cell| &cell.label);
+                let timed = stored.timing.as_ref().and_then(|timing| timing.batches_of(cell, name));
+                let timed = timed.ok_or_else(|| format!("no CPU time of {name} was kept"))?;
+                (timed.cpu_seconds.clone(), timed.settled.clone())
+            }
+        };
+        if costs.len() != batches.len() || settled.len() != batches.len() {
+            return Err(format!("costs of {name} are not of the record's {} batches", batches.len()));
+        }
+        Ok(Side { batches, costs, settled })
+    }
+
+    fn blocks(&self) -> Vec<Block> {
+        let blocks = self.batches.iter().zip(&self.costs);
+        blocks.map(|(&moments, &cost)| Block { moments, cost }).collect()
+    }
+
+    /// Batches 2q and 2q + 1, where both were timed side by side.
+    fn quadruple(&self, q: usize) -> Option<Block> {
+        let (i, j) = (2 * q, 2 * q + 1);
+        let is_settled = self.settled.get(i).zip(self.settled.get(j)) == Some((&true, &true));
+        is_settled.then(|| Block {
+            moments: self.batches[i].merge(self.batches[j]),
+            cost: self.costs[i] + self.costs[j],
+        })
+    }
+}
+
+/// The quadruples of both arms in which both were timed.
+fn quadruples(a: &Side, b: &Side) -> (Vec<Block>, Vec<Block>) {
+    let count = a.batches.len().min(b.batches.len()) / 2;
+    (0..count).filter_map(|q| a.quadruple(q).zip(b.quadruple(q))).unzip()
+}
+
+/// What a claim of efficiency shows.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Shown {
+    /// E with its interval.
+    ratio: LogRatio,
+    /// e.
+    bound: f64,
+    /// Kurtosis of a pass: candidate, baseline.
+    kurtosis: (f64, f64),
+    /// The difference of the means, relative to the larger.
+    difference: Estimate,
+    /// Is it the means that speak against the claim, more than E?
+    blames_means: bool,
+    /// Student's t of ln E - ln e, with the p-value of the claim as a whole.
+    pub test: Test,
+}
+
+/// Turns the trial of the means into that of a claim of efficiency.
+pub(super) fn trial(
+    stored: &Stored,
+    means: Trial,
+    candidate: &Quantity,
+    baseline: &Quantity,
+    (bound, measure): (f64, CostMeasure),
+) -> Trial {
+    let shown = weigh(stored, &means, candidate, baseline, (bound, measure));
+    let mut verdict = means.verdict.clone();
+    verdict.test = match measure {
+        CostMeasure::Counters => "efficiency by counters",
+        CostMeasure::Cpu => "efficiency by CPU time",
+    }
+    .into();
+    (verdict.value, verdict.std_error) = (f64::NAN, f64::NAN);
+    (verdict.expected, verdict.expected_error) = (bound, 0.0);
+    let evidence = match shown {
+        Ok(shown) => {
+            verdict.value = shown.ratio.ratio();
+            verdict.std_error = verdict.value * shown.ratio.log.std_error;
+            Evidence::Efficiency(Box::new(shown))
+        }
+        Err(reason) => Evidence::None(reason),
+    };
+    Trial { evidence, verdict, one_look: true, reference: None, ..means }
+}
+
+fn weigh(
+    stored: &Stored,
+    means: &Trial,
+    candidate: &Quantity,
+    baseline: &Quantity,
+    (bound, measure): (f64, CostMeasure),
+) -> Result<Shown, String> {
+    let (difference, mean_test) = match &means.evidence {
+        Evidence::Test { difference, test } => (difference, test),
+        Evidence::None(reason) => return Err(format!("no mean test: {reason}")),
+        Evidence::Identity { holds: true } => {
+            return Err("no variance: there is nothing to compare".into());
+        }
+        _ => return Err("the means differ, without sampling error".into()),
+    };
+    let contest = contest(stored, candidate, baseline, measure, CONFIDENCE)?;
+    if measure == CostMeasure::Cpu {
+        if !contest.side_by_side {
+            return Err("the arms were not timed side by side".into());
+        }
+        control_objection(stored, baseline).map_or(Ok(()), Err)?;
+    }
+    let efficiency = &contest.efficiency;
+    let kurtosis = (efficiency.b.kurtosis, efficiency.a.kurtosis);
+    if !efficiency.resolved {
+        return Err(format!(
+            "not resolved: ln of the ratio moved by {:.2} when the passes doubled, interval +-{:.2}; one pass may \
+             hold {:.1} % of a variance; kurtosis {:.3} and {:.3}",
+            efficiency.moved,
+            efficiency.work.half_width,
+            100.0 * efficiency.a.largest_pass.1.max(efficiency.b.largest_pass.1),
+            kurtosis.0,
+            kurtosis.1
+        ));
+    }
+    let ratio = efficiency.work;
+    let two_sided = ratio.test(bound);
+    let half = 0.5 * two_sided.p_value;
+    let slow = if two_sided.statistic < 0.0 { half } else { 1.0 - half };
+    let p_value = (2.0 * mean_test.p_value.min(slow)).min(1.0);
+    let scale = means.verdict.value.abs().max(means.verdict.expected.abs());
+    let relative = |x: f64| if scale > 0.0 { x / scale } else { x };
+    Ok(Shown {
+        ratio,
+        bound,
+        kurtosis,
+        difference: Estimate {
+            value: relative(difference.value),
+            std_error: relative(difference.std_error),
+            dof: difference.dof,
+        },
+        blames_means: mean_test.p_value < slow,
+        test: Test { p_value, ..two_sided },
+    })
+}
+
+/// What the baseline against itself says of the machine.
+fn control_objection(stored: &Stored, baseline: &Quantity) -> Option<String> {
+    let runs = &stored.record.cells.get(baseline.cell)?.runs;
+    let is_control = |run: &&EstimatorRun| run.control_of.as_deref() == Some(&*baseline.estimator);
+    let Some(control) = runs.iter().find(is_control) else {
+        return Some(format!("no control: {} was not played twice", baseline.estimator));
+    };
+    let control = Quantity { estimator: control.estimator.clone(), ..baseline.clone() };
+    let contest = match contest(stored, &control, baseline, CostMeasure::Cpu, CONFIDENCE) {
+        Ok(contest) if contest.side_by_side => contest,
+        Ok(_) => return Some("no control: it was not timed side by side".into()),
+        Err(reason) => return Some(format!("no control: {reason}")),
+    };
+    let excludes_one = |ratio: &LogRatio| ratio.log.value.abs() > ratio.half_width;
+    let (cost, work) = (contest.efficiency.cost, contest.efficiency.work);
+    (excludes_one(&cost) || excludes_one(&work)).then(|| {
+        format!(
+            "machine too noisy: {} against itself has {:.3} times the cost and {:.3} times the efficiency, and \
+             1 lies outside of a 99.9 % interval",
+            baseline.estimator,
+            cost.ratio(),
+            work.ratio()
+        )
+    })
+}
+
+impl Shown {
+    /// What it says, where the p-value adjusted over the family is `adjusted_p` and a test fails below
+    /// `level`; `own_level` is the level of this test alone. A control that expects failure wants it of E.
+    pub(super) fn outcome(
+        &self,
+        adjusted_p: f64,
+        (level, own_level): (f64, f64),
+        detect: Option<f64>,
+        fails: bool,
+    ) -> Outcome {
+        match adjusted_p {
+            p if p.is_nan() => Outcome::Invalid("the test has no p-value".into()),
+            p if p < level && fails && self.blames_means => {
+                Outcome::Invalid(format!("the means differ by {:+.2} %", 100.0 * self.difference.value))
+            }
+            p if p < level => Outcome::Fail,
+            _ if self.ratio.interval().0 <= self.bound => Outcome::Underpowered,
+            _ if detect.is_some_and(|d| self.unseen(own_level) > d) => Outcome::Underpowered,
+            _ => Outcome::Pass,
+        }
+    }
+
+    /// The relative difference of the means that could have gone unseen.
+    fn unseen(&self, own_level: f64) -> f64 {
+        self.difference.detectable(own_level, POWER)
+    }
+
+    /// The smallest shortfall of E below e, relative to e, that would have failed: 1 - exp(-d) with d that of
+    /// ln E. The p-value is twice the one-sided one, so that its level is that of a two-sided test.
+    pub(super) fn detectable(&self, own_level: f64) -> f64 {
+        let log = Estimate::known(-self.ratio.log.detectable(own_level, POWER), 0.0);
+        1.0 - LogRatio { log, half_width: 0.0 }.ratio()
+    }
+
+    /// The reason for an outcome.
+    pub(super) fn note(&self, found: &Outcome, own_level: f64) -> String {
+        let (low, high) = self.ratio.interval();
+        let numbers = format!(
+            "{:.3} times the efficiency, 99.9 % interval {low:.3} to {high:.3}; kurtosis {:.1} and {:.1}",
+            self.ratio.ratio(),
+            self.kurtosis.0,
+            self.kurtosis.1
+        );
+        match found {
+            Outcome::Invalid(reason) => reason.clone(),
+            Outcome::Fail if self.blames_means => {
+                format!("the means differ by {:+.2} %", 100.0 * self.difference.value)
+            }
+            Outcome::Underpowered if low <= self.bound => {
+                format!("not shown to exceed {:.3}: {numbers}", self.bound)
+            }
+            Outcome::Underpowered => format!(
+                "a difference of the means of {:.1} % could have gone unseen; {numbers}",
+                100.0 * self.unseen(own_level)
+            ),
+            _ => format!("{numbers}; means agree within {:.1} %", 100.0 * self.unseen(own_level)),
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "efficiency_tests.rs"]
+mod tests;

@@ -1,0 +1,208 @@
+//! Every rule of claims of efficiency seen to pass, and to catch a planted defect.
+
+use serde_json::json;
+
+use super::super::judge::judge_alone;
+use super::super::verdict::Verdict;
+use super::*;
+use crate::results::record::{Against, Bias, Comparison};
+use crate::results::sample::{quantity, set_gates, stored, uniform};
+use crate::results::store::gates_path;
+use crate::results::timing::{Batches, Timing};
+
+const BATCHES: usize = 64;
+
+/// Both estimators score 1 with this standard deviation, on numbers of their own.
+fn scored(mis: f64, snee: f64) -> Stored {
+    let mut s = stored(0.1);
+    set_gates(&mut s, "mis", |i, o, b| 1.0 + mis * uniform(i + (1000 * (2 * o + b)) as u64));
+    set_gates(&mut s, "snee", |i, o, b| 1.0 + snee * uniform(i + (9000 + 1000 * (2 * o + b)) as u64));
+    s
+}
+
+/// A claim that `snee` is more than `bound` times as efficient as `mis`, judged.
+fn claimed(mut s: Stored, bound: f64, cost: CostMeasure, expect: Option<&str>) -> Verdict {
+    s.record.claims = json!([{"name": "c", "expect": expect, "faster": {}}]);
+    let against = Against::Efficiency { baseline: quantity("mis", 0), exceeds: bound, cost };
+    s.record.comparisons =
+        vec![Comparison { claim: 0, quantity: quantity("snee", 0), against, detect: None }];
+    let mut verdicts = judge_alone(&s);
+    assert_eq!(verdicts.len(), 1);
+    verdicts.remove(0)
+}
+
+fn by_counters(s: Stored, bound: f64) -> Verdict {
+    claimed(s, bound, CostMeasure::Counters, None)
+}
+
+#[track_caller]
+fn assert_invalid(v: &Verdict, what: &str) {
+    assert!(matches!(&v.outcome, Outcome::Invalid(why) if why.contains(what)), "{v:?}");
+}
+
+/// `snee` has a quarter of the variance, at equal counts: the ratio is 4.
+#[test]
+fn a_claim_of_speed_has_three_outcomes() {
+    let pass = by_counters(scored(0.1, 0.05), 1.5);
+    assert_eq!(pass.outcome, Outcome::Pass, "{pass:?}");
+    assert!((pass.value / 4.0 - 1.0).abs() < 0.2 && pass.note.contains("kurtosis 1."), "{pass:?}");
+    assert!(pass.detectable > 0.0 && pass.detectable < 1.0, "{}", pass.detectable);
+    let open = by_counters(scored(0.1, 0.05), 4.0);
+    assert_eq!(open.outcome, Outcome::Underpowered, "{open:?}");
+    assert!(open.note.starts_with("not shown to exceed 4.000"), "{}", open.note);
+    let fail = by_counters(scored(0.1, 0.05), 20.0);
+    assert_eq!(fail.outcome, Outcome::Fail, "{fail:?}");
+    assert!(fail.statistic < -5.0 && fail.p_value < 1e-6, "{fail:?}");
+}
+
+#[test]
+fn controls_expect_failure_of_the_efficiency_alone() {
+    let fails = |s| claimed(s, 20.0, CostMeasure::Counters, Some("fails"));
+    assert_eq!(fails(scored(0.1, 0.05)).outcome, Outcome::Pass);
+    assert_eq!(
+        claimed(scored(0.1, 0.05), 1.5, CostMeasure::Counters, Some("fails")).outcome,
+        Outcome::Fail
+    );
+    let mut differing = scored(0.1, 0.05);
+    set_gates(&mut differing, "snee", |i, _, _| 1.2 + 0.05 * uniform(i + 9000));
+    // With a smaller bound, the means speak louder than the efficiency.
+    assert_invalid(
+        &claimed(differing, 4.0, CostMeasure::Counters, Some("fails")),
+        "the means differ by +",
+    );
+}
+
+#[test]
+fn energy_that_is_missing_is_no_efficiency() {
+    let mut s = scored(0.1, 0.05);
+    set_gates(&mut s, "snee", |i, _, _| 0.9 + 0.05 * uniform(i + 9000));
+    let v = by_counters(s, 1.5);
+    assert_eq!(v.outcome, Outcome::Fail);
+    assert!(v.note.starts_with("the means differ by -10"), "{}", v.note);
+}
+
+#[test]
+fn what_an_efficiency_cannot_rest_on_is_invalid() {
+    let mut biased = scored(0.1, 0.05);
+    biased.record.cells[0].runs[1].bias = Bias::Biased("a cut".into());
+    assert_invalid(&by_counters(biased, 1.5), "no mean test: snee is biased");
+
+    let mut exact = scored(0.1, 0.05);
+    set_gates(&mut exact, "snee", |_, _, _| 1.0);
+    assert_invalid(&by_counters(exact, 1.5), "no variance");
+
+    let mut anomalous = scored(0.1, 0.05);
+    anomalous.record.cells[0].runs[1].anomalies.insert("nonfinite".into(), 1);
+    assert_invalid(&by_counters(anomalous, 1.5), "no mean test: snee counted 1");
+
+    let mut absent = scored(0.1, 0.05);
+    absent.record.cells[0].runs.remove(0);
+    assert_invalid(&by_counters(absent, 1.5), "does not hold this quantity");
+
+    let mut uncounted = scored(0.1, 0.05);
+    let path = uncounted.record.cells[0].runs[0].costs.clone();
+    uncounted.arrays.remove(&path);
+    assert_invalid(&by_counters(uncounted, 1.5), "no counts of work by batch");
+}
+
+/// A symmetric tail, so that the mean test has no objection: four passes of 256 make the variance.
+#[test]
+fn a_variance_that_few_passes_make_is_not_resolved() {
+    let mut s = scored(0.1, 0.05);
+    set_gates(&mut s, "snee", |i, _, _| match (i % 64, (i / 64) % 2) {
+        (5, 0) => 4.0,
+        (5, _) => -2.0,
+        _ => 1.0 + 0.05 * uniform(i + 9000),
+    });
+    assert_invalid(&by_counters(s, 0.001), "not resolved");
+}
+
+/// Counters doubled halve the efficiency: a planted defect that the claim sees.
+#[test]
+fn doubled_counters_turn_the_claim_red() {
+    let mut s = scored(0.1, 0.05);
+    let path = s.record.cells[0].runs[1].costs.clone();
+    s.arrays.get_mut(&path).expect("costs").data.iter_mut().for_each(|n| *n *= 2.0);
+    let v = by_counters(s, 3.0);
+    assert!((v.value / 2.0 - 1.0).abs() < 0.2, "{}", v.value);
+    assert_ne!(v.outcome, Outcome::Pass);
+    assert_eq!(by_counters(scored(0.1, 0.05), 3.0).outcome, Outcome::Pass);
+}
+
+/// CPU seconds of a batch, by estimator and batch; the control is `mis (control)`.
+fn timed(mut s: Stored, seconds: impl Fn(&str, usize) -> f64) -> Stored {
+    let mut control = s.record.cells[0].runs[0].clone();
+    control.estimator = "mis (control)".into();
+    control.control_of = Some("mis".into());
+    control.gates = gates_path(0, "mis (control)");
+    s.record.cells[0].runs.push(control);
+    set_gates(&mut s, "mis (control)", |i, o, b| {
+        1.0 + 0.1 * uniform(i + (50_000 + 1000 * (2 * o + b)) as u64)
+    });
+    let mut timing = Timing::default();
+    for name in ["mis", "snee", "mis (control)"] {
+        let batches = Batches {
+            processes: 1,
+            cpu_seconds: (0..BATCHES).map(|batch| seconds(name, batch)).collect(),
+            // The first quadruple warms up.
+            settled: (0..BATCHES).map(|batch| batch > 1).collect(),
+        };
+        timing.set_batches("smooth", name, batches);
+    }
+    s.timing = Some(timing);
+    s
+}
+
+/// Noise of 2 % on top of 1 s.
+fn noisy(name: &str, batch: usize) -> f64 {
+    1.0 + 0.02 * uniform((1000 * name.len() + batch) as u64)
+}
+
+fn by_cpu(s: Stored, bound: f64) -> Verdict {
+    claimed(s, bound, CostMeasure::Cpu, None)
+}
+
+#[test]
+fn cpu_time_counts_where_the_machine_is_quiet() {
+    let quiet = timed(scored(0.1, 0.05), noisy);
+    assert_eq!(by_cpu(quiet, 1.5).outcome, Outcome::Pass);
+    // What warms up has no say, whatever it took.
+    let cold = timed(scored(0.1, 0.05), |name, batch| if batch < 2 { 50.0 } else { noisy(name, batch) });
+    assert_eq!(by_cpu(cold, 1.5).outcome, Outcome::Pass);
+    // Twice the time is half of the efficiency.
+    let slow = timed(scored(0.1, 0.05), |name, batch| {
+        noisy(name, batch) * if name == "snee" { 2.0 } else { 1.0 }
+    });
+    let v = by_cpu(slow, 1.5);
+    assert!((v.value / 2.0 - 1.0).abs() < 0.2, "{}", v.value);
+}
+
+/// The timer also counts the time of the arm before: the control, which follows another arm, differs.
+#[test]
+fn a_timer_that_counts_another_arms_time_is_found() {
+    let cost = |name: &str| if name == "snee" { 0.3 } else { 1.0 };
+    let leaking = timed(scored(0.1, 0.05), |name, batch| {
+        // A B C, C B A: before the control stands `snee`, before `mis` another `mis`.
+        let before = if name == "mis (control)" { cost("snee") } else { cost("mis") };
+        cost(name) * noisy(name, batch) + before
+    });
+    assert_invalid(&by_cpu(leaking, 1.5), "machine too noisy");
+}
+
+#[test]
+fn cpu_time_needs_its_conditions() {
+    let mut without = timed(scored(0.1, 0.05), noisy);
+    without.record.cells[0].runs.pop();
+    assert_invalid(&by_cpu(without, 1.5), "no control: mis was not played twice");
+
+    let mut apart = timed(scored(0.1, 0.05), noisy);
+    let timing = apart.timing.as_mut().expect("a timing");
+    let batches = timing.batches.get_mut("smooth").expect("a cell").get_mut("snee").expect("an arm");
+    batches.settled = vec![false; BATCHES];
+    assert_invalid(&by_cpu(apart, 1.5), "not timed side by side");
+
+    assert_invalid(&by_cpu(scored(0.1, 0.05), 1.5), "no CPU time");
+
+    let zero = timed(scored(0.1, 0.05), |_, _| 0.0);
+    assert_invalid(&by_cpu(zero, 1.5), "not finite, or a cost is not positive");
+}

@@ -1,0 +1,129 @@
+//! Work and time by batch, rivals side by side, and what both make of claims of efficiency.
+
+use scatterproof::results::store::{RecordFolder, Stored};
+use scatterproof::verify::weights::{DRIFT_LIMIT, WEIGHTS, counter, drift, fit, timed};
+use serde_json::Value;
+
+use super::work::{IMAGE, Work, probe, replaced, same};
+
+/// A claim by CPU time, so that both estimators are played side by side and `mis` twice.
+const BY_TIME: &str =
+    "[[claim]]\nfaster = { candidate = \"analog\", baseline = \"mis\", cost = \"cpu\" }\n";
+
+fn stored(work: &Work, out: &str) -> Stored {
+    RecordFolder::new(work.path(&format!("{out}/x"))).read().expect("a record")
+}
+
+/// 300 passes: 75 batches of 4.
+fn three_hundred(text: &str) -> String {
+    replaced(text, "passes = 100", "passes = 300")
+}
+
+#[test]
+fn work_and_time_by_batch_sum_to_their_totals() {
+    let work = Work::with(&(three_hundred(&probe()) + BY_TIME));
+    work.run("run x.toml -q --threads 2").exits(0);
+    let stored = stored(&work, "results");
+    let timing = stored.timing.as_ref().expect("a timing");
+    let runs = &stored.record.cells[0].runs;
+    let names: Vec<&str> = runs.iter().map(|run| run.estimator.as_str()).collect();
+    assert_eq!(names, ["mis", "mis (control)", "analog"]);
+    assert_eq!(runs[1].control_of.as_deref(), Some("mis"));
+    for run in runs {
+        for (name, total) in &run.cost {
+            let batches = counter(&stored, run, name).expect("counts");
+            assert_eq!(batches.len(), 75);
+            assert_eq!(batches.iter().sum::<f64>(), *total as f64, "{name} of {}", run.estimator);
+        }
+        let label = &stored.record.cells[0].label;
+        let batches = timing.batches_of(label, &run.estimator).expect("times");
+        let total = timing.of(label, &run.estimator).expect("a cost").cpu_seconds;
+        let sum: f64 = batches.cpu_seconds.iter().sum();
+        assert!((sum / total - 1.0).abs() < 1e-9, "{sum} of {total} s");
+        assert_eq!((batches.processes, batches.cpu_seconds.len()), (1, 75));
+        // Each worker warms up with one quadruple; the last batch has no partner.
+        let settled = batches.settled.iter().filter(|settled| **settled).count();
+        assert!((70..=72).contains(&settled) && !batches.settled[74], "{:?}", batches.settled);
+    }
+}
+
+#[test]
+fn playing_rivals_side_by_side_changes_no_byte() {
+    for text in [IMAGE.to_string(), probe()] {
+        let text = three_hundred(&text);
+        let alone = Work::with(&text);
+        alone.run("run x.toml -q").exits(0);
+        let alone = alone.record("results");
+        let work = Work::with(&(text.clone() + BY_TIME));
+        work.run("run x.toml -q --threads 1").exits(0);
+        let first = work.record("results");
+        for name in ["mis", "analog"] {
+            for kind in ["gates", "costs"] {
+                let path = format!("cells/000/{name}.{kind}.npy");
+                assert!(first[&path] == alone[&path], "{path} is another than without a rival");
+            }
+        }
+        assert!(first["cells/000/mis.gates.npy"] != first["cells/000/mis (control).gates.npy"]);
+        for options in ["--threads 2", "--threads 7", "--threads 2 --block-passes 5"] {
+            work.run(&format!("run x.toml -q --out other {options}")).exits(0);
+            same(&first, &work.record("other"), options);
+            std::fs::remove_dir_all(work.path("other")).expect("removed");
+        }
+    }
+}
+
+#[test]
+fn rivals_that_were_interrupted_go_on_to_the_same_bytes() {
+    let text = replaced(IMAGE, "passes = 100", "passes = 3000") + BY_TIME;
+    let work = Work::with(&text);
+    work.run("run x.toml -q --out whole").exits(0);
+    let whole = work.record("whole");
+    // How far it gets is the machine's affair.
+    for after in [200, 400, 800, 1600] {
+        let _ = std::fs::remove_dir_all(work.path("results"));
+        let program = work.start("run x.toml -q --threads 2");
+        std::thread::sleep(std::time::Duration::from_millis(after));
+        program.signal("INT");
+        if program.end().code() != Some(130) {
+            continue;
+        }
+        let states = work.files("results/x/state").len();
+        work.run("run x.toml -q --threads 1").exits(0);
+        same(&work.record("results"), &whole, "after Ctrl-C");
+        if states == 3 {
+            let timing: Value = serde_json::from_str(&work.read("results/x/timing.json")).expect("JSON");
+            let batches = &timing["batches"]["base"];
+            let processes: Vec<u64> = ["mis", "mis (control)", "analog"]
+                .iter()
+                .map(|name| batches[*name]["processes"].as_u64().expect("a number"))
+                .collect();
+            assert_eq!(processes, [2, 2, 2], "{timing}");
+            return;
+        }
+    }
+    panic!("it was never interrupted in the middle");
+}
+
+/// Prints the weights that CPU time on this machine asks for, and fails where those of the program are off.
+#[test]
+#[ignore = "measures CPU time: for the night"]
+fn cpu_time_follows_the_counters() {
+    let experiments = concat!(env!("CARGO_MANIFEST_DIR"), "/experiments/compare/nine-cells.toml");
+    let mut runs = Vec::new();
+    for albedo in ["0.99", "0.8", "0.3"] {
+        let work = Work::new();
+        let set = format!("--set name=x --set object.medium.coefficients.albedo={albedo}");
+        work.run(&format!("run {experiments} -q --threads 1 {set}")).exits(0);
+        runs.extend(timed(&stored(&work, "results")));
+    }
+    for ((name, weight), fitted) in WEIGHTS.iter().zip(fit(&runs)) {
+        println!("{name:>16} {weight:6} ns, fitted {fitted:7.1} ns");
+    }
+    for run in &runs {
+        let predicted: f64 = fit(&runs).iter().zip(run.counts).map(|(w, n)| w * n).sum();
+        println!("{:?} {:.3} of the time", run.counts, predicted / run.nanoseconds);
+    }
+    let drift = drift(&runs).expect("27 runs");
+    println!("drift {:.1} %", 100.0 * drift);
+    assert!(drift < DRIFT_LIMIT, "the weights are off by {:.1} %", 100.0 * drift);
+}
