@@ -118,10 +118,9 @@ fn least_squares(runs: &[Timed], free: &[usize]) -> Vec<f64> {
     // Gauss-Jordan; the matrix is positive definite, so no pivot is sought.
     for i in 0..size {
         let pivot = rows[i].clone();
-        for (j, row) in rows.iter_mut().enumerate().filter(|(j, _)| *j != i) {
+        for (_, row) in rows.iter_mut().enumerate().filter(|(j, _)| *j != i) {
             let factor = row[i] / pivot[i];
             row.iter_mut().zip(&pivot).for_each(|(a, b)| *a -= factor * b);
-            debug_assert!(j < size);
         }
     }
     (0..size).map(|i| rows[i][size] / rows[i][i]).collect()
