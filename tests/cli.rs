@@ -27,7 +27,7 @@ fn words_and_types() {
     let help = "did you mean `radius_mm`?";
     bad("{ radius_mm", "{ radius_m", &["unknown key `radius_m`", "x.toml:4:25", help]);
     bad("seed", "sead", &["unknown key `sead`", "x.toml:2:1", "did you mean `seed`?"]);
-    bad("seed = 7\n", "", &["missing key `seed`", "Root of all random streams."]);
+    bad("budget.passes = 100\n", "", &["missing key `budget`", "How much work"]);
     bad(
         "mm = 1.0",
         "mm = \"one\"",

@@ -264,14 +264,14 @@ fn toml_text(text: &str) -> String {
 
 fn write_files(args: &Args, verdicts: &[Verdict]) -> Result<()> {
     let files = [
-        (&args.junit, junit::to_junit(verdicts)),
-        (&args.csv, verdict::to_csv(verdicts)),
-        (&args.json, verdict::to_json(verdicts)),
-        (&args.markdown, verdict_table(verdicts).to_markdown()),
+        (&args.junit, "write the JUnit file", junit::to_junit(verdicts)),
+        (&args.csv, "write the CSV file", verdict::to_csv(verdicts)),
+        (&args.json, "write the JSON file", verdict::to_json(verdicts)),
+        (&args.markdown, "write the Markdown file", verdict_table(verdicts).to_markdown()),
     ];
-    for (path, text) in files {
+    for (path, doing, text) in files {
         if let Some(path) = path {
-            atomic::write(path, text.as_bytes(), "write the verdicts")?;
+            atomic::write(path, text.as_bytes(), doing)?;
         }
     }
     Ok(())

@@ -74,8 +74,8 @@ fn truncated_json() {
 #[test]
 fn another_version() {
     let (_temp, folder, _) = written();
-    tamper(&folder, "\"schema_version\": 1", "\"schema_version\": 7", false);
-    refused(&folder, &["schema version 7", "reads 1"]);
+    tamper(&folder, "\"schema_version\": 2", "\"schema_version\": 7", false);
+    refused(&folder, &["schema version 7", "reads 2"]);
 }
 
 #[test]

@@ -36,7 +36,7 @@ fn wrong_types_are_named() {
 fn missing_keys_are_named_at_their_table() {
     let message = refused("radius_mm = 1.0", "");
     holds(&message, "missing key `object.shape.sphere.radius_mm`", "4:23", "`radius_mm`: Radius, mm.");
-    holds(&refused("name = \"t\"\n", ""), "missing key `name`", "1:1", "Name of the experiment");
+    holds(&refused("name = \"good\"\n", ""), "missing key `name`", "1:1", "Name of the experiment");
     holds(&refused("name = \"mis\"\n", ""), "missing key `estimator.0.name`", "11:1", "");
     let message = refused("object.boundary.smooth = { eta = 1.3 }\n", "");
     holds(&message, "missing key `object.boundary`", "4:1", "");
