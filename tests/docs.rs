@@ -304,6 +304,26 @@ fn wrong(work: &Work, command: &str) -> Option<String> {
     (ran.code() != Some(0)).then(|| ran.stderr())
 }
 
+/// The streams of the project's own verification are named by what they test: nobody picks a seed.
+#[test]
+fn verification_has_no_literal_seed() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut seen = 0;
+    for folder in ["experiments/verify", "tests/power"] {
+        for entry in std::fs::read_dir(root.join(folder)).expect(folder) {
+            let path = entry.expect("an entry").path();
+            if path.extension().is_some_and(|e| e == "toml") {
+                let text = std::fs::read_to_string(&path).expect("a text");
+                let seed =
+                    text.lines().find(|l| l.trim_start().starts_with("seed") || l.contains("fresh ="));
+                assert!(seed.is_none(), "{}: {seed:?}", path.display());
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen > 12, "{seen} files");
+}
+
 #[test]
 fn every_command_exists() {
     let work = Work::new();

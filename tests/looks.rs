@@ -65,6 +65,30 @@ fn a_second_look_is_played_and_decides() {
 }
 
 #[test]
+fn controls_and_each_class() {
+    let analog = "[[estimator]]\nname = \"analog\"\npath = { roulette = { analog = {} } }\n";
+    let sweep = "[[sweep]]\nkey = \"object.medium.coefficients.albedo\"\nvalues = [0.9, 0.8]\n";
+    let claimed = |claim: &str| {
+        let text = replaced(&grey(), "passes = 1024", "passes = 4096");
+        let work = Work::with(&format!("{text}{analog}{sweep}[[claim]]\n{claim}\n"));
+        work.run("verify x.toml -q --verbose")
+    };
+    // Absorption matters; the way to end a path does not, and a control that says so is red.
+    let found = claimed("differs = { estimators = [\"mis\"], across = \"albedo\" }");
+    found.exits(0).says("control, expects a difference");
+    let same = claimed("differs = { estimators = [\"mis\", \"analog\"] }");
+    same.exits(1).says("no difference found");
+    let twice = "expect = \"differs\"\ndiffers = { estimators = [\"mis\", \"analog\"] }";
+    claimed(twice).exits(2).complains("`differs` says what is expected already");
+    // Each class and their sum; the power is relative to the sum.
+    let each = claimed("agree = { estimators = [\"mis\", \"analog\"], class = \"each\", detect = 0.2 }");
+    for class in ["all", "surface", "single ", "single_internal", "multiple ", "multiple_internal"] {
+        each.says(class);
+    }
+    each.exits(0).says("12 of 12 verdicts are green");
+}
+
+#[test]
 fn records_come_out_again() {
     let claim = |more: &str| format!("{}[[claim]]\nreproduces = {{ passes = 50{more} }}\n", grey());
     let work = Work::with(&claim(""));

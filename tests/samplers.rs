@@ -17,7 +17,7 @@ use scatterproof::run::{Options, samplers};
 use scatterproof::samplers::phase::HenyeyGreensteinSampler;
 use scatterproof::samplers::{Axis, Contrast, Discrete, Draw, Null, Piece, Sampler};
 use scatterproof::sampling::stream::Stream;
-use scatterproof::verify::judge::judge_alone;
+use scatterproof::verify::judge::{Case, Judgement, Looks, Measured, judge, judge_alone};
 use scatterproof::verify::verdict::{Outcome, Verdict};
 use serde_json::{Value, json};
 
@@ -415,6 +415,40 @@ fn a_second_look_has_streams_of_its_own_and_more_draws() {
     );
     assert_ne!(run.deltas[0].observed, 4 * main.record.samplers[1].deltas[0].observed);
     assert_eq!(red(&judge_alone(&again)), Vec::<String>::new());
+}
+
+#[test]
+fn the_second_look_decides_what_the_first_cannot() {
+    let look = |error: f64| {
+        let made = experiment("looks", 20_000, &[("hg", "phase", json!({ "g": 0.7, "error": error }))]);
+        let folder = tempfile::tempdir().expect("a folder");
+        let (options, interrupt) = (options(folder.path(), 2), Interrupt::default());
+        let (_, main) = samplers::run(&made, &registry(), &options, &interrupt).expect("a record");
+        let names = BTreeSet::from(["hg".to_string()]);
+        let again = samplers::retest(&made, &registry(), &options, &interrupt, &names, 4);
+        (main, again.expect("a record"))
+    };
+    let (_, sound) = look(0.0);
+    let judged = |main: &Stored, retest: Option<&Stored>| judge(&[Case { main, retest }], Looks::Two);
+    // Growing defects: one of them has its first look between the two levels.
+    let errors = (1..40).map(|i| 0.01 * f64::from(i));
+    let found = errors.map(look).find(|(main, _)| !judged(main, None).wanted.is_empty());
+    let (main, again) = found.expect("a defect between the levels");
+    let waiting = judged(&main, None);
+    assert_eq!(waiting.wanted[0].subject, Measured::Sampler("hg".into()));
+    let row = |judgement: &Judgement, test: &str| find(&judgement.verdicts, test).clone();
+    let test = waiting
+        .verdicts
+        .iter()
+        .find(|v| v.note.contains("wants a second look"))
+        .expect("one")
+        .test
+        .clone();
+    assert_eq!(row(&waiting, &test).outcome, Outcome::Fail);
+    let confirmed = judged(&main, Some(&again));
+    assert!(row(&confirmed, &test).note.ends_with("at both looks"), "{:?}", row(&confirmed, &test));
+    let cleared = judged(&main, Some(&sound));
+    assert!(row(&cleared, &test).is_green() && cleared.wanted.is_empty(), "{:?}", row(&cleared, &test));
 }
 
 #[test]

@@ -29,6 +29,8 @@ mod page;
 pub mod table;
 /// For the terminal.
 pub mod terminal;
+/// How the tests were tested.
+mod trust;
 
 /// Everything that a report is made from.
 pub struct Material {

@@ -21,6 +21,9 @@ pub(super) fn page(material: &Material) -> Document {
     } else {
         blocks.extend(samplers(material));
     }
+    if !material.verdicts.is_empty() {
+        blocks.extend(super::trust::blocks());
+    }
     blocks.extend(origin(material));
     Document { title: material.stored.record.experiment.clone(), blocks }
 }

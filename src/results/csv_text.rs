@@ -24,6 +24,14 @@ pub fn optional(x: Option<f64>) -> String {
     x.map(number).unwrap_or_default()
 }
 
+/// The rows of a CSV text, its header among them; rows after a malformed one are left out.
+pub fn rows(text: &str) -> Vec<Vec<String>> {
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+    let fields = |record: csv::StringRecord| record.iter().map(String::from).collect();
+    reader.records().map_while(Result::ok).map(fields).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,8 +6,8 @@
 //! and applications", Annals of Statistics 49(3), 2021, the calibrator kappa = 1/2). Nights are
 //! independent, so the product over nights is a non-negative supermartingale of expectation at most 1, and
 //! by Ville's inequality it ever reaches 1/level with probability at most `level`, however often one looks.
-//! With m tests, each at level [`LIFE_LEVEL`] / m, any false alarm in the whole life of a program has
-//! probability at most [`LIFE_LEVEL`]. The product starts again where what fixes the numbers changes.
+//! With m tests, each at level `LIFE_LEVEL` / m, any false alarm in the whole life of a program has
+//! probability at most `LIFE_LEVEL`. The product starts again where what fixes the numbers changes.
 
 use std::collections::BTreeMap;
 
