@@ -125,7 +125,12 @@ pub fn verdict_table(verdicts: &[Verdict]) -> Table {
     ]);
     for v in verdicts {
         let number = |value: f64, error: f64| {
-            if value.is_nan() { String::new() } else { with_error(value, error) }
+            match value.is_nan() {
+                true => String::new(),
+                // Exact, or without an error of its own.
+                false if error == 0.0 || error.is_nan() => significant(value, 6),
+                false => with_error(value, error),
+            }
         };
         // Relative to the expected value; absolute where that is 0.
         let detectable =
