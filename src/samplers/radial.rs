@@ -1,11 +1,11 @@
 //! Points of a plane by the radial profiles of subsurface scattering.
 //!
-//! Chart: r = l x / (1 - x) with a length l of the profile's own size, or r = r_max x in a disc; azimuth in
-//! turns. dA = 2 pi r dr per turn.
+//! Chart: x = l / (l + r) with a length l of the profile's own size, or r = r_max x in a disc; azimuth in
+//! turns. dA = 2 pi r dr per turn. The far tail lies at x = 0, where numbers are dense: a profile without
+//! absorption draws r = 1e7 l once in 1e7, and 1 - x would keep half of its digits.
 
 use std::f64::consts::TAU;
 
-use super::distance::Unbounded;
 use super::{Axis, Contrast, Draw, Piece, Sampler, turns};
 use crate::math::exp;
 use crate::sampling::radial::{Dipole, Radial};
@@ -19,22 +19,23 @@ pub struct RadialSampler {
 
 #[derive(Clone, Copy)]
 enum Chart {
-    Plane(Unbounded),
+    /// The whole plane; l.
+    Plane(f64),
     Disc(f64),
 }
 
 impl Chart {
     fn coordinate(self, r: f64) -> f64 {
         match self {
-            Chart::Plane(lengths) => lengths.coordinate(r),
+            Chart::Plane(l) => l / (l + r),
             Chart::Disc(r_max) => r / r_max,
         }
     }
 
-    /// r and dr/dx.
+    /// r and |dr/dx|; nothing at infinity.
     fn at(self, x: f64) -> Option<(f64, f64)> {
         match self {
-            Chart::Plane(lengths) => lengths.at(x),
+            Chart::Plane(l) => (x > 0.0).then(|| (l * (1.0 - x) / x, l / (x * x))),
             Chart::Disc(r_max) => Some((r_max * x, r_max)),
         }
     }
@@ -44,13 +45,13 @@ impl RadialSampler {
     /// For this profile.
     pub fn new(code: Radial) -> RadialSampler {
         let chart = match code {
-            Radial::Exponential { sigma } => Chart::Plane(Unbounded(1.0 / sigma)),
+            Radial::Exponential { sigma } => Chart::Plane(1.0 / sigma),
             Radial::Gaussian { r_max, .. } if r_max.is_finite() => Chart::Disc(r_max),
-            Radial::Gaussian { variance, .. } => Chart::Plane(Unbounded(variance.sqrt())),
-            Radial::NormalizedDiffusion { d } => Chart::Plane(Unbounded(2.0 * d)),
+            Radial::Gaussian { variance, .. } => Chart::Plane(variance.sqrt()),
+            Radial::NormalizedDiffusion { d } => Chart::Plane(2.0 * d),
             // A strongly absorbing layer narrows the profile from z to sqrt(z / sigma_tr).
             Radial::Dipole(Dipole { sigma_tr, z_real, .. }) => {
-                Chart::Plane(Unbounded(z_real / (1.0 + sigma_tr * z_real).sqrt()))
+                Chart::Plane(z_real / (1.0 + sigma_tr * z_real).sqrt())
             }
         };
         RadialSampler { code, chart }
