@@ -37,13 +37,6 @@ pub fn brdf(w: f64, mu0: f64, mu: f64) -> Integral {
     }
 }
 
-/// Reflected share of light that comes at cosine `mu0`: 1 - sqrt(1 - w) H(mu0), with its error.
-pub fn directional_albedo(w: f64, mu0: f64) -> Integral {
-    let h = h(w, mu0);
-    let root = (1.0 - w).sqrt();
-    Integral { value: 1.0 - root * h.value, error: root * h.error }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

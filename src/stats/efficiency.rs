@@ -77,6 +77,11 @@ pub struct LogRatio {
 }
 
 impl LogRatio {
+    /// From the logarithm with its error, for two-sided intervals of this confidence.
+    pub fn new(log: Estimate, confidence: f64) -> LogRatio {
+        LogRatio { log, half_width: critical_value(1.0 - confidence, log.dof) * log.std_error }
+    }
+
     /// The ratio itself.
     pub fn ratio(&self) -> f64 {
         exp(self.log.value)
@@ -291,8 +296,21 @@ impl Jackknife {
         } else {
             alone(a).minus(&alone(b))
         };
-        LogRatio { log, half_width: critical_value(1.0 - confidence, log.dof) * log.std_error }
+        LogRatio::new(log, confidence)
     }
+}
+
+/// The delete-one jackknife's standard error of a positive estimate's logarithm: from the estimates
+/// that leave one block out each, se^2 = (n - 1) / n sum (log - mean log)^2. Infinite for fewer than two.
+/// For estimates that are no sums over [`Block`]s.
+pub fn jackknife_log_error(without_one: &[f64]) -> f64 {
+    if without_one.len() < 2 {
+        return f64::INFINITY;
+    }
+    let n = without_one.len() as f64;
+    let logs: Vec<f64> = without_one.iter().map(|x| ln(*x)).collect();
+    let mean = logs.iter().sum::<f64>() / n;
+    ((n - 1.0) / n * logs.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>()).sqrt()
 }
 
 /// All blocks but one, for each: merged prefixes with merged suffixes, because taking a block out again by
@@ -318,6 +336,30 @@ mod tests {
 
     fn close(a: f64, b: f64, relative: f64) {
         assert!((a - b).abs() <= relative * b.abs(), "{a:e} is not {b:e}");
+    }
+
+    // For a plain mean the jackknife is the standard error; for its logarithm that over the mean.
+    #[test]
+    fn the_jackknife_of_a_mean() {
+        let data: Vec<f64> = (0..40).map(|i| 100.0 + f64::from(i * 7 % 11)).collect();
+        let n = data.len() as f64;
+        let sum: f64 = data.iter().sum();
+        let squares: f64 = data.iter().map(|x| (x - sum / n) * (x - sum / n)).sum();
+        let expected = (squares / (n * (n - 1.0))).sqrt() / (sum / n);
+        let without: Vec<f64> = data.iter().map(|x| (sum - x) / (n - 1.0)).collect();
+        assert!((jackknife_log_error(&without) / expected - 1.0).abs() < 1e-3);
+        assert_eq!(jackknife_log_error(&[1.0]), f64::INFINITY);
+    }
+
+    // scipy: t.isf(0.025, 7) = 2.364624251592785.
+    #[test]
+    fn intervals() {
+        let log = Estimate { value: 3f64.ln(), std_error: 0.05, dof: 7.0 };
+        let ratio = LogRatio::new(log, 0.95);
+        let (low, high) = ratio.interval();
+        close(ratio.ratio(), 3.0, 1e-12);
+        close(high / 3.0, (0.05f64 * 2.364624251592785).exp(), 1e-9);
+        close(low * high, 9.0, 1e-9);
     }
 
     fn block(values: &[f64], cost: f64) -> Block {

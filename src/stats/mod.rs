@@ -16,8 +16,6 @@ pub mod hypothesis;
 pub mod moments;
 /// Many tests under one error rate.
 pub mod multiplicity;
-/// Ratios of positive estimates.
-pub mod ratio;
 /// Sums of symmetric terms.
 pub mod signs;
 /// Survival functions and their inverses.

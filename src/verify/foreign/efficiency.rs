@@ -2,15 +2,20 @@
 
 use super::images::Planes;
 use super::pixels::Band;
+use crate::math::ln;
 use crate::results::image::Picture;
 use crate::results::record::EstimatorRun;
 use crate::results::store::Stored;
+use crate::stats::efficiency::{LogRatio, jackknife_log_error};
+use crate::stats::hypothesis::Estimate;
 use crate::stats::moments::Moments;
-use crate::stats::ratio::{LogRatio, jackknife_log_error};
 use crate::stats::tree::Merge;
 
 /// Seeds below this say nothing about a variance.
 const MIN_SEEDS: usize = 4;
+
+/// Confidence of the interval.
+const CONFIDENCE: f64 = 0.95;
 
 /// An interval wider than this factor either way decides nothing.
 const WIDEST: f64 = 2.0;
@@ -48,12 +53,17 @@ pub fn ratios(stored: &Stored, run: &EstimatorRun, planes: &Planes, seconds: [f6
             let ours: f64 = band.ours_error.iter().map(|e| e * e).sum();
             let theirs = (theirs * seconds[0], seeds_error(&band, &pixels));
             let ours = (ours * seconds[1], batches_error(stored, run, index));
-            let found = LogRatio::of(theirs, ours, (seeds as f64 - 1.0).max(1.0));
-            let interval = found.interval(0.05);
+            let log = Estimate {
+                value: ln(theirs.0 / ours.0),
+                std_error: (theirs.1 * theirs.1 + ours.1 * ours.1).sqrt(),
+                dof: (seeds as f64 - 1.0).max(1.0),
+            };
+            let found = LogRatio::new(log, CONFIDENCE);
+            let interval: [f64; 2] = found.interval().into();
             let share = band.largest_share(&pixels);
             let unresolved = if seeds < MIN_SEEDS {
                 Some(format!("{seeds} seeds; at least {MIN_SEEDS} are needed"))
-            } else if !(found.log.is_finite() && found.std_error.is_finite()) {
+            } else if !(log.value.is_finite() && log.std_error.is_finite()) {
                 Some("a side has no variance".into())
             } else if share > SHARE + 10.0 / pixels.len() as f64 {
                 Some(format!("one pixel holds {:.0} % of the images' spread", 100.0 * share))
