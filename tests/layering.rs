@@ -13,7 +13,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
     // Simulation.
     ("math", &[]),
     ("sampling", &["math"]),
-    ("optics", &["math"]),
+    ("optics", &["math", "sampling"]),
     ("geometry", &["math", "sampling"]),
     ("scene", &["math", "sampling", "optics", "geometry"]),
     ("estimators", &["math", "sampling", "optics", "geometry", "scene"]),

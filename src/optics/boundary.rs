@@ -90,10 +90,7 @@ impl Boundary {
             Boundary::Rough { eta, ref facets } => {
                 let relative = side_eta(eta, wo);
                 let sign = 1f64.copysign(wo.z);
-                // The distribution is even: mirror wo to the upper side, and the facet back.
-                let upper = DVec3::new(wo.x, wo.y, wo.z * sign);
-                let h = facets.sample_visible(upper, [u[1], u[2]]);
-                let h = DVec3::new(h.x, h.y, h.z * sign);
+                let h = visible_facet(facets, wo, [u[1], u[2]]);
                 let (wi, event) = split(wo, h, relative, u[0]);
                 let expected_side = if event == Event::Reflect { sign } else { -sign };
                 if wi.z * expected_side <= 0.0 {
@@ -117,6 +114,76 @@ impl Boundary {
         }
     }
 
+    /// Draws the direction on the other side for `from`, refraction forced: h from the visible normals of
+    /// `from`, then Snell about h, without a choice of lobe. `None` is a failed sample and scores 0: the facet
+    /// reflects totally, or it sends the light to the side it came from. A delta surface gives
+    /// [`Self::refract`].
+    #[inline]
+    pub fn sample_refraction(&self, from: DVec3, u: [f64; 2]) -> Option<DVec3> {
+        let Boundary::Rough { eta, facets } = self else { return self.refract(from) };
+        let relative = side_eta(*eta, from);
+        let h = visible_facet(facets, from, u);
+        let surface = fresnel(from.dot(h), relative);
+        if surface.cos_t == 0.0 {
+            return None;
+        }
+        let to = through(from, h, relative, surface.cos_t);
+        (to.z * from.z < 0.0).then_some(to)
+    }
+
+    /// Density of [`Self::sample_refraction`] per solid angle of `to`: the refraction part of the pdf of
+    /// [`Self::eval`] without its factor 1 - F,
+    ///   G1(from) D |from.h| n_to^2 |to.h| / (|cos_from| (n_from from.h + n_to to.h)^2).
+    /// The index squared is that of the *sampled* side, so that with `from` = wo
+    ///   f |cos_i| / pdf_refraction(wo, wi) = (1 - F) G1(wi) (n_o / n_i)^2.
+    /// Its integral falls short of 1 by the probability of a failed sample. 0 for delta surfaces and where no
+    /// facet joins the directions.
+    #[inline]
+    pub fn pdf_refraction(&self, from: DVec3, to: DVec3) -> f64 {
+        let Boundary::Rough { eta, facets } = self else { return 0.0 };
+        if from.z * to.z >= 0.0 {
+            return 0.0;
+        }
+        let relative = side_eta(*eta, from);
+        let Some(Joining { d, from_h, to_h }) = joining(relative, facets, from, to, false) else {
+            return 0.0;
+        };
+        let visible = facets.g1(from) * d / from.z.abs();
+        visible * from_h * square(relative) * -to_h / square(from_h + relative * to_h)
+    }
+
+    /// The direction on the other side by Snell about the macroscopic normal, whatever the roughness; `None`
+    /// under total internal reflection. Straight through where there is no surface.
+    #[inline]
+    pub fn refract(&self, from: DVec3) -> Option<DVec3> {
+        if matches!(self, Boundary::Matched) {
+            return Some(-from);
+        }
+        let relative = side_eta(self.eta(), from);
+        let cos_t = fresnel(from.z.abs(), relative).cos_t;
+        let to = DVec3::new(-from.x / relative, -from.y / relative, -cos_t.copysign(from.z));
+        (cos_t > 0.0).then_some(to)
+    }
+
+    /// 1 - F about the macroscopic normal at the angle of `from`, whatever the roughness; 1 where there is no
+    /// surface.
+    #[inline]
+    pub fn transmittance_smooth(&self, from: DVec3) -> f64 {
+        match self {
+            Boundary::Matched => 1.0,
+            _ => 1.0 - fresnel(from.z.abs(), side_eta(self.eta(), from)).reflectance,
+        }
+    }
+
+    /// Index inside over outside; 1 where there is no surface.
+    #[inline]
+    pub fn eta(&self) -> f64 {
+        match *self {
+            Boundary::Smooth { eta } | Boundary::Rough { eta, .. } => eta,
+            Boundary::Matched => 1.0,
+        }
+    }
+
     /// True where the surface has delta lobes alone.
     pub fn is_delta(&self) -> bool {
         !matches!(self, Boundary::Rough { .. })
@@ -134,6 +201,22 @@ fn side_eta(eta: f64, wo: DVec3) -> f64 {
     if wo.z > 0.0 { eta } else { 1.0 / eta }
 }
 
+/// A facet's normal as seen from `wo`, on the side of `wo`.
+#[inline]
+fn visible_facet(facets: &Microfacets, wo: DVec3, u: [f64; 2]) -> DVec3 {
+    let sign = 1f64.copysign(wo.z);
+    // The distribution is even: mirror wo to the upper side, and the facet back.
+    let upper = DVec3::new(wo.x, wo.y, wo.z * sign);
+    let h = facets.sample_visible(upper, u);
+    DVec3::new(h.x, h.y, h.z * sign)
+}
+
+/// Snell: the tangential part of `wo` shrinks by `eta` (far side over near side), the normal part is -cos_t.
+#[inline]
+fn through(wo: DVec3, h: DVec3, eta: f64, cos_t: f64) -> DVec3 {
+    (wo.dot(h) / eta - cos_t) * h - wo / eta
+}
+
 /// Reflects `wo` about `h` with the probability of Fresnel's reflectance, else refracts it through;
 /// `wo.h` > 0, `eta` = far side over near side.
 #[inline]
@@ -143,8 +226,7 @@ fn split(wo: DVec3, h: DVec3, eta: f64, u: f64) -> (DVec3, Event) {
     if u < surface.reflectance {
         (2.0 * cos * h - wo, Event::Reflect)
     } else {
-        // Snell: the tangential part shrinks by eta, the normal part is -cos_t.
-        ((cos / eta - surface.cos_t) * h - wo / eta, Event::Refract)
+        (through(wo, h, eta, surface.cos_t), Event::Refract)
     }
 }
 
@@ -159,17 +241,9 @@ fn rough(eta: f64, facets: &Microfacets, wo: DVec3, wi: DVec3) -> (f64, f64) {
 #[inline]
 fn rough_lobe(eta: f64, facets: &Microfacets, wo: DVec3, wi: DVec3, reflects: bool) -> (f64, f64) {
     let relative = side_eta(eta, wo);
-    let sign = 1f64.copysign(wo.z);
-    // In units of n_o: n_i = relative on the far side.
-    let sum = if reflects { wo + wi } else { wo + relative * wi };
-    let sum = if sum.z * sign < 0.0 { -sum } else { sum };
-    let h = sum.normalize();
-    let (oh, ih) = (wo.dot(h), wi.dot(h));
-    let facet_faces = oh > 0.0 && if reflects { ih > 0.0 } else { ih < 0.0 };
-    if !facet_faces || wo.z == 0.0 || wi.z == 0.0 {
+    let Some(Joining { d, from_h: oh, to_h: ih }) = joining(relative, facets, wo, wi, reflects) else {
         return (0.0, 0.0);
-    }
-    let d = facets.d(DVec3::new(h.x, h.y, h.z * sign));
+    };
     let visible = facets.g1(wo) * d / wo.z.abs();
     let reflectance = fresnel(oh, relative).reflectance;
     let pdf = if reflects {
@@ -179,6 +253,38 @@ fn rough_lobe(eta: f64, facets: &Microfacets, wo: DVec3, wi: DVec3, reflects: bo
     };
     let radiance = if reflects { 1.0 } else { 1.0 / square(relative) };
     (pdf * facets.g1(wi) * radiance, pdf)
+}
+
+/// The facet that joins two directions.
+struct Joining {
+    /// Density of facets with its normal h.
+    d: f64,
+    /// from.h, positive.
+    from_h: f64,
+    /// to.h, negative on the far side of the facet.
+    to_h: f64,
+}
+
+/// `relative` = index of the far side over that of the side of `from`; `None` where no facet joins them.
+#[inline]
+fn joining(
+    relative: f64,
+    facets: &Microfacets,
+    from: DVec3,
+    to: DVec3,
+    reflects: bool,
+) -> Option<Joining> {
+    let sign = 1f64.copysign(from.z);
+    // In units of the near side's index: the far side's is `relative`.
+    let sum = if reflects { from + to } else { from + relative * to };
+    let sum = if sum.z * sign < 0.0 { -sum } else { sum };
+    let h = sum.normalize();
+    let (from_h, to_h) = (from.dot(h), to.dot(h));
+    let facet_faces = from_h > 0.0 && if reflects { to_h > 0.0 } else { to_h < 0.0 };
+    if !facet_faces || from.z == 0.0 || to.z == 0.0 {
+        return None;
+    }
+    Some(Joining { d: facets.d(DVec3::new(h.x, h.y, h.z * sign)), from_h, to_h })
 }
 
 #[cfg(test)]

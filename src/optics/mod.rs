@@ -6,6 +6,9 @@ pub mod boundary;
 /// Reflectance of a smooth dielectric.
 pub mod fresnel;
 
+/// Directions of a single bounce towards a point, in proportion to phase function and geometry.
+pub mod joint;
+
 /// Homogeneous media.
 pub mod medium;
 

@@ -7,6 +7,12 @@ pub mod discrete;
 /// Distances along a ray.
 pub mod distance;
 
+/// A lobe about an axis that is wide or narrow without losing its tail.
+pub mod lobe;
+
+/// Directions to a plane above a vertex.
+pub mod plane;
+
 /// Points of a plane about the origin.
 pub mod radial;
 

@@ -37,25 +37,38 @@ impl TowardsPoint {
     /// A direction from the vertex.
     #[inline]
     pub fn sample(&self, u: [f64; 2]) -> DVec3 {
-        // 1 - sqrt(1 - u) without the difference.
-        let theta = (PI * u[0] / (1.0 + (1.0 - u[0]).sqrt())).max(TowardsPoint::CLAMP);
-        let (sin_phi, cos_phi) = sin_cos_turns(u[1]);
-        let r = sin(theta);
-        let half = sin(0.5 * theta);
-        self.frame.to_world(DVec3::new(r * cos_phi, r * sin_phi, 1.0 - 2.0 * half * half))
+        self.frame.to_world(TowardsPoint::sample_local(u))
     }
 
     /// Density of [`Self::sample`] per solid angle.
     #[inline]
     pub fn pdf(&self, dir: DVec3) -> f64 {
+        TowardsPoint::pdf_about(self.frame.n, dir).1
+    }
+
+    /// [`Self::sample`] in a frame whose third axis points to the point: theta by `u[0]`, azimuth 2 pi `u[1]`
+    /// from the first axis.
+    #[inline]
+    pub fn sample_local(u: [f64; 2]) -> DVec3 {
+        // 1 - sqrt(1 - u) without the difference.
+        let theta = (PI * u[0] / (1.0 + (1.0 - u[0]).sqrt())).max(TowardsPoint::CLAMP);
+        let (sin_phi, cos_phi) = sin_cos_turns(u[1]);
+        let r = sin(theta);
+        let half = sin(0.5 * theta);
+        DVec3::new(r * cos_phi, r * sin_phi, 1.0 - 2.0 * half * half)
+    }
+
+    /// theta, and [`Self::pdf`], of the unit vector `dir` for a point straight along the unit vector `axis`.
+    #[inline]
+    pub fn pdf_about(axis: DVec3, dir: DVec3) -> (f64, f64) {
         // Half angles by lengths keep their digits at both poles (Kahan).
-        let (apart, along) = ((dir - self.frame.n).length(), (dir + self.frame.n).length());
+        let (apart, along) = ((dir - axis).length(), (dir + axis).length());
         let theta = (2.0 * atan2(apart, along)).max(TowardsPoint::CLAMP);
         let back = 2.0 * atan2(along, apart);
         let sin_theta = sin(theta.min(back));
         // Straight back, back / sin(back) goes to 1.
         let ratio = if back > 0.0 { back / sin_theta } else { 1.0 };
-        ratio / (PI * PI * PI)
+        (theta, ratio / (PI * PI * PI))
     }
 
     /// The distances along a direction; see [`Equiangular::towards`].
