@@ -3,12 +3,16 @@
 //! An estimator is built for one cell and plays passes: it turns a pass's random streams into scores
 //! and knows no file, thread or statistic. The runner folds scores into moments, zeros included.
 
+mod bands;
 mod history;
 pub mod path;
 mod scores;
+pub mod snee;
+mod walk;
 
 pub use history::{History, TransportClass};
 pub use scores::{Anomaly, Cost, Layout, ObservableName, Scores};
+pub use walk::Roulette;
 
 use crate::sampling::stream::PassKey;
 

@@ -47,7 +47,7 @@ impl<'a> Builder<'a> {
     /// The scene of one cell.
     ///
     /// # Errors
-    /// A mesh or map that cannot be used, a sensor inside the body.
+    /// A mesh or map that cannot be used, a sensor inside the body, a vertex outside.
     pub fn scene(&mut self, cell: &CellSpec) -> Result<Scene> {
         let shape = self.shape(&cell.object.shape)?;
         let boundary = self.boundary(&cell.object.boundary)?;
@@ -63,6 +63,17 @@ impl<'a> Builder<'a> {
             return Err(Error::input_help(
                 format!("the sensor at {point} mm stands inside or on the body (cell `{}`)", cell.label),
                 "move it outside",
+            ));
+        }
+        if let Sensor::Vertex { ray, .. } = &sensor
+            && !shape.contains(ray.origin)
+        {
+            return Err(Error::input_help(
+                format!(
+                    "the vertex at {} mm is not inside the body (cell `{}`)",
+                    ray.origin, cell.label
+                ),
+                "move it inside",
             ));
         }
         Ok(Scene { shape, boundary, medium, lights, sensor })
@@ -261,6 +272,10 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Sensor {
             let pixel = 2.0 * half / resolution[1] as f64;
             Sensor::Perspective(screen(resolution, *position_mm, view, *up, pixel))
         }
+        schema::Sensor::Vertex { point_mm, toward, paths_per_pass } => Sensor::Vertex {
+            ray: Ray { origin: DVec3::from_array(*point_mm), dir: toward.unit() },
+            paths: *paths_per_pass,
+        },
         schema::Sensor::Probe { point_mm, toward, paths_per_pass } => Sensor::Probe {
             ray: Ray { origin: DVec3::from(*point_mm), dir: toward.unit() },
             paths: *paths_per_pass,
@@ -316,6 +331,7 @@ fn sensor_position(sensor: &Sensor) -> Option<DVec3> {
     match sensor {
         Sensor::Perspective(screen) => Some(screen.origin),
         Sensor::Probe { ray, .. } => Some(ray.origin),
+        Sensor::Vertex { .. } => None,
         Sensor::Orthographic(_) | Sensor::FaceFlux { .. } | Sensor::BodyFlux { .. } => None,
     }
 }

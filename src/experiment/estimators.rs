@@ -5,22 +5,57 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
 use super::registry::{Registry, RegistryEntry};
+use super::snee::SneeWords;
 use crate::error::{Error, Result};
 use crate::estimators::path::{PathTracer, Roulette};
+use crate::estimators::snee::{Snee, TwoBounce};
+use crate::scene::{Scene, Sensor};
 
 /// Every estimator and sampler of this crate; a program of one's own may push its entries on top.
 pub fn builtin() -> Registry {
-    Registry {
-        samplers: super::samplers::builtin(),
-        entries: vec![RegistryEntry {
-            kind: "path",
-            doc: "unidirectional path tracing with MIS between BSDF and light sampling; unbiased",
-            options_schema: || schemars::schema_for!(PathOptions),
-            build: |options, scene| {
-                let options: PathOptions = read(options)?;
-                Ok(Box::new(PathTracer::new(scene, options.roulette.into())))
-            },
-        }],
+    Registry { samplers: super::samplers::builtin(), entries: vec![PATH, SNEE, TWO_BOUNCE] }
+}
+
+const PATH: RegistryEntry = RegistryEntry {
+    kind: "path",
+    doc: "unidirectional path tracing with MIS between BSDF and light sampling; unbiased",
+    options_schema: || schemars::schema_for!(PathOptions),
+    build: |options, scene| {
+        let options: PathOptions = read(options)?;
+        looks_from_outside("path", &scene)?;
+        Ok(Box::new(PathTracer::new(scene, options.roulette.into())))
+    },
+};
+
+const SNEE: RegistryEntry = RegistryEntry {
+    kind: "snee",
+    doc: "path tracing with subdivision next-event estimation, as published or guided; unbiased",
+    options_schema: || schemars::schema_for!(SneeWords),
+    build: |options, scene| {
+        let words: SneeWords = read(options)?;
+        looks_from_outside("snee", &scene)?;
+        Ok(Box::new(Snee::new(scene, words.options()?)?))
+    },
+};
+
+const TWO_BOUNCE: RegistryEntry = RegistryEntry {
+    kind: "two_bounce",
+    doc: "the last two segments alone, from a medium vertex, by snee's techniques; unbiased",
+    options_schema: || schemars::schema_for!(SneeWords),
+    build: |options, scene| {
+        let words: SneeWords = read(options)?;
+        Ok(Box::new(TwoBounce::new(scene, words.options()?)?))
+    },
+};
+
+/// Whole paths start outside the body.
+fn looks_from_outside(kind: &str, scene: &Scene) -> Result<()> {
+    match scene.sensor {
+        Sensor::Vertex { .. } => Err(Error::input_help(
+            format!("{kind} starts its paths outside the body, the sensor `vertex` stands inside"),
+            "use two_bounce, or another sensor",
+        )),
+        _ => Ok(()),
     }
 }
 

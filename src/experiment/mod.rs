@@ -55,6 +55,9 @@ pub mod schema;
 /// The JSON Schema of a file.
 pub mod schema_json;
 
+/// Words for `snee`, and its presets.
+pub mod snee;
+
 /// "Did you mean".
 pub mod suggest;
 

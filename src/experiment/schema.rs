@@ -416,6 +416,17 @@ pub enum Sensor {
         #[schemars(range(min = 1, max = 1048576))]
         paths_per_pass: usize,
     },
+    /// Radiance that arrives at a medium vertex: for estimators of a path's last segments.
+    Vertex {
+        /// The vertex, mm; inside the body.
+        point_mm: [f64; 3],
+        /// Direction of travel of the path that arrives there.
+        toward: Direction,
+        /// Independent paths whose mean is one pass.
+        #[serde(default = "default_paths_per_pass")]
+        #[schemars(range(min = 1, max = 1048576))]
+        paths_per_pass: usize,
+    },
     /// Flux that leaves the body, by bins of the cosine between exit direction and axis.
     /// `half_space` and `slab`: radiant exitance per face, observables `top_i`, `bottom_i` (W/mm^2).
     /// Other shapes: flux of the whole body, observables `flux_i` (W).

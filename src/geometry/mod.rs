@@ -176,6 +176,22 @@ impl Shape {
         }
     }
 
+    /// A lower bound of the distance from a point of the body to its surface, mm; exact for analytic shapes, and cheap.
+    pub fn clearance(&self, point: DVec3) -> f64 {
+        match *self {
+            Shape::HalfSpace => -point.z,
+            Shape::Slab { thickness } => (-point.z).min(thickness + point.z),
+            Shape::Box { half } => (half - point.abs()).min_element(),
+            Shape::Sphere { radius } => radius - point.length(),
+            Shape::Mesh(ref mesh) => mesh.clearance(point),
+        }
+    }
+
+    /// Whether the body is known to be convex: then all its points see each other.
+    pub fn is_convex(&self) -> bool {
+        !matches!(self, Shape::Mesh(_))
+    }
+
     /// Number of triangles; 0 for analytic shapes.
     pub fn triangle_count(&self) -> usize {
         match self {

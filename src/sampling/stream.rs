@@ -17,6 +17,10 @@ pub enum Purpose {
     Walk = 2,
     /// Light samples.
     Light = 3,
+    /// Connections from medium vertices through the boundary.
+    Connection = 4,
+    /// The band that steers a walk shared by all.
+    Hero = 5,
 }
 
 /// The key of one (experiment, cell, bands, estimator, stage).

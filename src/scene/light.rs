@@ -98,6 +98,15 @@ impl Light {
         }
     }
 
+    /// Whether two bands get the same light.
+    pub fn is_same_in(&self, a: usize, b: usize) -> bool {
+        match &self.emission {
+            Emission::Directional { irradiance: per_band, .. }
+            | Emission::Cap { radiance: per_band, .. } => per_band[a] == per_band[b],
+            Emission::Map(map) => map.is_same_in(a, b),
+        }
+    }
+
     /// True for parallel light.
     pub fn is_directional(&self) -> bool {
         matches!(self.emission, Emission::Directional { .. })

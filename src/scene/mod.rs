@@ -4,7 +4,7 @@ mod latlong;
 mod light;
 mod sensor;
 
-pub use latlong::LatLong;
+pub use latlong::{Bright, LatLong};
 pub use light::{Emission, Light, LightSample};
 pub use sensor::{FluxFace, Pinhole, Region, Screen, Sensor, SensorRay};
 

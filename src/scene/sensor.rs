@@ -21,6 +21,13 @@ pub enum Sensor {
         /// Paths per pass.
         paths: usize,
     },
+    /// A medium vertex, played `paths` times per pass: the ray starts there and travels as a path arrives.
+    Vertex {
+        /// The vertex and the direction of arrival.
+        ray: Ray,
+        /// Paths per pass.
+        paths: usize,
+    },
     /// Radiant exitance of a half-space's or slab's faces by the cosine of the exit direction.
     FaceFlux {
         /// The faces, top first.
@@ -114,7 +121,7 @@ impl Sensor {
     pub fn rays_per_pass(&self) -> usize {
         match self {
             Sensor::Orthographic(screen) | Sensor::Perspective(screen) => screen.width * screen.height,
-            Sensor::Probe { paths, .. } => *paths,
+            Sensor::Probe { paths, .. } | Sensor::Vertex { paths, .. } => *paths,
             Sensor::FaceFlux { faces, bins, paths } => faces.len() * bins * paths,
             Sensor::BodyFlux { bins, paths, .. } => bins * paths,
         }
@@ -137,7 +144,7 @@ impl Sensor {
                 let dir = (screen.view + screen.offset(index, u)).normalize();
                 SensorRay { ray: Ray { origin: screen.origin, dir }, weight: 1.0, slot: index }
             }
-            Sensor::Probe { ray, paths } => {
+            Sensor::Probe { ray, paths } | Sensor::Vertex { ray, paths } => {
                 SensorRay { ray: *ray, weight: 1.0 / *paths as f64, slot: 0 }
             }
             Sensor::FaceFlux { faces, bins, paths } => {
@@ -178,6 +185,7 @@ impl Sensor {
                     .collect()
             }
             Sensor::Probe { .. } => vec![named("probe".into(), true)],
+            Sensor::Vertex { .. } => vec![named("vertex".into(), true)],
             Sensor::FaceFlux { faces, bins, .. } => faces
                 .iter()
                 .flat_map(|face| (0..*bins).map(move |bin| named(format!("{}_{bin}", face.name), true)))
@@ -196,7 +204,7 @@ impl Sensor {
                 let (tile, pixels) = screen.tile(slot);
                 [(0, 1.0 / (screen.width * screen.height) as f64), (1 + tile, 1.0 / pixels as f64)]
             }
-            Sensor::Probe { .. } => [(0, 1.0), (0, 0.0)],
+            Sensor::Probe { .. } | Sensor::Vertex { .. } => [(0, 1.0), (0, 0.0)],
             Sensor::FaceFlux { .. } | Sensor::BodyFlux { .. } => [(slot, 1.0), (slot, 0.0)],
         }
     }

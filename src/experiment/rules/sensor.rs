@@ -29,6 +29,9 @@ pub fn sensor(at: At, sensor: &Sensor, shape: Option<&Shape>) {
         Sensor::Probe { toward, .. } => {
             direction(at.to("probe").to("toward"), toward);
         }
+        Sensor::Vertex { toward, .. } => {
+            direction(at.to("vertex").to("toward"), toward);
+        }
         Sensor::Flux { axis, .. } => {
             let at = at.to("flux").to("axis");
             let is_planar = matches!(shape, Some(Shape::HalfSpace {} | Shape::Slab { .. }));

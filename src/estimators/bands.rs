@@ -1,0 +1,139 @@
+//! What a walk remembers of the bands that it scores: nothing where it plays one band alone; of a walk
+//! that all bands share, what each band would have made of it.
+//!
+//! Shared walks (hero wavelengths, Wilkie et al. 2014). The hero h, drawn with probability 1/n, steers: its
+//! extinction draws the flights, its phase function the directions. With f_b and p_b the integrand and the
+//! density of the walk in band b, the walk carries
+//!   value_b = f_b / (p_h w),   rho_b = p_b / p_h,
+//! w being the hero's throughput without its albedos. Step by step, relative to the hero,
+//!   a flight of length d that ends in the medium   rho_b *= (sigma_t,b / sigma_t,h) e^{-(sigma_t,b - sigma_t,h) d},
+//!                                                  value_b *= the same * albedo_b / survival
+//!   one that ends at the boundary                  both *= e^{-(sigma_t,b - sigma_t,h) d}
+//!   a turn                                         both *= phase_b / phase_h
+//! where survival is the factor that roulette sees, one for all bands (the largest albedo). By the balance
+//! heuristic over heroes a walk scores value_b w / (sum over m of rho_m / n) in band b. Equal coefficients make
+//! every factor exactly 1, and every band the same to the last bit.
+
+use super::{Scores, TransportClass};
+use crate::math::exp;
+use crate::optics::medium::Medium;
+
+/// What a walk remembers of its bands.
+pub(super) trait Bands: Clone {
+    /// A flight of length `t` in the medium, which ends in a scattering event or at the boundary.
+    fn flight(&mut self, media: &[Medium], t: f64, scatters: bool);
+
+    /// A change of direction with cosine `mu`.
+    fn turn(&mut self, media: &[Medium], mu: f64);
+
+    /// The factor that roulette sees at a scattering event, for the medium of the walk's own band.
+    fn survival(&self, medium: &Medium) -> f64;
+
+    /// Density of the walk under any hero over its density under its own: sum of rho_m / n.
+    fn density(&self) -> f64;
+
+    /// Adds a contribution of the walk's own band, and to every other that the walk scores what it is there.
+    fn score(&self, scores: &mut Scores, own: Place, value: f64);
+}
+
+/// Where a contribution counts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub slot: usize,
+    pub band: usize,
+    pub class: TransportClass,
+    pub light: usize,
+}
+
+/// A walk that one band has for itself.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OneBand;
+
+impl Bands for OneBand {
+    #[inline]
+    fn flight(&mut self, _: &[Medium], _: f64, _: bool) {}
+
+    #[inline]
+    fn turn(&mut self, _: &[Medium], _: f64) {}
+
+    #[inline]
+    fn survival(&self, medium: &Medium) -> f64 {
+        medium.albedo
+    }
+
+    #[inline]
+    fn density(&self) -> f64 {
+        1.0
+    }
+
+    #[inline]
+    fn score(&self, scores: &mut Scores, own: Place, value: f64) {
+        scores.add(own.slot, own.band, own.class, own.light, value);
+    }
+}
+
+/// The most bands that can share a walk.
+pub const MAX_SHARED: usize = 32;
+
+/// A walk that all bands share.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SharedBands {
+    hero: usize,
+    count: usize,
+    survival: f64,
+    value: [f64; MAX_SHARED],
+    rho: [f64; MAX_SHARED],
+}
+
+impl SharedBands {
+    /// At the sensor; at most [`MAX_SHARED`] media.
+    pub fn new(media: &[Medium], hero: usize) -> SharedBands {
+        SharedBands {
+            hero,
+            count: media.len(),
+            survival: media.iter().map(|m| m.albedo).fold(0.0, f64::max),
+            value: [1.0; MAX_SHARED],
+            rho: [1.0; MAX_SHARED],
+        }
+    }
+}
+
+impl Bands for SharedBands {
+    fn flight(&mut self, media: &[Medium], t: f64, scatters: bool) {
+        let hero = media[self.hero].sigma_t;
+        for (band, medium) in media.iter().enumerate() {
+            let reach = exp(-(medium.sigma_t - hero) * t);
+            if scatters {
+                let step = reach * (medium.sigma_t / hero);
+                self.rho[band] *= step;
+                self.value[band] *= step * (medium.albedo / self.survival);
+            } else {
+                self.rho[band] *= reach;
+                self.value[band] *= reach;
+            }
+        }
+    }
+
+    fn turn(&mut self, media: &[Medium], mu: f64) {
+        let hero = media[self.hero].phase.pdf(mu);
+        for (band, medium) in media.iter().enumerate() {
+            let step = medium.phase.pdf(mu) / hero;
+            self.rho[band] *= step;
+            self.value[band] *= step;
+        }
+    }
+
+    fn survival(&self, _: &Medium) -> f64 {
+        self.survival
+    }
+
+    fn density(&self) -> f64 {
+        self.rho[..self.count].iter().sum::<f64>() / self.count as f64
+    }
+
+    fn score(&self, scores: &mut Scores, own: Place, value: f64) {
+        for band in 0..self.count {
+            scores.add(own.slot, band, own.class, own.light, self.value[band] * value);
+        }
+    }
+}

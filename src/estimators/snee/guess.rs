@@ -1,0 +1,54 @@
+//! The specular guess: where light from a direction would enter the body to reach a point inside.
+//!
+//! A fixed point, deterministic and cheap, that need not converge: shoot from the point along the light's
+//! direction, refract the light at the normal that is met, shoot back along the refracted ray, take the
+//! normal there. It steers samplers, which know their own densities; what it gets wrong costs variance alone.
+
+use crate::estimators::Cost;
+use crate::estimators::walk::Walk;
+use crate::geometry::{Ray, Side};
+use crate::math::{DVec3, Frame};
+use crate::optics::boundary::Boundary;
+
+/// Where light from one direction probably enters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Guess {
+    /// Outward normal of the boundary there.
+    pub normal: DVec3,
+    /// From the point towards it.
+    pub dir: DVec3,
+    /// How far it is, mm.
+    pub distance: f64,
+}
+
+impl Guess {
+    /// For a point in the medium and a direction towards the light; `None` where no boundary is met.
+    pub fn new<R, B>(walk: &mut Walk<'_, R, B>, point: DVec3, toward: DVec3) -> Option<Guess> {
+        let Walk { scene, boundary, scores, .. } = walk;
+        let mut shoot = |dir| {
+            scores.count(Cost::Rays);
+            scene.shape.intersect(&Ray { origin: point, dir }, Side::Inside, None, f64::INFINITY)
+        };
+        let straight = shoot(toward)?;
+        let first = Guess { normal: straight.shading_normal, dir: toward, distance: straight.t };
+        let Some(dir) = entering(boundary, first.normal, toward) else { return Some(first) };
+        let Some(hit) = shoot(dir) else { return Some(first) };
+        Some(Guess { normal: hit.shading_normal, dir, distance: hit.t })
+    }
+
+    /// The direction from the point, against the light that is refracted at the guessed normal; that of
+    /// the guess where the normal faces away from the light.
+    pub fn refracted(&self, boundary: &Boundary, toward: DVec3) -> DVec3 {
+        entering(boundary, self.normal, toward).unwrap_or(self.dir)
+    }
+}
+
+/// Against light from `toward` after its refraction at a normal.
+fn entering(boundary: &Boundary, normal: DVec3, toward: DVec3) -> Option<DVec3> {
+    let frame = Frame::about(normal);
+    let local = frame.to_local(toward);
+    if local.z <= 0.0 {
+        return None;
+    }
+    boundary.refract(local).map(|inward| -frame.to_world(inward))
+}

@@ -1,0 +1,101 @@
+//! What a light lends to techniques that start from it: its concentrated part, drawn by itself.
+
+use std::f64::consts::PI;
+
+use crate::math::DVec3;
+use crate::scene::{Bright, Emission, Light, LightSample};
+
+/// The concentrated part of one light in one band.
+#[derive(Debug)]
+pub(super) struct Guide {
+    /// Index of the light.
+    pub light: usize,
+    /// Probability of choosing it among the guides.
+    pub choice: f64,
+    /// Towards its middle.
+    pub axis: DVec3,
+    /// Half the angle that it covers, rad; 0 for parallel light.
+    pub half_angle: f64,
+    /// Part of a map; the other lights are concentrated as a whole or not at all.
+    bright: Option<Bright>,
+}
+
+/// Concentration of a light: 4 pi int L^2 / (int L)^2. 1 for a constant sky, 4 pi over its solid angle for a
+/// disc, infinite for parallel light.
+fn concentration(emission: &Emission) -> f64 {
+    match emission {
+        Emission::Directional { .. } => f64::INFINITY,
+        Emission::Cap { height, .. } => 2.0 / height,
+        Emission::Map(_) => 1.0,
+    }
+}
+
+/// How many times brighter than its mean a map's texel is that counts as concentrated light.
+const BRIGHT: f64 = 10.0;
+
+/// Half the angle about a map's brightest texel within which light counts as one concentrated part, rad.
+const COMPACT: f64 = 0.3;
+
+impl Guide {
+    /// The guides among lights whose concentration reaches `least`. A map is split: the part of it that is
+    /// far brighter than its mean, and near its brightest texel, is the guide; the rest has none.
+    pub fn all(lights: &[Light], band: usize, least: f64) -> Vec<Guide> {
+        let mut guides: Vec<Guide> = lights
+            .iter()
+            .enumerate()
+            .filter_map(|(index, light)| Guide::of(index, light, band, least))
+            .collect();
+        let total: f64 = guides.iter().map(|guide| guide.choice).sum();
+        guides.iter_mut().for_each(|guide| guide.choice /= total);
+        guides
+    }
+
+    fn of(index: usize, light: &Light, band: usize, least: f64) -> Option<Guide> {
+        let strength = light.strength(band);
+        let whole = |axis, half_angle| {
+            let is_guide = strength > 0.0 && concentration(&light.emission) >= least;
+            is_guide.then_some(Guide { light: index, choice: strength, axis, half_angle, bright: None })
+        };
+        match &light.emission {
+            Emission::Directional { toward, .. } => whole(*toward, 0.0),
+            // 1 - cos = height: sin(half / 2)^2 = height / 2.
+            Emission::Cap { frame, height, .. } => {
+                whole(frame.n, 2.0 * crate::math::asin((0.5 * height).sqrt().min(1.0)))
+            }
+            Emission::Map(map) => {
+                let is_whole = least <= 1.0;
+                let (excess, reach) = if is_whole { (0.0, PI) } else { (BRIGHT, COMPACT) };
+                let bright = map.bright(band, excess, reach)?;
+                (is_whole || bright.concentration() >= least).then(|| Guide {
+                    light: index,
+                    choice: bright.strength(),
+                    axis: bright.axis(),
+                    half_angle: bright.half_angle(),
+                    bright: Some(bright),
+                })
+            }
+        }
+    }
+
+    /// A direction towards the guide's part of its light.
+    pub fn sample(&self, light: &Light, band: usize, u: [f64; 2]) -> LightSample {
+        match (&self.bright, &light.emission) {
+            (Some(bright), Emission::Map(map)) => {
+                let (wi, radiance, pdf) = bright.sample(map, u);
+                LightSample { wi, radiance, pdf: Some(pdf) }
+            }
+            _ => light.sample(band, u),
+        }
+    }
+
+    /// Density of [`Self::sample`] per solid angle, the choice of the guide included; for parallel light the
+    /// probability of the choice.
+    pub fn density(&self, light: &Light, band: usize, wi: DVec3) -> f64 {
+        self.choice
+            * match (&self.bright, &light.emission) {
+                (Some(bright), Emission::Map(map)) => bright.pdf(map, wi),
+                (_, Emission::Directional { .. }) => 1.0,
+                _ => light.eval(band, wi).1,
+            }
+    }
+}

@@ -1,0 +1,199 @@
+//! The light-guided last vertex: from any medium vertex x_j, towards where light probably enters.
+//!
+//! Rough boundary: draw w_L from the light, refract it at a microfacet about the normal n* of the specular guess,
+//! and go against it to the boundary, x_k the first hit. Two widths of microfacets are mixed, the boundary's own and a
+//! wider one for bodies whose true normal at x_k may be far from n*. Per area of x_k and solid angle of w_L the
+//! density is
+//!   q(x_j) p_G(w_L) p(w_kj | w_L, n*) cos_k / d_jk^2,   over U:   q p_G p / (phase(x_j) T(d_jk)).
+//! n* is a function of x_j and the light's axis, so nothing is left to integrate over.
+//!
+//! Smooth boundary and a light of finite size: w_L follows from the direction, so the direction is drawn about the
+//! refracted axis, by a lobe as wide as the light and a wide one; density q P(guide) p_lobe(w_jk) with the same
+//! Dirac factor as BSDF sampling. It also covers what subdivision cannot: single scattering, and paths whose last
+//! vertex follows an internal reflection.
+
+use super::connections::{Call, Connections, End, Middle, Vertex, choose_guide};
+use super::guess::Guess;
+use super::guide::Guide;
+use super::subdivision;
+use crate::estimators::Cost;
+use crate::estimators::bands::Bands;
+use crate::estimators::walk::{Rivals, Walk};
+use crate::geometry::{Ray, Side};
+use crate::math::{DVec3, Frame, tan};
+use crate::optics::boundary::Boundary;
+use crate::optics::microfacet::Microfacets;
+use crate::sampling::discrete::choose;
+use crate::sampling::distance::transmittance;
+use crate::sampling::lobe::PowerLobe;
+
+/// Options of the technique.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LastVertex {
+    /// How often it is called.
+    pub call: Call,
+    /// Share of the wider lobe.
+    pub wide_share: f64,
+    /// Roughness of the wider lobe (rough boundary), or its width (smooth).
+    pub wide: f64,
+}
+
+/// The lobe of directions w_jk about one guess.
+enum Lobe {
+    /// Refraction of a light sample at the guessed normal: narrow, wide.
+    Refraction { frame: Frame, narrow: Boundary, wide: Boundary },
+    /// About the refracted axis.
+    About { narrow: PowerLobe, wide: PowerLobe },
+}
+
+/// The narrowest lobe about the refracted axis of a light, tan(theta / 2).
+const NARROWEST: f64 = 1e-4;
+
+impl LastVertex {
+    fn lobe(&self, boundary: &Boundary, guide: &Guide, guess: &Guess) -> Option<Lobe> {
+        match *boundary {
+            Boundary::Rough { eta, facets } => {
+                let alpha = facets.alpha.max(self.wide);
+                let wide = Boundary::Rough { eta, facets: Microfacets { alpha, ..facets } };
+                Some(Lobe::Refraction { frame: Frame::about(guess.normal), narrow: *boundary, wide })
+            }
+            Boundary::Smooth { eta } if guide.half_angle > 0.0 => {
+                // Refraction narrows a light by about eta.
+                let width = tan(0.25 * (guide.half_angle / eta).min(3.0)).max(NARROWEST);
+                let axis = guess.refracted(boundary, guide.axis);
+                let wide = PowerLobe::new(axis, width.max(self.wide));
+                Some(Lobe::About { narrow: PowerLobe::new(axis, width), wide })
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Lobe {
+    /// A direction from x_j, given a light sample.
+    fn sample(&self, wide_share: f64, w_l: DVec3, [u, v]: [f64; 2]) -> Option<DVec3> {
+        let (is_wide, u) = choose(u, wide_share);
+        match self {
+            Lobe::Refraction { frame, narrow, wide } => {
+                let from = frame.to_local(w_l);
+                if from.z <= 0.0 {
+                    return None;
+                }
+                let boundary = if is_wide { wide } else { narrow };
+                boundary.sample_refraction(from, [u, v]).map(|to| -frame.to_world(to))
+            }
+            Lobe::About { narrow, wide } => Some(if is_wide { wide } else { narrow }.sample([u, v])),
+        }
+    }
+
+    /// Its density per solid angle of w_jk, given w_L.
+    fn pdf(&self, wide_share: f64, w_l: DVec3, to_k: DVec3) -> f64 {
+        let mix = |narrow: f64, wide: f64| (1.0 - wide_share) * narrow + wide_share * wide;
+        match self {
+            Lobe::Refraction { frame, narrow, wide } => {
+                let (from, to) = (frame.to_local(w_l), frame.to_local(-to_k));
+                if from.z <= 0.0 || to.z >= 0.0 {
+                    return 0.0;
+                }
+                mix(narrow.pdf_refraction(from, to), wide.pdf_refraction(from, to))
+            }
+            Lobe::About { narrow, wide } => mix(narrow.pdf(to_k), wide.pdf(to_k)),
+        }
+    }
+}
+
+/// The technique's density of an end whose last vertex is `x_j`, over U, times the density of the walk up to x_j.
+pub(super) fn density<B: Bands>(
+    walk: &mut Walk<'_, Connections<'_>, B>,
+    x_j: &mut Vertex,
+    guide: &Guide,
+    (to_k, d_jk): (DVec3, f64),
+    wi: DVec3,
+    end: &End,
+) -> f64 {
+    let setup = walk.rivals.setup;
+    let Some(technique) = &setup.options.last_vertex else { return 0.0 };
+    if end.guide == 0.0 {
+        return 0.0;
+    }
+    let Some(guess) = x_j.guess(walk, guide) else { return 0.0 };
+    let Some(lobe) = technique.lobe(&walk.boundary, guide, &guess) else { return 0.0 };
+    let of_light = match lobe {
+        Lobe::Refraction { .. } => end.guide,
+        Lobe::About { .. } => guide.choice,
+    };
+    let q = technique.call.probability(setup.sigma, Some(&guess));
+    let pdf = q * of_light * lobe.pdf(technique.wide_share, wi, to_k);
+    if pdf == 0.0 {
+        return 0.0;
+    }
+    let phase = walk.medium.phase.pdf(x_j.arrival.dot(to_k));
+    pdf * x_j.walks / (phase * transmittance(walk.medium.sigma_t, d_jk))
+}
+
+/// Draws the technique at the walk's latest vertex and scores what it finds.
+pub(super) fn call<B: Bands>(walk: &mut Walk<'_, Connections<'_>, B>, technique: &LastVertex) {
+    let setup = walk.rivals.setup;
+    let Some(reach) = technique.call.reach(setup.sigma, walk.rivals.stream.draw()) else { return };
+    let [mut x_i, mut x_j] = walk.rivals.vertices;
+    if walk.scene.shape.clearance(x_j.point) >= reach {
+        return;
+    }
+    let guide = if setup.guides.len() == 1 {
+        &setup.guides[0]
+    } else {
+        choose_guide(&setup.guides, walk.rivals.stream.draw())
+    };
+    let guess = x_j.guess(walk, guide);
+    walk.rivals.vertices[1] = x_j;
+    let Some(guess) = guess.filter(|guess| guess.distance < reach) else { return };
+    let Some(lobe) = technique.lobe(&walk.boundary, guide, &guess) else { return };
+
+    let light = &walk.scene.lights[guide.light];
+    let (w_l, radiance) = match lobe {
+        Lobe::Refraction { .. } => {
+            let sample = guide.sample(light, walk.band, walk.rivals.stream.draw2());
+            (sample.wi, Some(sample.radiance))
+        }
+        Lobe::About { .. } => (guide.axis, None),
+    };
+    let u = walk.rivals.stream.draw2();
+    let Some(dir) = lobe.sample(technique.wide_share, w_l, u) else { return };
+    walk.scores.count(Cost::Rays);
+    let ray = Ray { origin: x_j.point, dir };
+    let Some(hit) = walk.scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY) else { return };
+    let Some(exit) = walk.exit_at(hit, dir) else { return };
+    let w_l = match lobe {
+        Lobe::Refraction { .. } => w_l,
+        Lobe::About { .. } => match walk.boundary.refract(exit.wo) {
+            Some(local) => exit.frame.to_world(local),
+            None => return,
+        },
+    };
+    if !walk.leads_outside(&exit, w_l) {
+        return;
+    }
+    let keep = walk.rivals.unidirectional();
+    let end = End::new(walk, guide, &exit, w_l, keep, radiance);
+    if end.value == 0.0 || end.guide == 0.0 {
+        return;
+    }
+    let mut rivals = density(walk, &mut x_j, guide, (dir, hit.t), w_l, &end);
+    if walk.rivals.count >= 2
+        && setup.options.strategies.subdivides()
+        && let Some(middle) = Middle::new(x_i.point, x_j.point, hit.point, hit.normal)
+        && walk.sees_point(x_i.point, hit.point)
+    {
+        rivals += subdivision::density(walk, &mut x_i, guide, &middle, &exit, &end);
+        walk.rivals.vertices[0] = x_i;
+    }
+    walk.scores.count(Cost::ShadowRays);
+    if walk.scene.shape.occluded(&Ray { origin: hit.point, dir: w_l }, Some(hit.face)) {
+        return;
+    }
+    let mut bands = walk.bands.clone();
+    bands.turn(&walk.scene.medium, x_j.arrival.dot(dir));
+    bands.flight(&walk.scene.medium, hit.t, false);
+    let score = walk.throughput * end.value / (bands.density() * end.unidirectional + rivals);
+    walk.score_with(&bands, walk.history.class(), guide.light, score);
+}

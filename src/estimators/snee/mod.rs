@@ -1,0 +1,225 @@
+//! Subdivision next-event estimation (Koerner, Novak, Kutz, Habel & Jarosz 2016, "Subdivision next-event
+//! estimation for path-traced subsurface scattering"), and what makes it worth calling.
+//!
+//! At every medium vertex x_i of a camera walk a boundary point x_k is probed and the edge between them is
+//! subdivided by a vertex x_j, from the light's end or from the walk's ([`subdivision`]). Both are weighed against
+//! the walk's own ways of making the same path. Beyond the talk: probes that know where light probably enters
+//! ([`guess`], [`probe`]), a last vertex guided by the light ([`last_vertex`]), calls made with a probability that falls
+//! with depth, and a gate that leaves lights that are not concentrated to the walk alone ([`guide`]): where no
+//! light passes it, the estimator is `path` to the last bit.
+//!
+//! Unbiased for all that the walk or a rival can sample. Through a smooth boundary parallel light is only found
+//! by subdivision from the light's end: what lacks two medium vertices before the exit is missing there.
+
+mod connections;
+mod guess;
+mod guide;
+mod last_vertex;
+mod probe;
+mod subdivision;
+mod two_bounce;
+
+use std::sync::Arc;
+
+use super::bands::{MAX_SHARED, OneBand, SharedBands};
+use super::walk::{Field, Unrivalled, Walk};
+use super::{BandUse, Estimator, Roulette, Scores};
+use crate::error::{Error, Result};
+use crate::optics::boundary::Boundary;
+use crate::optics::joint::{JointDirections, JointTable};
+use crate::sampling::stream::{PassKey, Purpose};
+use crate::scene::Scene;
+
+use connections::Connections;
+use guide::Guide;
+
+pub use connections::Call;
+pub use last_vertex::LastVertex;
+pub use probe::ProbeShares;
+pub use two_bounce::TwoBounce;
+
+/// Which techniques make the paths whose last two medium vertices follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Strategies {
+    /// The walk goes on, its exit by BSDF sampling.
+    pub bsdf: bool,
+    /// The walk goes on, its exit by light sampling.
+    pub light: bool,
+    /// Subdivision from the light's end.
+    pub top_to_bottom: bool,
+    /// Subdivision from the walk's end.
+    pub bottom_to_top: bool,
+}
+
+/// How directions are drawn bottom to top.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// By a table of phase function times geometry.
+    Table,
+    /// By phase function and geometry in turn.
+    Mixture,
+}
+
+impl Strategies {
+    fn subdivides(&self) -> bool {
+        self.top_to_bottom || self.bottom_to_top
+    }
+}
+
+/// How the estimator is set up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SneeOptions {
+    /// Russian roulette of the walk.
+    pub roulette: Roulette,
+    /// What takes part.
+    pub strategies: Strategies,
+    /// How often an edge is subdivided.
+    pub call: Call,
+    /// Whether distances end at the boundary (one more ray for every density) or run on and may fail.
+    pub truncated: bool,
+    /// Directions of probes.
+    pub probe: ProbeShares,
+    /// Directions from x_i, bottom to top.
+    pub joint: JointKind,
+    /// The light-guided last vertex.
+    pub last_vertex: Option<LastVertex>,
+    /// Whether a smooth boundary's reflection of a light that is connected to is scored by its expectation,
+    /// wherever a walk meets the boundary from outside, instead of by the walks that take it.
+    pub expected_reflection: bool,
+    /// Least concentration 4 pi int L^2 / (int L)^2 of a light that is connected to; 1 lets all pass.
+    pub least_concentration: f64,
+    /// Whether all bands share a walk.
+    pub share_bands: bool,
+}
+
+/// What connections need to know, for one band.
+#[derive(Debug)]
+struct BandSetup {
+    options: Arc<SneeOptions>,
+    guides: Vec<Guide>,
+    /// Extinction that steers samplers, 1/mm: the medium's, or the least of those that share a walk.
+    sigma: f64,
+    joint: JointDirections,
+}
+
+/// The estimator, for one scene.
+#[derive(Debug)]
+pub struct Snee {
+    field: Field,
+    options: Arc<SneeOptions>,
+    /// Per band; one for all where they share walks.
+    setups: Vec<BandSetup>,
+}
+
+impl Snee {
+    /// For a scene.
+    ///
+    /// # Errors
+    /// If bands are to share walks and differ in more than their media.
+    pub fn new(scene: Arc<Scene>, options: SneeOptions) -> Result<Snee> {
+        if options.share_bands {
+            check_shared(&scene)?;
+        }
+        let options = Arc::new(options);
+        let setup = |band: usize| {
+            let media = if options.share_bands { &scene.medium[..] } else { &scene.medium[band..=band] };
+            let sigma = media.iter().map(|m| m.sigma_t).fold(f64::INFINITY, f64::min);
+            let is_matched = scene.boundary[band] == Boundary::Matched;
+            let scatters = media.iter().all(|m| m.sigma_t > 0.0) && media.iter().any(|m| m.albedo > 0.0);
+            let guides = if is_matched || !scatters {
+                Vec::new()
+            } else {
+                Guide::all(&scene.lights, band, options.least_concentration)
+            };
+            let phase = scene.medium[band].phase;
+            let joint = match options.joint {
+                JointKind::Table if options.strategies.bottom_to_top => {
+                    JointDirections::Table(JointTable::new(phase))
+                }
+                _ => JointDirections::Mixture(phase),
+            };
+            BandSetup { options: options.clone(), guides, sigma, joint }
+        };
+        let count = if options.share_bands { 1 } else { scene.bands() };
+        let setups = (0..count).map(setup).collect();
+        Ok(Snee { field: Field::new(scene, options.roulette), options, setups })
+    }
+}
+
+/// What bands may not differ in if they share walks.
+fn check_shared(scene: &Scene) -> Result<()> {
+    let same_boundary = scene.boundary.windows(2).all(|pair| pair[0] == pair[1]);
+    let grey = |light: &crate::scene::Light| (1..scene.bands()).all(|band| light.is_same_in(0, band));
+    let trouble = if scene.bands() > MAX_SHARED {
+        format!("there are {} bands, and at most {MAX_SHARED} can share a walk", scene.bands())
+    } else if !same_boundary {
+        "the boundary differs between bands (its index disperses)".into()
+    } else if scene.boundary.first() == Some(&Boundary::Matched) {
+        "the boundary is matched".into()
+    } else if let Some(light) = scene.lights.iter().find(|light| !grey(light)) {
+        format!("light `{}` differs between bands", light.name)
+    } else {
+        return Ok(());
+    };
+    Err(Error::input(format!("bands cannot share walks: {trouble}; use bands = \"alone\"")))
+}
+
+impl Estimator for Snee {
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        let rays = self.field.scene.sensor.rays_per_pass();
+        if self.options.share_bands {
+            let media = &self.field.scene.medium;
+            for index in 0..rays {
+                let u = key.stream(index as u64, Purpose::Hero).draw();
+                let hero = ((u * media.len() as f64) as usize).min(media.len() - 1);
+                self.play(0, hero, index, key, scores, SharedBands::new(media, hero));
+            }
+        } else {
+            for &band in bands {
+                for index in 0..rays {
+                    self.play(band, band, index, key, scores, OneBand);
+                }
+            }
+        }
+    }
+
+    fn band_use(&self) -> BandUse {
+        if self.options.share_bands { BandUse::Shared } else { BandUse::EachAlone }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let scene = &self.field.scene;
+        let smooth = scene.boundary.iter().any(|b| matches!(b, Boundary::Smooth { .. }));
+        let missing = |light: &&crate::scene::Light| light.is_directional() && smooth;
+        let note = |light: &crate::scene::Light| {
+            format!(
+                "through a smooth boundary, directional light `{}` is found by subdivision from its end alone: \
+                 surface, single, single_internal and what has one medium vertex after its last internal \
+                 reflection are missing (not dark)",
+                light.name
+            )
+        };
+        scene.lights.iter().filter(missing).map(note).collect()
+    }
+}
+
+impl Snee {
+    fn play<B: super::bands::Bands>(
+        &self,
+        setup: usize,
+        band: usize,
+        index: usize,
+        key: &PassKey,
+        scores: &mut Scores,
+        bands: B,
+    ) {
+        let setup = &self.setups[setup];
+        if setup.guides.is_empty() {
+            Walk::play(&self.field, band, index, key, scores, Unrivalled, bands);
+        } else {
+            let stream = key.stream(index as u64, Purpose::Connection);
+            let connections = Connections::new(setup, stream);
+            Walk::play(&self.field, band, index, key, scores, connections, bands);
+        }
+    }
+}

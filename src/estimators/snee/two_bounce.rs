@@ -1,0 +1,66 @@
+//! One edge of a path alone: the radiance that two segments carry to a medium vertex.
+//!
+//! The sensor is a medium vertex: it gives x_i and the direction of arrival. What is estimated is
+//!   I(x_i) = int phase T / d_ij^2 sigma_s phase T cos_k / d_jk^2 f_k |cos| L
+//! over x_j, x_k and the direction of light, by whatever strategies take part. With one at a time, each of them
+//! is held against all others without the walk that usually surrounds them: errors of a few per cent in one
+//! density, which weights would hide, show at once.
+
+use std::sync::Arc;
+
+use super::connections::Connections;
+use super::{Snee, SneeOptions};
+use crate::error::{Error, Result};
+use crate::estimators::bands::OneBand;
+use crate::estimators::walk::{Unrivalled, Walk};
+use crate::estimators::{Estimator, Scores};
+use crate::sampling::stream::{PassKey, Purpose};
+use crate::scene::{Scene, Sensor};
+
+/// The estimator, for one scene.
+#[derive(Debug)]
+pub struct TwoBounce(Snee);
+
+impl TwoBounce {
+    /// For a scene whose sensor is a medium vertex.
+    ///
+    /// # Errors
+    /// Another sensor; bands that share walks.
+    pub fn new(scene: Arc<Scene>, options: SneeOptions) -> Result<TwoBounce> {
+        if !matches!(scene.sensor, Sensor::Vertex { .. }) {
+            return Err(Error::input(
+                "two_bounce starts at a medium vertex: its sensor must be a `vertex`",
+            ));
+        }
+        if options.share_bands {
+            return Err(Error::input(
+                "two_bounce plays every band alone; leave out `bands = \"shared\"`",
+            ));
+        }
+        Ok(TwoBounce(Snee::new(scene, options)?))
+    }
+}
+
+impl Estimator for TwoBounce {
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        let TwoBounce(snee) = self;
+        for &band in bands {
+            let setup = &snee.setups[band];
+            for index in 0..snee.field.scene.sensor.rays_per_pass() {
+                let field = &snee.field;
+                if setup.guides.is_empty() {
+                    Walk::play_two_bounces(field, band, index, key, scores, Unrivalled, OneBand);
+                } else {
+                    let stream = key.stream(index as u64, Purpose::Connection);
+                    let mut connections = Connections::new(setup, stream);
+                    connections.is_edge_alone = true;
+                    Walk::play_two_bounces(field, band, index, key, scores, connections, OneBand);
+                }
+            }
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+}

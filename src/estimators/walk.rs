@@ -1,0 +1,651 @@
+//! A camera walk through the body, with whatever techniques beside unidirectional sampling its ends may have.
+//!
+//! The walk is that of [`super::path`]; an estimator that adds techniques implements [`Rivals`]: it is called at
+//! every medium vertex, and says at every exit how densely its techniques draw the same path. Weights are
+//! those of the balance heuristic over all techniques. Their densities are written relative to U, the density with
+//! which the walk draws its medium vertices and the flight to the exit, so that U itself, which underflows
+//! in thick media, is never formed: a light sample has density p_L, a BSDF sample p_B, a rival p_R / U.
+//! Roulette is in no density: each walk divides by its own survival, and weights without it still sum to 1.
+
+use std::sync::Arc;
+
+use super::bands::{Bands, Place};
+use super::{Anomaly, Cost, History, Scores, TransportClass};
+use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Side};
+use crate::math::{DVec3, Frame};
+use crate::optics::boundary::{Boundary, Density, Event};
+use crate::optics::medium::Medium;
+use crate::sampling::distance::{sample_exponential, transmittance};
+use crate::sampling::stream::{PassKey, Purpose, Stream};
+use crate::scene::Scene;
+
+/// When a path is ended by chance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Roulette {
+    /// At every scattering event with probability 1 - albedo: the weight never changes.
+    Analog,
+    /// Only where the path's weight has fallen below this: it survives with probability weight over
+    /// threshold and continues with the threshold as weight.
+    Below(f64),
+}
+
+/// What all walks of an estimator share.
+#[derive(Debug)]
+pub(super) struct Field {
+    /// The scene.
+    pub scene: Arc<Scene>,
+    /// Per band: probability of choosing each light.
+    pub choice: Vec<Vec<f64>>,
+    roulette: Roulette,
+    bounds: Option<BoundingSphere>,
+}
+
+impl Field {
+    /// For a scene.
+    pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Field {
+        let choice = (0..scene.bands())
+            .map(|band| {
+                let strengths: Vec<f64> = scene.lights.iter().map(|l| l.strength(band)).collect();
+                let total: f64 = strengths.iter().sum();
+                let share = |s: &f64| if total > 0.0 { s / total } else { 0.0 };
+                strengths.iter().map(share).collect()
+            })
+            .collect();
+        Field { bounds: scene.shape.bounds(), roulette, choice, scene }
+    }
+}
+
+/// Techniques beside unidirectional sampling.
+pub(super) trait Rivals: Sized {
+    /// At a medium vertex that roulette has spared, before its direction is drawn; the walk's ray holds the
+    /// vertex and the direction of arrival. Draws samples and scores them.
+    fn call<B: Bands>(walk: &mut Walk<'_, Self, B>);
+
+    /// The walk has met the boundary.
+    fn meet_surface(&mut self);
+
+    /// The walk has met a smooth boundary from outside: scores lights that it reflects by their expectation.
+    fn reflect<B: Bands>(walk: &mut Walk<'_, Self, B>, hit: &Hit, reflected: DVec3, reflectance: f64);
+
+    /// Whether [`Self::reflect`] scores a light from this direction.
+    fn has_scored_reflection<B: Bands>(walk: &Walk<'_, Self, B>, light: usize, wi: DVec3) -> bool;
+
+    /// Which of BSDF and light sampling take part at the end of a path that leaves from the walk's latest medium
+    /// vertex: 1 or 0 each.
+    fn unidirectional(&self) -> [f64; 2];
+
+    /// Sum over the rivals of their densities of the path that ends at `exit` and goes on towards `wi`, light
+    /// `light`, relative to the density of the walk's medium vertices.
+    fn densities<B: Bands>(walk: &mut Walk<'_, Self, B>, exit: &Exit, light: usize, wi: DVec3) -> f64;
+}
+
+/// No techniques but the walk's own.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Unrivalled;
+
+impl Rivals for Unrivalled {
+    #[inline]
+    fn call<B: Bands>(_: &mut Walk<'_, Self, B>) {}
+
+    #[inline]
+    fn meet_surface(&mut self) {}
+
+    #[inline]
+    fn reflect<B: Bands>(_: &mut Walk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
+
+    #[inline]
+    fn has_scored_reflection<B: Bands>(_: &Walk<'_, Self, B>, _: usize, _: DVec3) -> bool {
+        false
+    }
+
+    #[inline]
+    fn unidirectional(&self) -> [f64; 2] {
+        [1.0, 1.0]
+    }
+
+    #[inline]
+    fn densities<B: Bands>(_: &mut Walk<'_, Self, B>, _: &Exit, _: usize, _: DVec3) -> f64 {
+        0.0
+    }
+}
+
+/// Where a walk meets the boundary from inside.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Exit {
+    pub hit: Hit,
+    /// About the shading normal.
+    pub frame: Frame,
+    /// Back along the walk, in that frame.
+    pub wo: DVec3,
+}
+
+/// Part of a body's size by which rounding may put a medium vertex outside its bounding sphere.
+const ROUNDING: f64 = 1e-9;
+
+/// How the path's current direction was drawn, as light sampling sees it.
+#[derive(Clone, Copy)]
+enum Drawn {
+    /// Only this way: by the sensor or a delta lobe.
+    Alone,
+    /// Also by light sampling, in competition with this density per solid angle.
+    Competing(f64),
+}
+
+/// One path.
+pub(super) struct Walk<'a, R, B> {
+    pub scene: &'a Scene,
+    choice: &'a [f64],
+    roulette: Roulette,
+    bounds: Option<BoundingSphere>,
+    pub boundary: Boundary,
+    pub medium: Medium,
+    pub band: usize,
+    slot: usize,
+    pub ray: Ray,
+    from: Option<FaceId>,
+    pub throughput: f64,
+    /// The throughput without radiance's eta^2: what roulette looks at.
+    survival: f64,
+    pub history: History,
+    drawn: Drawn,
+    exit: Option<Exit>,
+    /// The latest event was a reflection by a smooth boundary, met from outside.
+    is_mirrored: bool,
+    stream: Stream,
+    light_stream: Stream,
+    pub scores: &'a mut Scores,
+    pub rivals: R,
+    pub bands: B,
+}
+
+impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
+    /// Plays path `index` of a pass; returns how many numbers its walk drew.
+    pub fn play(
+        field: &'a Field,
+        band: usize,
+        index: usize,
+        key: &PassKey,
+        scores: &'a mut Scores,
+        rivals: R,
+        bands: B,
+    ) -> u64 {
+        let walk = Walk::start(field, band, index, key, scores, rivals, bands);
+        walk.scores.count(Cost::Rays);
+        match walk.scene.shape.intersect(&walk.ray, Side::Outside, None, f64::INFINITY) {
+            Some(hit) => walk.run(hit),
+            None => 0, // light that has not met the body is not scored
+        }
+    }
+
+    /// Plays the last two segments in the medium alone: the sensor's ray is the arrival at x_i, the next flight
+    /// must end in the medium, the one after it at the boundary, and what leaves there must meet a light.
+    pub fn play_two_bounces(
+        field: &'a Field,
+        band: usize,
+        index: usize,
+        key: &PassKey,
+        scores: &'a mut Scores,
+        rivals: R,
+        bands: B,
+    ) -> Option<()> {
+        let mut walk = Walk::start(field, band, index, key, scores, rivals, bands);
+        walk.history.scatter();
+        R::call(&mut walk);
+        walk.turn();
+        let t = walk.flight();
+        if walk.scene.shape.intersect(&walk.ray, Side::Inside, None, t).is_some() {
+            return None;
+        }
+        walk.arrive(t)?;
+        walk.turn();
+        let t = walk.flight();
+        let hit = walk.scene.shape.intersect(&walk.ray, Side::Inside, None, t)?;
+        walk.bands.flight(&walk.scene.medium, hit.t, false);
+        if walk.cross(&hit, Side::Inside)? == Side::Outside {
+            walk.fly_outside();
+        }
+        Some(())
+    }
+
+    fn start(
+        field: &'a Field,
+        band: usize,
+        index: usize,
+        key: &PassKey,
+        scores: &'a mut Scores,
+        rivals: R,
+        bands: B,
+    ) -> Walk<'a, R, B> {
+        let scene = &*field.scene;
+        let mut sensor_stream = key.stream(index as u64, Purpose::Sensor);
+        let [a, b] = sensor_stream.draw2();
+        let [c, d] = sensor_stream.draw2();
+        let start = scene.sensor.ray(index, [a, b, c, d]);
+        scores.count(Cost::Paths);
+        Walk {
+            scene,
+            choice: &field.choice[band],
+            roulette: field.roulette,
+            bounds: field.bounds,
+            boundary: scene.boundary[band],
+            medium: scene.medium[band],
+            band,
+            slot: start.slot,
+            ray: start.ray,
+            from: None,
+            throughput: start.weight,
+            survival: 1.0,
+            history: History::default(),
+            drawn: Drawn::Alone,
+            exit: None,
+            is_mirrored: false,
+            stream: key.stream(index as u64, Purpose::Walk),
+            light_stream: key.stream(index as u64, Purpose::Light),
+            scores,
+            rivals,
+            bands,
+        }
+    }
+
+    /// Runs from a first hit until the path ends.
+    fn run(mut self, hit: Hit) -> u64 {
+        let mut side = Side::Outside;
+        let mut hit = hit;
+        loop {
+            let Some(next_side) = self.cross(&hit, side) else { return self.stream.draws() };
+            side = next_side;
+            let next = match side {
+                Side::Inside => self.walk_inside(),
+                Side::Outside => self.fly_outside(),
+            };
+            match next {
+                Some(next) => hit = next,
+                None => return self.stream.draws(),
+            }
+        }
+    }
+
+    /// Flies and scatters in the medium until the path meets the boundary or ends.
+    fn walk_inside(&mut self) -> Option<Hit> {
+        loop {
+            let t = self.flight();
+            match self.scene.shape.intersect(&self.ray, Side::Inside, self.from, t) {
+                Some(hit) => {
+                    self.drawn = match self.drawn {
+                        Drawn::Competing(pdf) if self.matched() => {
+                            Drawn::Competing(pdf * transmittance(self.medium.sigma_t, hit.t))
+                        }
+                        drawn => drawn,
+                    };
+                    self.bands.flight(&self.scene.medium, hit.t, false);
+                    return Some(hit);
+                }
+                None if t == f64::INFINITY => {
+                    // Without extinction a half-space swallows the path; a finite body lets none go.
+                    if self.bounds.is_some() {
+                        self.scores.note(Anomaly::LostRay);
+                    }
+                    return None;
+                }
+                None => self.scatter(t)?,
+            }
+        }
+    }
+
+    /// The length of the next flight in the medium, if no boundary ends it.
+    #[inline]
+    fn flight(&mut self) -> f64 {
+        self.scores.count(Cost::Rays);
+        sample_exponential(self.medium.sigma_t, self.stream.draw())
+    }
+
+    /// A scattering event at distance `t`; `None` where the path ends.
+    fn scatter(&mut self, t: f64) -> Option<()> {
+        self.arrive(t)?;
+        self.turn();
+        Some(())
+    }
+
+    /// A new medium vertex at distance `t`, with what connects from it; `None` where the path ends.
+    #[inline]
+    fn arrive(&mut self, t: f64) -> Option<()> {
+        self.ray.origin = self.ray.at(t);
+        self.from = None;
+        if let Some(bounds) = self.bounds
+            && (self.ray.origin - bounds.center).length_squared()
+                > bounds.radius * bounds.radius * (1.0 + ROUNDING)
+        {
+            self.scores.note(Anomaly::LostRay);
+            return None;
+        }
+        self.scores.count(Cost::MediumEvents);
+        self.bands.flight(&self.scene.medium, t, true);
+        self.survive(self.bands.survival(&self.medium))?;
+        self.history.scatter();
+        R::call(self);
+        if self.matched() {
+            self.connect_from_medium();
+        }
+        Some(())
+    }
+
+    /// A new direction at a medium vertex.
+    #[inline]
+    fn turn(&mut self) {
+        let dir = self.medium.phase.sample(self.ray.dir, self.stream.draw2());
+        if self.matched() {
+            let pdf = self.medium.phase.pdf(self.ray.dir.dot(dir));
+            self.drawn = Drawn::Competing(pdf);
+        }
+        self.bands.turn(&self.scene.medium, self.ray.dir.dot(dir));
+        self.ray.dir = dir;
+    }
+
+    /// Multiplies the path's weight by `factor`, or ends the path by roulette.
+    #[inline]
+    fn survive(&mut self, factor: f64) -> Option<()> {
+        match self.roulette {
+            Roulette::Analog => (self.stream.draw() < factor).then_some(()),
+            Roulette::Below(threshold) => {
+                self.throughput *= factor;
+                self.survival *= factor;
+                let probability = roulette(self.survival, threshold, || self.stream.draw())?;
+                self.throughput /= probability;
+                self.survival /= probability;
+                Some(())
+            }
+        }
+    }
+
+    /// Flies on outside; scores the lights where nothing is in the way.
+    fn fly_outside(&mut self) -> Option<Hit> {
+        self.scores.count(Cost::Rays);
+        let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
+        if hit.is_none() {
+            self.score_escape();
+        }
+        hit
+    }
+
+    /// Meets the boundary from `side`; the side the path goes on to, `None` where it ends.
+    fn cross(&mut self, hit: &Hit, side: Side) -> Option<Side> {
+        self.from = Some(hit.face);
+        let wo = -self.ray.dir;
+        self.ray.origin = hit.point;
+        if self.matched() {
+            return Some(other(side)); // direction and competition stay as they are
+        }
+        self.scores.count(Cost::BoundaryEvents);
+        let frame = Frame::about(hit.shading_normal);
+        let local = frame.to_local(wo);
+        self.exit = (side == Side::Inside).then_some(Exit { hit: *hit, frame, wo: local });
+        if (local.z > 0.0) != (side == Side::Outside) {
+            self.scores.note(Anomaly::WrongSide);
+            return None;
+        }
+        if !self.boundary.is_delta() {
+            self.connect_from_surface(hit, &frame, local);
+        } else if side == Side::Outside {
+            let reflected = frame.to_world(DVec3::new(-local.x, -local.y, local.z));
+            let reflectance = 1.0 - self.boundary.transmittance_smooth(local);
+            R::reflect(self, hit, reflected, reflectance);
+        }
+        let sample = self.boundary.sample(local, self.stream.draw3())?;
+        let dir = frame.to_world(sample.wi);
+        let next_side = if sample.event == Event::Refract { other(side) } else { side };
+        if (dir.dot(hit.normal) > 0.0) != (next_side == Side::Outside) {
+            self.scores.note(Anomaly::WrongSide);
+            return None;
+        }
+        let mirrors = sample.event == Event::Reflect && sample.density == Density::Delta;
+        self.is_mirrored = mirrors && side == Side::Outside;
+        if sample.event == Event::Reflect && side == Side::Inside {
+            self.history.reflect_internally();
+        }
+        if next_side == Side::Inside {
+            self.rivals.meet_surface();
+        }
+        self.throughput *= sample.weight;
+        self.survival *= sample.weight * radiance_scale(side, next_side, &self.boundary);
+        self.ray.dir = dir;
+        self.drawn = match sample.density {
+            Density::Delta => Drawn::Alone,
+            Density::Finite(pdf) => Drawn::Competing(pdf),
+        };
+        Some(next_side)
+    }
+
+    /// Scores every light in the direction of a path that leaves the scene.
+    fn score_escape(&mut self) {
+        let class = self.history.class();
+        for (index, light) in self.scene.lights.iter().enumerate() {
+            let (radiance, pdf) = light.eval(self.band, self.ray.dir);
+            let is_scored = self.is_mirrored && R::has_scored_reflection(self, index, self.ray.dir);
+            if radiance > 0.0 && !is_scored {
+                let rivals = self.rival_densities(index, self.ray.dir);
+                let walks = self.bands.density();
+                let [bsdf, by_light] = self.taking_part();
+                if bsdf == 0.0 {
+                    continue;
+                }
+                let weight = match (self.drawn, &self.exit) {
+                    (Drawn::Alone, Some(exit)) if rivals > 0.0 => {
+                        // A delta lobe's density is its probability.
+                        let own = self.boundary.transmittance_smooth(exit.wo);
+                        own / (walks * own + rivals)
+                    }
+                    (Drawn::Alone, _) => 1.0 / walks,
+                    (Drawn::Competing(own), _) => {
+                        own / (walks * (own + by_light * (self.choice[index] * pdf)) + rivals)
+                    }
+                };
+                let value = self.throughput * weight * radiance;
+                self.score(class, index, value);
+            }
+        }
+    }
+
+    /// What other techniques make of the path that leaves at the last exit, if there is one.
+    #[inline]
+    fn rival_densities(&mut self, light: usize, wi: DVec3) -> f64 {
+        match self.exit {
+            Some(exit) => R::densities(self, &exit, light, wi),
+            None => 0.0,
+        }
+    }
+
+    /// Which of BSDF and light sampling take part in what leaves at the last exit.
+    #[inline]
+    fn taking_part(&self) -> [f64; 2] {
+        if self.exit.is_some() { self.rivals.unidirectional() } else { [1.0, 1.0] }
+    }
+
+    /// Adds a contribution of the walk to what its sensor slot counts.
+    #[inline]
+    fn score(&mut self, class: TransportClass, light: usize, value: f64) {
+        let place = Place { slot: self.slot, band: self.band, class, light };
+        self.bands.score(self.scores, place, value);
+    }
+
+    /// The same for a path that has left the walk, with what the bands made of it since.
+    #[inline]
+    pub fn score_with(&mut self, bands: &B, class: TransportClass, light: usize, value: f64) {
+        let place = Place { slot: self.slot, band: self.band, class, light };
+        bands.score(self.scores, place, value);
+    }
+
+    /// With which probability light sampling chooses a light.
+    #[inline]
+    pub fn choice(&self, light: usize) -> f64 {
+        self.choice[light]
+    }
+
+    /// The exit of a path that arrives along `dir`; `None` (and counted) where shading and geometric normal
+    /// disagree about the side.
+    pub fn exit_at(&mut self, hit: Hit, dir: DVec3) -> Option<Exit> {
+        let frame = Frame::about(hit.shading_normal);
+        let wo = frame.to_local(-dir);
+        if wo.z >= 0.0 {
+            self.scores.note(Anomaly::WrongSide);
+            return None;
+        }
+        Some(Exit { hit, frame, wo })
+    }
+
+    /// Whether a direction leads outside at an exit; counted where the normals disagree.
+    pub fn leads_outside(&mut self, exit: &Exit, dir: DVec3) -> bool {
+        let [geometric, shading] = [exit.hit.normal, exit.frame.n].map(|normal| dir.dot(normal) > 0.0);
+        if geometric != shading {
+            self.scores.note(Anomaly::WrongSide);
+        }
+        geometric && shading
+    }
+
+    /// Samples a light from a rough surface vertex.
+    fn connect_from_surface(&mut self, hit: &Hit, frame: &Frame, wo: DVec3) {
+        let u = self.light_stream.draw3();
+        let Some((index, choice)) = self.choose_light(u[0]) else { return };
+        let sample = self.scene.lights[index].sample(self.band, [u[1], u[2]]);
+        let wi = frame.to_local(sample.wi);
+        let outside = sample.wi.dot(hit.normal) > 0.0;
+        if outside != (wi.z > 0.0) {
+            self.scores.note(Anomaly::WrongSide);
+            return;
+        }
+        if !outside || sample.radiance == 0.0 {
+            return;
+        }
+        let (value, pdf) = self.boundary.eval(wo, wi);
+        if value == 0.0 {
+            return;
+        }
+        self.scores.count(Cost::ShadowRays);
+        let shadow = Ray { origin: hit.point, dir: sample.wi };
+        if self.scene.shape.occluded(&shadow, Some(hit.face)) {
+            return;
+        }
+        self.score_connection((index, choice), (sample.wi, sample.pdf), value * sample.radiance, pdf);
+    }
+
+    /// Samples a light from a medium vertex, straight through a matched boundary.
+    fn connect_from_medium(&mut self) {
+        let u = self.light_stream.draw3();
+        let Some((index, choice)) = self.choose_light(u[0]) else { return };
+        let sample = self.scene.lights[index].sample(self.band, [u[1], u[2]]);
+        if sample.radiance == 0.0 {
+            return;
+        }
+        let phase = self.medium.phase.pdf(self.ray.dir.dot(sample.wi));
+        let Some(through) = self.transmittance_out(sample.wi) else { return };
+        let own = phase * through;
+        self.score_connection((index, choice), (sample.wi, sample.pdf), own * sample.radiance, own);
+    }
+
+    /// Transmittance from the path's medium vertex to infinity along `dir`, through every part of the
+    /// body on the way.
+    fn transmittance_out(&mut self, dir: DVec3) -> Option<f64> {
+        let mut ray = Ray { origin: self.ray.origin, dir };
+        let mut from = None;
+        let mut inside_length = 0.0;
+        let mut side = Side::Inside;
+        loop {
+            self.scores.count(Cost::ShadowRays);
+            match self.scene.shape.intersect(&ray, side, from, f64::INFINITY) {
+                Some(hit) => {
+                    if side == Side::Inside {
+                        inside_length += hit.t;
+                    }
+                    ray.origin = hit.point;
+                    from = Some(hit.face);
+                    side = other(side);
+                }
+                None if side == Side::Outside => {
+                    return Some(transmittance(self.medium.sigma_t, inside_length));
+                }
+                None => {
+                    if self.bounds.is_some() {
+                        self.scores.note(Anomaly::LostRay);
+                    }
+                    return None;
+                }
+            }
+        }
+    }
+
+    /// Adds a light sample towards `wi`: `value` is f |cos| (or phase times transmittance) times radiance, `own`
+    /// the density with which the path's own sampling draws the direction. Against parallel light it has none.
+    fn score_connection(
+        &mut self,
+        (light, choice): (usize, f64),
+        (wi, pdf): (DVec3, Option<f64>),
+        value: f64,
+        own: f64,
+    ) {
+        let [bsdf, by_light] = self.taking_part();
+        if by_light == 0.0 {
+            return;
+        }
+        let rivals = self.rival_densities(light, wi);
+        let walks = self.bands.density();
+        let estimate = match pdf {
+            Some(pdf) => {
+                let density = choice * pdf;
+                value / density * (density / (walks * (density + bsdf * own) + rivals))
+            }
+            None => value / choice * (choice / (walks * choice + rivals)),
+        };
+        let score = self.throughput * estimate;
+        self.score(self.history.class(), light, score);
+    }
+
+    /// A light by its strength, and the probability of that choice.
+    fn choose_light(&self, u: f64) -> Option<(usize, f64)> {
+        let mut rest = u;
+        for (index, &choice) in self.choice.iter().enumerate() {
+            if rest < choice {
+                return Some((index, choice));
+            }
+            rest -= choice;
+        }
+        // Rounding of the sum: the last light that shines.
+        self.choice.iter().rposition(|&choice| choice > 0.0).map(|index| (index, self.choice[index]))
+    }
+
+    #[inline]
+    fn matched(&self) -> bool {
+        self.boundary == Boundary::Matched
+    }
+}
+
+/// Russian roulette on a weight: above the threshold it goes on as it is, below it survives with
+/// probability weight / threshold. Returns the probability to divide by.
+#[inline]
+fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> Option<f64> {
+    if weight >= threshold {
+        return Some(1.0);
+    }
+    let probability = weight / threshold;
+    (u() < probability).then_some(probability)
+}
+
+#[inline]
+pub(super) fn other(side: Side) -> Side {
+    match side {
+        Side::Outside => Side::Inside,
+        Side::Inside => Side::Outside,
+    }
+}
+
+/// Undoes radiance's factor (n_o / n_i)^2 of a refraction from `side` (of wo) to `next` (of wi).
+#[inline]
+pub(super) fn radiance_scale(side: Side, next: Side, boundary: &Boundary) -> f64 {
+    let eta = match boundary {
+        Boundary::Smooth { eta } | Boundary::Rough { eta, .. } => *eta,
+        Boundary::Matched => 1.0,
+    };
+    match (side, next) {
+        (Side::Outside, Side::Inside) => eta * eta,
+        (Side::Inside, Side::Outside) => 1.0 / (eta * eta),
+        _ => 1.0,
+    }
+}
