@@ -254,8 +254,9 @@ pub struct Bounce {
     /// Mean cosine of the Henyey-Greenstein phase function.
     #[schemars(range(min = -0.9999, max = 0.9999))]
     pub g: f64,
-    /// Angle between the direction of travel on arrival and the point, degrees.
-    #[schemars(range(min = 0.0, max = 180.0))]
+    /// Angle between the direction of travel on arrival and the point, degrees; at both ends there is no plane
+    /// of arrival to chart the azimuth from.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 180))]
     pub angle_deg: f64,
 }
 
