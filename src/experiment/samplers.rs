@@ -9,7 +9,9 @@ use super::registry::SamplerEntry;
 use crate::error::{Error, Result};
 use crate::geometry::procedural;
 use crate::math::DVec3;
+use crate::optics::joint::{JointDirections, JointTable};
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
+use crate::optics::phase::HenyeyGreenstein;
 use crate::samplers::Sampler;
 use crate::samplers::boundary::{RoughSampler, SmoothSampler};
 use crate::samplers::discrete::{BandSampler, HeroFlightSampler};
@@ -17,7 +19,9 @@ use crate::samplers::distance::{
     EquiangularSampler, ExponentialSampler, MixtureSampler, TruncatedExponentialSampler,
 };
 use crate::samplers::facets::NormalSampler;
+use crate::samplers::joint::BounceSampler;
 use crate::samplers::light::{CapSampler, LatLongSampler};
+use crate::samplers::lobe::{PlaneSampler, PowerSampler};
 use crate::samplers::phase::HenyeyGreensteinSampler;
 use crate::samplers::radial::RadialSampler;
 use crate::samplers::surface::{MeshSampler, TriangleSampler};
@@ -63,12 +67,22 @@ pub fn builtin() -> Vec<SamplerEntry> {
             Towards => |o| some(TowardsSampler::new(o.distance_mm))),
         entry!("direction_distance", "joint direction-distance sampling towards a point",
             Joint => |o| some(JointSampler::new(o.distance_mm, end(o.t_max_mm)))),
+        entry!("bounce_table", "directions of a single bounce towards a point by the table of the joint density",
+            Bounce => |o| Ok(BounceSampler::new(JointDirections::Table(JointTable::new(o.phase())), o.angle_deg))),
+        entry!("bounce_mixture", "directions of a single bounce towards a point, phase function and geometry mixed",
+            Bounce => |o| Ok(BounceSampler::new(JointDirections::Mixture(o.phase()), o.angle_deg))),
+        entry!("power_lobe", "directions of a lobe with a power tail about an axis",
+            Width => |o| Ok(PowerSampler::new(o.width))),
+        entry!("plane_lobe", "directions from a vertex to the points of a plane above it",
+            Depth => |o| Ok(PlaneSampler::new(o.height_mm, o.mfp_mm))),
         entry!("facet_normals", "microfacet normals in proportion to their projected area",
             Facets => |o| Ok(NormalSampler::plain(o.facets()))),
         entry!("visible_normals", "microfacet normals as seen from a direction",
             SeenFacets => |o| Ok(NormalSampler::visible(o.facets(), o.cos))),
         entry!("rough_dielectric", "the rough dielectric as a whole: reflection, refraction, total reflection",
-            Rough => |o| o.sampler()),
+            Rough => |o| o.sampler(RoughSampler::new)),
+        entry!("rough_refraction", "refraction through a rough dielectric, without a choice of lobe",
+            Rough => |o| o.sampler(RoughSampler::refraction)),
         entry!("smooth_dielectric", "which lobe of the smooth dielectric, with exact directions",
             Smooth => |o| Ok(SmoothSampler::smooth(o.eta, o.view.signed(o.cos)))),
         entry!("matched_boundary", "the boundary that is none: straight through",
@@ -233,6 +247,46 @@ pub struct Joint {
     pub t_max_mm: Option<f64>,
 }
 
+/// Options of `bounce_table` and `bounce_mixture`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Bounce {
+    /// Mean cosine of the Henyey-Greenstein phase function.
+    #[schemars(range(min = -0.9999, max = 0.9999))]
+    pub g: f64,
+    /// Angle between the direction of travel on arrival and the point, degrees; at both ends there is no plane
+    /// of arrival to chart the azimuth from.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 180))]
+    pub angle_deg: f64,
+}
+
+impl Bounce {
+    fn phase(&self) -> HenyeyGreenstein {
+        HenyeyGreenstein { g: self.g }
+    }
+}
+
+/// Options of `power_lobe`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Width {
+    /// Tangent of half the angle that holds half of it; 1 is uniform.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub width: f64,
+}
+
+/// Options of `plane_lobe`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Depth {
+    /// Distance of the vertex from the plane, mm.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub height_mm: f64,
+    /// Mean free path, mm.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub mfp_mm: f64,
+}
+
 /// A distribution of microfacets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -306,7 +360,7 @@ impl ViewSide {
     }
 }
 
-/// Options of `rough_dielectric`.
+/// Options of `rough_dielectric` and `rough_refraction`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rough {
@@ -326,14 +380,14 @@ pub struct Rough {
 }
 
 impl Rough {
-    fn sampler(&self) -> Result<RoughSampler> {
+    fn sampler(&self, new: fn(f64, Microfacets, f64) -> RoughSampler) -> Result<RoughSampler> {
         if self.eta == 1.0 {
             return Err(Error::input(
                 "sampler options: eta = 1 is no rough dielectric; use matched_boundary",
             ));
         }
         let facets = self.distribution.facets(self.alpha);
-        Ok(RoughSampler::new(self.eta, facets, self.view.signed(self.cos)))
+        Ok(new(self.eta, facets, self.view.signed(self.cos)))
     }
 }
 

@@ -456,4 +456,103 @@ mod tests {
             }
         }
     }
+
+    /// The probability of the sides that forced refraction may fail with, and of what it draws, is 1: the
+    /// density over the far side by quadrature, failures counted over an evenly spread cube. The tolerances
+    /// are those of [`densities_and_failures_sum_to_one`].
+    #[test]
+    fn refraction_and_its_failures_sum_to_one() {
+        for surface in rough_surfaces() {
+            let Boundary::Rough { facets, .. } = surface else { unreachable!() };
+            if facets.alpha < 0.1 {
+                continue;
+            }
+            for cos in [0.8, -0.9, -0.5] {
+                let from = direction(cos, 0.0);
+                let far = if cos > 0.0 { 0.5 * PI } else { 0.0 };
+                let sent = pieces(far, far + 0.5 * PI, 32, 1e-10, |theta| {
+                    let (sin, cos) = (crate::math::sin(theta), crate::math::cos(theta));
+                    let ring = |phi: f64| surface.pdf_refraction(from, direction(cos, phi));
+                    4.0 * PI * sin * pieces(0.0, 0.5, 16, 1e-12, ring).value
+                });
+                assert!(sent.error < 1e-8, "the quadrature did not resolve: {sent:?}");
+                let n = 150_000;
+                let point = |k: u32| [R3[0], R3[1]].map(|step| (f64::from(k) * step).fract());
+                let nulls =
+                    (0..n).filter(|&k| surface.sample_refraction(from, point(k)).is_none()).count();
+                let counted = nulls as f64 / f64::from(n);
+                let share = 1.0 - sent.value;
+                // As above; where nothing fails, the quadrature is good to 1e-6.
+                let error = (share * (1.0 - share)).max(0.0) / f64::from(n);
+                let bound = (5.0 * error.sqrt()).clamp(1e-6, 2e-3);
+                assert!((counted - share).abs() < bound, "{surface:?} {cos}: {counted} {share}");
+            }
+        }
+    }
+
+    /// Forced refraction is the refraction part of the whole, without its choice of lobe; and the value
+    /// over its density is (n_o / n_i)^2 (1 - F) G1(wi), from either side, with F of the facet by Snell.
+    #[test]
+    fn value_over_refraction_density() {
+        for surface in rough_surfaces() {
+            let Boundary::Rough { eta, facets } = surface else { unreachable!() };
+            for cos in [0.95, 0.4, 0.05, -0.05, -0.4, -0.95] {
+                let wo = direction(cos, 0.21);
+                let (near, far) = if cos > 0.0 { (1.0, eta) } else { (eta, 1.0) };
+                let mut drawn = 0;
+                for u0 in grid(32) {
+                    for u1 in grid(32) {
+                        let Some(wi) = surface.sample_refraction(wo, [u0, u1]) else { continue };
+                        let forced = surface.pdf_refraction(wo, wi);
+                        let (value, pdf) = surface.eval(wo, wi);
+                        let h = (near * wo + far * wi).normalize();
+                        let reflectance = fresnel(wo.dot(h).abs(), far / near).reflectance;
+                        assert!(forced > 0.0 && (wi.length() - 1.0).abs() < 1e-13);
+                        // 1 - F is a difference, of numbers near 1 where it is small.
+                        let digits = 1e-10 + 1e-13 / (1.0 - reflectance);
+                        assert!((pdf / forced / (1.0 - reflectance) - 1.0).abs() < digits);
+                        let expected = (near / far) * (near / far) * (1.0 - reflectance) * facets.g1(wi);
+                        assert!(
+                            (value / forced / expected - 1.0).abs() < digits,
+                            "{surface:?} {cos}: {value} {forced} {expected}"
+                        );
+                        assert_eq!(surface.pdf_refraction(wo, DVec3::new(wi.x, wi.y, -wi.z)), 0.0);
+                        drawn += 1;
+                    }
+                }
+                // Towards the thinner side oblique facets reflect totally, all of them where they are flat.
+                let is_total = fresnel(cos.abs(), far / near).reflectance == 1.0;
+                assert!(is_total || drawn > 300, "{surface:?} {cos}: {drawn}");
+            }
+        }
+    }
+
+    /// Snell about the macroscopic normal is what the smooth surface draws, whatever the roughness.
+    #[test]
+    fn refraction_about_the_macroscopic_normal() {
+        let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.3 };
+        for eta in [0.8, 1.3, 1.5] {
+            let (smooth, rough) = (Boundary::Smooth { eta }, Boundary::Rough { eta, facets });
+            for i in 1..40 {
+                let from = direction(f64::from(i) / 20.0 - 0.999, 0.3);
+                let drawn = smooth.sample(from, [1.0, 0.0, 0.0]).expect("a direction");
+                let is_total = smooth.transmittance_smooth(from) == 0.0;
+                assert_eq!(smooth.refract(from).is_none(), is_total);
+                assert_eq!(rough.refract(from), smooth.refract(from));
+                assert_eq!(smooth.sample_refraction(from, [0.2, 0.7]), smooth.refract(from));
+                assert_eq!(rough.transmittance_smooth(from), smooth.transmittance_smooth(from));
+                if let Some(to) = smooth.refract(from) {
+                    assert!((to - drawn.wi).length() < 1e-14 && to.z * from.z < 0.0);
+                    assert_eq!(smooth.pdf_refraction(from, to), 0.0);
+                    let back = smooth.refract(to).expect("goes back");
+                    assert!((back - from).length() < 1e-12, "{eta} {from}");
+                }
+            }
+        }
+        let from = direction(0.3, 0.1);
+        assert_eq!(Boundary::Matched.refract(from), Some(-from));
+        assert_eq!(Boundary::Matched.sample_refraction(from, [0.1, 0.2]), Some(-from));
+        assert_eq!((Boundary::Matched.transmittance_smooth(from), Boundary::Matched.eta()), (1.0, 1.0));
+        assert_eq!(Boundary::Rough { eta: 1.3, facets }.eta(), 1.3);
+    }
 }

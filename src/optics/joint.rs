@@ -13,8 +13,19 @@
 //!   pdf(w) = iso(w) P(cell) / I(cell),     I(cell) = the isotropic probability of the cell,
 //! which is the density of what is drawn to the last bit, however coarse the cells.
 //!
-//! How close: the second moment of target / pdf under pdf (normalised; 1 would be exact), the mean over 16 angles alpha
-//! spread over each third of [0, pi] and over the directions (see the test `closer_than_the_mixture`).
+//! How close: the mean of target / pdf over the target (both normalised) is 1 where they are the same, and
+//! its excess over 1 is the relative variance of a sample's weight. By the angle alpha (test
+//! `closer_than_the_mixture`; [`PhaseTowards`] is the mixture that needs no table):
+//!
+//! | g   | table at 20, 90, 160 degrees | mixture             |
+//! |-----|------------------------------|---------------------|
+//! | 0   | 1, 1, 1                      | 1.137, 1.137, 1.137 |
+//! | 0.5 | 1.001, 1.002, 1.001          | 1.809, 1.148, 1.048 |
+//! | 0.8 | 1.009, 1.018, 1.008          | 2.033, 1.387, 1.371 |
+//! | 0.9 | 1.035, 1.083, 1.033          | 1.862, 1.584, 1.591 |
+//!
+//! Beyond that the cells, 2.8 by 5.6 degrees, become coarse beside the phase function's peak, and the variance
+//! grows. Tables for one g are built in 0.05 s and take 1.2 MB; drawing costs about 60 ns, a density 45 ns.
 
 use std::f64::consts::PI;
 
@@ -61,6 +72,10 @@ pub struct Joint<'a> {
 }
 
 impl JointTable {
+    /// Cells in theta over [0, pi], and in azimuth over the half turn from the plane of `w_in`; in both the
+    /// density jumps at the edges.
+    pub const CELLS: [usize; 2] = [ROWS, COLUMNS];
+
     /// Builds the tables: for each step of alpha and each cell the mean of the phase function over both,
     /// by three Gauss points along each of the three angles. No mean is 0.
     pub fn new(phase: HenyeyGreenstein) -> JointTable {
@@ -260,5 +275,175 @@ impl JointLobe<'_> {
             JointLobe::Table(joint) => joint.pdf(dir),
             JointLobe::Mixture(mixture) => mixture.pdf(dir),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sin_cos_turns;
+
+    const TO: DVec3 = DVec3::new(0.48, -0.6, 0.64);
+
+    /// A direction of travel at this angle to the point, and a frame with it in its first plane.
+    fn arrival(alpha: f64) -> (DVec3, Frame) {
+        let frame = Frame::about(TO);
+        let (s, c) = sin_cos_turns(0.137);
+        let frame = Frame { s: frame.s * c + frame.t * s, t: frame.t * c - frame.s * s, n: TO };
+        (frame.to_world(DVec3::new(sin(alpha), 0.0, cos(alpha))), frame)
+    }
+
+    /// Sum of f over directions, weighted by the isotropic density: theta and azimuth by the midpoint rule,
+    /// exact in theta for what is constant over the rows, since 2 (pi - theta) / pi^2 is linear.
+    fn isotropic_mean(frame: &Frame, n: usize, f: impl Fn(DVec3) -> f64) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..n * ROWS {
+            let theta = PI * (i as f64 + 0.5) / (n * ROWS) as f64;
+            let mut ring = 0.0;
+            for j in 0..2 * n * COLUMNS {
+                let (s, c) = sin_cos_turns((j as f64 + 0.5) / (2 * n * COLUMNS) as f64);
+                ring += f(frame.to_world(DVec3::new(sin(theta) * c, sin(theta) * s, cos(theta))));
+            }
+            sum += ring * 2.0 * (PI - theta) / PI;
+        }
+        sum / (2 * n * n * ROWS * COLUMNS) as f64
+    }
+
+    fn isotropic(dir: DVec3) -> f64 {
+        TowardsPoint::pdf_about(TO, dir).1
+    }
+
+    /// D7, along every kind of arrival, the axis itself included.
+    #[test]
+    fn normalised() {
+        for g in [-0.9, 0.3, 0.8, 0.99] {
+            let table = JointTable::new(HenyeyGreenstein { g });
+            for alpha in [0.0, 0.3, 1.6, 2.9, PI] {
+                let (w_in, frame) = arrival(alpha);
+                let joint = table.towards(w_in, TO);
+                let mass = isotropic_mean(&frame, 2, |dir| joint.pdf(dir) / isotropic(dir));
+                assert!((mass - 1.0).abs() < 1e-9, "{g} {alpha}: {mass}");
+            }
+        }
+    }
+
+    /// D2: the density is the inverse Jacobian of the map, wherever a difference stays inside a cell.
+    #[test]
+    fn density_is_the_inverse_jacobian() {
+        for g in [-0.5, 0.0, 0.8, 0.95] {
+            let table = JointTable::new(HenyeyGreenstein { g });
+            for alpha in [0.0, 0.7, 1.9, 3.1] {
+                let joint = table.towards(arrival(alpha).0, TO);
+                let (mut right, mut all) = (0, 0);
+                for i in 0..97 {
+                    for j in 0..89 {
+                        let u = [(f64::from(i) + 0.3) / 97.0, (f64::from(j) + 0.3) / 89.0];
+                        let at = |a: f64, b: f64| joint.sample([u[0] + a, u[1] + b]);
+                        let e = 1e-7;
+                        let du = (at(e, 0.0) - at(-e, 0.0)) / (2.0 * e);
+                        let dv = (at(0.0, e) - at(0.0, -e)) / (2.0 * e);
+                        let dir = at(0.0, 0.0);
+                        let product = du.cross(dv).length() * joint.pdf(dir);
+                        assert!((dir.length() - 1.0).abs() < 1e-14);
+                        right += u32::from((product - 1.0).abs() < 1e-4);
+                        all += 1;
+                    }
+                }
+                // Of 8633 places about 8633 2e-7 (64 + 64) lie this close to an edge: less than one.
+                assert!(right + 3 >= all, "{g} {alpha}: {right} of {all}");
+            }
+        }
+    }
+
+    /// Without a peak it is the exact isotropic density, with its exact map.
+    #[test]
+    fn isotropic_is_exact() {
+        let table = JointTable::new(HenyeyGreenstein { g: 0.0 });
+        let towards = TowardsPoint::new(TO).expect("away");
+        let (w_in, frame) = arrival(0.8);
+        for (a, b) in [(0.1, 0.2), (0.6, 0.9), (0.999, 0.4)] {
+            let dir = table.towards(w_in, TO).sample([a, b]);
+            assert_eq!(table.towards(w_in, TO).pdf(dir), towards.pdf(dir));
+            assert!((dir - frame.to_world(TowardsPoint::sample_local([a, b]))).length() < 1e-15);
+        }
+    }
+
+    /// Second moment of target / pdf under pdf, both normalised: 1 where the density is the target, and 1 plus
+    /// the relative variance of a sample's weight else.
+    fn second_moment(phase: HenyeyGreenstein, alpha: f64, pdf: impl Fn(DVec3) -> f64) -> f64 {
+        let (w_in, frame) = arrival(alpha);
+        let target = |dir: DVec3| phase.pdf(w_in.dot(dir));
+        let norm = isotropic_mean(&frame, 6, target);
+        let square = |dir: DVec3| target(dir) * target(dir) * isotropic(dir) / pdf(dir);
+        isotropic_mean(&frame, 6, square) / (norm * norm)
+    }
+
+    /// What the head says of both ways of drawing, at 20, 90 and 160 degrees: table, mixture.
+    const MOMENTS: [(f64, [f64; 3], [f64; 3]); 4] = [
+        (0.0, [1.0, 1.0, 1.0], [1.137, 1.137, 1.137]),
+        (0.5, [1.001, 1.002, 1.001], [1.809, 1.148, 1.048]),
+        (0.8, [1.009, 1.018, 1.008], [2.033, 1.387, 1.371]),
+        (0.9, [1.035, 1.083, 1.033], [1.862, 1.584, 1.591]),
+    ];
+
+    #[test]
+    fn closer_than_the_mixture() {
+        for (g, by_table, by_mixture) in MOMENTS {
+            let phase = HenyeyGreenstein { g };
+            let table = JointTable::new(phase);
+            for (k, degrees) in [20.0, 90.0, 160.0].into_iter().enumerate() {
+                let alpha = PI * degrees / 180.0;
+                let w_in = arrival(alpha).0;
+                let mixture = PhaseTowards::new(phase, w_in, TO);
+                let joint = table.towards(w_in, TO);
+                let moments = [
+                    second_moment(phase, alpha, |dir| joint.pdf(dir)),
+                    second_moment(phase, alpha, |dir| mixture.pdf(dir)),
+                ];
+                for (moment, told) in moments.into_iter().zip([by_table[k], by_mixture[k]]) {
+                    assert!((moment - told).abs() < 6e-4, "{g} {degrees}: {moments:?}");
+                }
+            }
+        }
+    }
+
+    /// Both ways of drawing under one name.
+    #[test]
+    fn one_name_for_both() {
+        let phase = HenyeyGreenstein { g: 0.6 };
+        let w_in = arrival(1.1).0;
+        let (table, mixture) = (JointTable::new(phase), PhaseTowards::new(phase, w_in, TO));
+        let u = [0.3, 0.8];
+        let by_table = JointDirections::Table(table.clone());
+        let by_mixture = JointDirections::Mixture(phase);
+        assert_eq!(by_table.towards(w_in, TO).sample(u), table.towards(w_in, TO).sample(u));
+        assert_eq!(by_mixture.towards(w_in, TO).sample(u), mixture.sample(u));
+        assert_eq!(by_table.towards(w_in, TO).pdf(DVec3::X), table.towards(w_in, TO).pdf(DVec3::X));
+        assert_eq!(by_mixture.towards(w_in, TO).pdf(DVec3::X), mixture.pdf(DVec3::X));
+    }
+
+    /// What building, drawing and asking cost; `cargo test --release joint::tests::cost -- --ignored --nocapture`.
+    #[test]
+    #[ignore = "times, for people"]
+    fn cost() {
+        let now = std::time::Instant::now();
+        let table = JointTable::new(HenyeyGreenstein { g: 0.9 });
+        println!("build {:?}", now.elapsed());
+        let n = 1_000_000;
+        let (mut sum, mut dirs) = (DVec3::ZERO, Vec::new());
+        let joint = table.towards(arrival(0.7).0, TO);
+        let u = |k: u32| [(f64::from(k) * 0.754_877_666).fract(), (f64::from(k) * 0.569_840_29).fract()];
+        let now = std::time::Instant::now();
+        for k in 0..n {
+            let dir = joint.sample(u(k));
+            sum += dir;
+            if k % 1000 == 0 {
+                dirs.push(dir);
+            }
+        }
+        println!("sample {:?}, {sum}", now.elapsed() / n);
+        let now = std::time::Instant::now();
+        let sum: f64 = (0..n).map(|k| joint.pdf(dirs[k as usize % dirs.len()])).sum();
+        println!("pdf {:?}, {sum}", now.elapsed() / n);
     }
 }

@@ -30,8 +30,12 @@ use crate::sampling::stream::Stream;
 /// Jacobians: about wo, h is at the polar angle g, wi at b(g) and the same azimuth, so that
 /// d omega_i / d omega_h = |sin b b'| / sin g. Reflection: b = 2g, 4 cos g. Refraction: b = pi + g - g_t,
 /// sin g_t = sin g / r: (cos g_t - cos g / r)^2 / cos g_t.
+///
+/// Forced refraction is the piece of refraction alone; it fails beyond the piece's end, by a wrong side or
+/// by total reflection, whatever the reflectance: where q > q_w or else q > q_c.
 pub struct RoughSampler {
     boundary: Boundary,
+    is_forced: bool,
     /// Towards the sensor; below the surface for light from inside.
     wo: DVec3,
     region: Region,
@@ -139,15 +143,25 @@ struct Edges {
 impl RoughSampler {
     /// `eta` inside over outside, not 1; `cos` of `wo`, negative from inside.
     pub fn new(eta: f64, facets: Microfacets, cos: f64) -> RoughSampler {
+        RoughSampler::with(eta, facets, cos, false)
+    }
+
+    /// The same surface with refraction forced.
+    pub fn refraction(eta: f64, facets: Microfacets, cos: f64) -> RoughSampler {
+        RoughSampler::with(eta, facets, cos, true)
+    }
+
+    fn with(eta: f64, facets: Microfacets, cos: f64, is_forced: bool) -> RoughSampler {
         let up = view(cos.abs());
         let sign = 1f64.copysign(cos);
         let relative = if cos > 0.0 { eta } else { 1.0 / eta };
         let critical2 = if relative < 1.0 { (1.0 - relative) * (1.0 + relative) } else { 0.0 };
         let region = Region { slopes: Slopes::about(up), relative, critical2 };
-        let parts = parts(&region, facets.alpha);
+        let mut parts = parts(&region, facets.alpha);
+        parts.retain(|part| !is_forced || part.event == Event::Refract);
         let wo = DVec3::new(up.x, up.y, up.z * sign);
-        let null = null(&region, &facets, up);
-        RoughSampler { boundary: Boundary::Rough { eta, facets }, wo, region, parts, null }
+        let null = null(&region, &facets, up, is_forced);
+        RoughSampler { boundary: Boundary::Rough { eta, facets }, is_forced, wo, region, parts, null }
     }
 
     /// Mirrors between the side of `wo` and the upper side.
@@ -191,20 +205,31 @@ impl RoughSampler {
         self.parts.iter().position(holds)
     }
 
-    fn point(&self, sample: &BoundarySample) -> Option<Draw> {
-        let Density::Finite(pdf) = sample.density else { return None };
-        let (wo, wi) = (self.upper(self.wo), self.upper(sample.wi));
-        let sum = match sample.event {
+    /// A direction with its event and the density that the code says it has.
+    fn drawn(&self, stream: &mut Stream) -> Option<(Event, DVec3, f64)> {
+        if self.is_forced {
+            let wi = self.boundary.sample_refraction(self.wo, stream.draw2())?;
+            return Some((Event::Refract, wi, self.boundary.pdf_refraction(self.wo, wi)));
+        }
+        let BoundarySample { wi, density, event, .. } = self.boundary.sample(self.wo, stream.draw3())?;
+        // The rough surface has no delta lobe: a density that says so is wrong.
+        let pdf = if let Density::Finite(pdf) = density { pdf } else { f64::NAN };
+        Some((event, wi, pdf))
+    }
+
+    fn point(&self, event: Event, wi: DVec3, pdf: f64) -> Option<Draw> {
+        let (wo, wi) = (self.upper(self.wo), self.upper(wi));
+        let sum = match event {
             Event::Reflect => wo + wi,
             Event::Refract => wo + self.region.relative * wi,
         };
         let h = if sum.z < 0.0 { -sum.normalize() } else { sum.normalize() };
         let slopes = self.region.slopes.of(h);
-        let piece = self.part_of(sample.event, slopes)?;
+        let piece = self.part_of(event, slopes)?;
         let Part { chart, reach, .. } = self.parts[piece];
         let at = chart.coordinates(slopes, self.region.range(reach, slopes[0]));
         let (_, solid_angle) = chart.at(at, |x| self.region.range(reach, x));
-        let (_, jacobian) = self.direction(sample.event, h);
+        let (_, jacobian) = self.direction(event, h);
         Some(Draw::Point { piece, at, density: pdf * jacobian * solid_angle })
     }
 }
@@ -253,8 +278,8 @@ fn parts(region: &Region, alpha: f64) -> Vec<Part> {
 
 /// The probability that the chosen facet sends the light to the wrong side, from the facets' density and
 /// Fresnel's reflectance F over the rest of the half-plane of visible slopes: reflection (F) where
-/// q > q_r, refraction (1 - F) where q_w < q < q_c.
-fn null(region: &Region, facets: &Microfacets, wo: DVec3) -> f64 {
+/// q > q_r, refraction (1 - F) where q_w < q < q_c. Of forced refraction all of what lies beyond its piece.
+fn null(region: &Region, facets: &Microfacets, wo: DVec3, is_forced: bool) -> f64 {
     let edges = region.edges();
     let mut ends = vec![f64::NEG_INFINITY, edges.horizon];
     ends.extend(edges.disc);
@@ -284,6 +309,10 @@ fn null(region: &Region, facets: &Microfacets, wo: DVec3) -> f64 {
     let failed = |chart: &SlopeChart, p: f64| {
         let x = chart.x(p);
         let (reflected, critical) = (region.q_reflected(x), region.q_critical(x));
+        if is_forced {
+            let end = region.q_wrong_side(x).unwrap_or(critical);
+            return 2.0 * strip(chart, p, [end, f64::INFINITY], &|_| 1.0);
+        }
         let split = critical.max(reflected);
         let mut sum = strip(chart, p, [reflected, split], &|f| f);
         sum += strip(chart, p, [split, f64::INFINITY], &|f| f);
@@ -301,14 +330,10 @@ fn null(region: &Region, facets: &Microfacets, wo: DVec3) -> f64 {
 
 impl Sampler for RoughSampler {
     fn draw(&self, stream: &mut Stream) -> Draw {
-        match self.boundary.sample(self.wo, stream.draw3()) {
-            None => Draw::Null,
-            // A sample of no piece is outside of all of them.
-            Some(sample) => {
-                let outside = Draw::Point { piece: 0, at: [f64::NAN; 2], density: 0.0 };
-                self.point(&sample).unwrap_or(outside)
-            }
-        }
+        let Some((event, wi, pdf)) = self.drawn(stream) else { return Draw::Null };
+        // A sample of no piece is outside of all of them.
+        let outside = Draw::Point { piece: 0, at: [f64::NAN; 2], density: 0.0 };
+        self.point(event, wi, pdf).unwrap_or(outside)
     }
 
     fn pieces(&self) -> Vec<Piece> {
@@ -325,7 +350,12 @@ impl Sampler for RoughSampler {
         let Part { event, chart, reach, .. } = self.parts[piece];
         let (slopes, solid_angle) = chart.at(at, |x| self.region.range(reach, x));
         let (wi, jacobian) = self.direction(event, self.region.slopes.normal(slopes));
-        self.boundary.eval(self.wo, wi).1 * jacobian * solid_angle
+        let pdf = if self.is_forced {
+            self.boundary.pdf_refraction(self.wo, wi)
+        } else {
+            self.boundary.eval(self.wo, wi).1
+        };
+        pdf * jacobian * solid_angle
     }
 
     fn null(&self) -> Null {
@@ -341,12 +371,12 @@ impl Sampler for RoughSampler {
             chart.bounded(slopes)[axis]
         };
         let across = slope.clone();
-        vec![
-            Contrast {
-                name: "reflected",
-                of: Box::new(move |piece, _| f64::from(u8::from(events[piece] == Event::Reflect))),
-                expected: None,
-            },
+        let reflected = Contrast {
+            name: "reflected",
+            of: Box::new(move |piece, _| f64::from(u8::from(events[piece] == Event::Reflect))),
+            expected: None,
+        };
+        let along_and_across = vec![
             Contrast {
                 name: "slope along the view",
                 of: Box::new(move |k, at| slope(k, at, 0)),
@@ -357,7 +387,9 @@ impl Sampler for RoughSampler {
                 of: Box::new(move |k, at| across(k, at, 1)),
                 expected: Some(0.0),
             },
-        ]
+        ];
+        let reflected = (!self.is_forced).then_some(reflected);
+        reflected.into_iter().chain(along_and_across).collect()
     }
 }
 

@@ -58,6 +58,11 @@ pub enum Defect {
     NullsRedrawn,
     SamplerSineMissing,
     NeighboursAlike,
+    RefractionOtherIndex,
+    RefractionOtherCosine,
+    PlaneCosineMissing,
+    BounceAzimuthMirrored,
+    BounceThetaOff,
     // The verifier.
     VarianceByDifference,
     DeviationForError,
@@ -376,6 +381,36 @@ pub const SAMPLERS: &[Planted] = &[
         Defect::NeighboursAlike,
         "every other draw nearly repeats the last",
         &["samplers.serial"],
+    ),
+    sampler(
+        "refraction-index",
+        Defect::RefractionOtherIndex,
+        "the density of refraction has the squared index of the known side, not of the sampled one",
+        &["samplers.identity D7"],
+    ),
+    sampler(
+        "refraction-cosine",
+        Defect::RefractionOtherCosine,
+        "the density of refraction has the cosine of the sampled side, not of the known one",
+        &["samplers.identity D7", "samplers.chi2 coarse"],
+    ),
+    sampler(
+        "plane-cosine-missing",
+        Defect::PlaneCosineMissing,
+        "an area's density becomes one of directions without the cosine",
+        &["samplers.identity D7"],
+    ),
+    sampler(
+        "bounce-azimuth",
+        Defect::BounceAzimuthMirrored,
+        "a table's azimuth is drawn from the far side of the plane of arrival",
+        &["samplers.chi2 coarse"],
+    ),
+    sampler(
+        "bounce-theta",
+        Defect::BounceThetaOff,
+        "the density of theta is 1 % too high",
+        &["samplers.identity D7"],
     ),
 ];
 

@@ -15,6 +15,7 @@
 
 mod defects;
 mod identities;
+mod lobes;
 mod matrix;
 mod plays;
 mod samplers;

@@ -14,6 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::defects::{Defect, planted};
+use super::lobes::{Bounce, Plane, Refraction};
 
 /// None of them has options.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -44,6 +45,9 @@ pub fn entries() -> Vec<SamplerEntry> {
         entry!("planted_partly_delta", "a delta lobe beside a cosine", Partly { defect: planted() }),
         entry!("planted_rejection", "a disc by rejection", Rejection { defect: planted() }),
         entry!("planted_sphere", "directions of a sphere", Sphere::new(planted())),
+        entry!("planted_refraction", "rough refraction alone", Refraction { defect: planted() }),
+        entry!("planted_plane", "directions to a plane", Plane { defect: planted() }),
+        entry!("planted_bounce", "a table of a single bounce", Bounce::new(planted())),
     ]
 }
 
