@@ -42,6 +42,24 @@ pub enum Defect {
     NotANumber,
     ClassesSwapped,
     ScoresScaled,
+    // Subdivision next-event estimation.
+    ReverseIndex,
+    JacobianMissing,
+    EscapeDensity,
+    ProbeCosineOfLast,
+    ProbeCosineMissing,
+    WrongDistance,
+    RadianceEtaSquaredMissing,
+    SelectionMissing,
+    SelectionInBottom,
+    SurvivalMissing,
+    FailedEndsRedrawn,
+    FirstHitIgnored,
+    TruncatedTop,
+    TruncatedBottom,
+    CallChanceMissing,
+    MisOmitsBottom,
+    ShadingCosineAtExit,
     // Samplers.
     DensityTilted,
     DensityDoubled,
@@ -70,6 +88,8 @@ pub enum Defect {
 pub enum Family {
     /// In the path tracer.
     Tracer,
+    /// In subdivision next-event estimation.
+    Subdivision,
     /// In a sampler.
     Sampler,
     /// In the verifier's arithmetic.
