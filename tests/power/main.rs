@@ -37,7 +37,7 @@ use scatterproof::experiment::estimators::{builtin, read};
 use scatterproof::experiment::registry::{Registry, RegistryEntry};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use subdivision::{Photons, Subdivision};
+use subdivision::{FluxOptions, Photons, Subdivision};
 use tracer::Tracer;
 
 /// Options of an estimator that has none.
@@ -70,19 +70,17 @@ fn registry() -> Registry {
         RegistryEntry {
             kind: "subdivision",
             doc: "paths with subdivision next-event estimation, and the planted defect",
-            options_schema: || schemars::schema_for!(NoOptions),
+            options_schema: || schemars::schema_for!(FluxOptions),
             build: |options, scene| {
-                let NoOptions {} = read(options)?;
-                Ok(Box::new(Subdivision { scene, defect: planted() }))
+                Ok(Box::new(Subdivision { scene, options: read(options)?, defect: planted() }))
             },
         },
         RegistryEntry {
             kind: "photons",
             doc: "an analog light tracer into the bins of a flux, without defects",
-            options_schema: || schemars::schema_for!(NoOptions),
+            options_schema: || schemars::schema_for!(FluxOptions),
             build: |options, scene| {
-                let NoOptions {} = read(options)?;
-                Ok(Box::new(Photons { scene }))
+                Ok(Box::new(Photons { scene, options: read(options)? }))
             },
         },
     ]);

@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
 use scatterproof::estimators::{Anomaly, Cost, Estimator, History, Scores};
 use scatterproof::geometry::{FaceId, Hit, Ray, Side};
 use scatterproof::math::{DVec3, Frame};
@@ -12,15 +13,26 @@ use scatterproof::sampling::distance::sample_exponential;
 use scatterproof::sampling::stream::{PassKey, Purpose, Stream};
 use scatterproof::sampling::warp::square_to_disc;
 use scatterproof::scene::{Scene, Sensor};
+use serde::{Deserialize, Serialize};
 
 use super::alone::{Technique, TwoEnds};
 use super::connection::{Model, Vertex};
 use super::defects::Defect;
 use super::surface::{Meeting, meet, meet_value};
 
+/// Options of both estimators.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FluxOptions {
+    /// Of the paths that leave by two scatterings, seen from the sensor, only those are scored whose flight
+    /// between them is longer than this, mm: see `two_bounce`.
+    pub beyond_mm: f64,
+}
+
 /// The estimator, for one scene.
 pub struct Subdivision {
     pub scene: Arc<Scene>,
+    pub options: FluxOptions,
     pub defect: Defect,
 }
 
@@ -58,7 +70,7 @@ impl Subdivision {
             ends: TwoEnds {
                 model: Model::of(&self.scene, band, self.defect),
                 technique: Technique::All,
-                beyond: 0.0,
+                beyond: self.options.beyond_mm,
                 start: Vertex { point: seen.ray.origin, travel: seen.ray.dir },
                 walk: key.stream(index as u64, Purpose::Walk),
                 lights: key.stream(index as u64, Purpose::Light),
@@ -205,6 +217,7 @@ impl Path<'_> {
 /// weighs (light has no eta^2: that is radiance's).
 pub struct Photons {
     pub scene: Arc<Scene>,
+    pub options: FluxOptions,
 }
 
 impl Estimator for Photons {
@@ -236,6 +249,9 @@ impl Photons {
         let origin = bounds.center + bounds.radius * (2.0 * sample.wi + x * across.s + y * across.t);
         let mut ray = Ray { origin, dir: -sample.wi };
         let mut history = History::default();
+        // Events since the entry, and whether the first was a scattering: with the second it makes the two
+        // by which a path leaves that comes from the sensor.
+        let (mut events, mut begins_in_medium) = (0, false);
         let mut side = Side::Outside;
         let mut hit = scene.shape.intersect(&ray, side, None, f64::INFINITY)?;
         loop {
@@ -243,7 +259,10 @@ impl Photons {
             (ray, power) = (Ray { origin: hit.point, dir: meeting.dir }, power * meeting.photon_weight);
             match (side, meeting.crosses) {
                 (_, true) => side = if side == Side::Inside { Side::Outside } else { Side::Inside },
-                (Side::Inside, false) => history.reflect_internally(),
+                (Side::Inside, false) => {
+                    history.reflect_internally();
+                    events += 1;
+                }
                 (Side::Outside, false) => {}
             }
             let mut from = Some(hit.face);
@@ -262,6 +281,11 @@ impl Photons {
                         return None;
                     }
                     history.scatter();
+                    events += 1;
+                    begins_in_medium |= events == 1;
+                    if events == 2 && begins_in_medium && t <= self.options.beyond_mm {
+                        return None;
+                    }
                     ray = Ray {
                         origin: ray.at(t),
                         dir: medium.phase.sample(ray.dir, stream.draw2()),
