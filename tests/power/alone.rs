@@ -3,22 +3,18 @@
 
 use std::sync::Arc;
 
-use schemars::JsonSchema;
 use scatterproof::estimators::{Anomaly, Cost, Estimator, Scores, TransportClass};
 use scatterproof::geometry::{Hit, Ray, Side};
 use scatterproof::math::DVec3;
-use scatterproof::sampling::distance::{
-    Equiangular, sample_exponential, sample_truncated_exponential,
-};
+use scatterproof::sampling::distance::{Equiangular, sample_exponential, sample_truncated_exponential};
 use scatterproof::sampling::stream::{PassKey, Purpose, Stream};
 use scatterproof::sampling::towards::TowardsPoint;
 use scatterproof::sampling::warp::square_to_cap;
 use scatterproof::scene::Scene;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::connection::{
-    BOTTOM_TO_TOP, BSDF, CALL, Ends, LIGHT, Model, TOP_TO_BOTTOM, Vertex,
-};
+use super::connection::{BOTTOM_TO_TOP, BSDF, CALL, Ends, LIGHT, Model, TOP_TO_BOTTOM, Vertex};
 use super::defects::Defect;
 
 /// Which techniques draw.
@@ -34,7 +30,8 @@ pub enum Technique {
 }
 
 impl Technique {
-    fn plays(self, technique: usize, model: &Model) -> bool {
+    /// Does it draw by this one of [`super::connection`]'s techniques?
+    pub fn plays(self, technique: usize, model: &Model) -> bool {
         (self == Technique::All || self as usize == technique) && model.can_draw(technique)
     }
 
@@ -71,37 +68,30 @@ pub struct TwoBounce {
 
 impl Estimator for TwoBounce {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
-        for &band in bands {
-            for index in 0..self.scene.sensor.rays_per_pass() {
-                self.play(band, index, key, scores);
-            }
-        }
-    }
-}
-
-impl TwoBounce {
-    fn play(&self, band: usize, index: usize, key: &PassKey, scores: &mut Scores) {
-        scores.count(Cost::Paths);
-        let model = Model::of(&self.scene, band, self.defect);
-        let seen = self.scene.sensor.ray(index, [0.5; 4]);
+        let seen = self.scene.sensor.ray(0, [0.5; 4]);
         let Some(start) = behind(&self.scene, &seen.ray, self.options.depth_mm) else {
             scores.note(Anomaly::LostRay);
             return;
         };
-        let mut ends = TwoEnds {
-            model,
-            technique: self.options.technique,
-            beyond: self.options.beyond_mm,
-            start,
-            walk: key.stream(index as u64, Purpose::Walk),
-            lights: key.stream(index as u64, Purpose::Light),
-            slot: seen.slot,
-            weight: seen.weight,
-            class: TransportClass::Multiple,
-            scores,
-        };
-        ends.unidirectional();
-        ends.call();
+        for &band in bands {
+            for index in 0..self.scene.sensor.rays_per_pass() {
+                scores.count(Cost::Paths);
+                let mut ends = TwoEnds {
+                    model: Model::of(&self.scene, band, self.defect),
+                    technique: self.options.technique,
+                    beyond: self.options.beyond_mm,
+                    start,
+                    walk: key.stream(index as u64, Purpose::Walk),
+                    lights: key.stream(index as u64, Purpose::Light),
+                    slot: seen.slot,
+                    weight: seen.weight,
+                    class: TransportClass::Multiple,
+                    scores,
+                };
+                ends.unidirectional();
+                ends.call();
+            }
+        }
     }
 }
 
@@ -179,7 +169,8 @@ impl TwoEnds<'_> {
     pub fn to_a_light(&mut self, x_j: DVec3, exit: &Hit) {
         let (light, to_light, radiance, p_light) = self.light();
         let ends = Ends { start: self.start, x_j, exit: *exit, to_light, light };
-        if let Some((value, densities)) = self.model.evaluate(&ends, p_light, false, self.scores)
+        if let Some((value, densities)) =
+            self.model.evaluate(&ends, p_light, false, self.technique, self.scores)
             && densities[LIGHT] > 0.0
             && self.model.is_lit(exit, to_light, self.scores)
         {
@@ -197,7 +188,7 @@ impl TwoEnds<'_> {
             let ends = Ends { start: self.start, x_j, exit: *exit, to_light, light };
             let p_light = self.model.choice() * pdf;
             if let Some((value, densities)) =
-                self.model.evaluate(&ends, p_light, is_first_hit, self.scores)
+                self.model.evaluate(&ends, p_light, is_first_hit, self.technique, self.scores)
             {
                 self.score(x_j, light, value * radiance, densities);
             }
@@ -215,7 +206,9 @@ impl TwoEnds<'_> {
 
     /// The call: x_k is the first hit along a uniform direction, and both techniques start from it.
     pub fn call(&mut self) {
-        if !self.technique.plays(TOP_TO_BOTTOM, &self.model) && !self.technique.plays(BOTTOM_TO_TOP, &self.model) {
+        if !self.technique.plays(TOP_TO_BOTTOM, &self.model)
+            && !self.technique.plays(BOTTOM_TO_TOP, &self.model)
+        {
             return;
         }
         if self.walk.draw() >= CALL {
@@ -269,7 +262,8 @@ impl TwoEnds<'_> {
         if t < end.t
             && self.model.is_clear(self.start.point, x_j, None, self.scores)
             && self.model.is_lit(exit, to_light, self.scores)
-            && let Some((value, densities)) = self.model.evaluate(&ends, p_light, true, self.scores)
+            && let Some((value, densities)) =
+                self.model.evaluate(&ends, p_light, true, self.technique, self.scores)
         {
             self.score(x_j, light, value * radiance, densities);
         }

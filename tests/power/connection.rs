@@ -27,17 +27,18 @@ use std::f64::consts::PI;
 
 use scatterproof::estimators::{Cost, Scores};
 use scatterproof::geometry::{Hit, Ray, Side};
-use scatterproof::math::{DVec3, Frame};
+use scatterproof::math::{DVec3, Frame, sin_cos_turns};
 use scatterproof::optics::boundary::Boundary;
 use scatterproof::optics::fresnel::fresnel;
 use scatterproof::optics::medium::Medium;
-use scatterproof::optics::microfacet::Microfacets;
+use scatterproof::optics::microfacet::{MicrofacetKind, Microfacets};
 use scatterproof::sampling::distance::{Equiangular, pdf_distance_exponential, transmittance};
 use scatterproof::sampling::towards::TowardsPoint;
 use scatterproof::scene::Scene;
 
+use super::alone::Technique;
 use super::defects::Defect;
-use super::surface::refract;
+use super::surface::{Surface, refract};
 
 /// Probability of a call.
 pub const CALL: f64 = 0.75;
@@ -92,15 +93,6 @@ impl Model<'_> {
         Model { scene, medium: scene.medium[band], boundary: scene.boundary[band], band, defect }
     }
 
-    /// Relative index, and facets where there are any.
-    pub fn interface(&self) -> (f64, Option<Microfacets>) {
-        match self.boundary {
-            Boundary::Matched => (1.0, None),
-            Boundary::Smooth { eta } => (eta, None),
-            Boundary::Rough { eta, facets } => (eta, Some(facets)),
-        }
-    }
-
     /// Is there a light that the technique can draw a way to?
     pub fn can_draw(&self, technique: usize) -> bool {
         match technique {
@@ -135,15 +127,16 @@ impl Model<'_> {
         !self.scene.shape.occluded(&ray, Some(exit.face))
     }
 
-    /// The integrand without the light's radiance, and the four densities. `is_first_hit` says that x_k was
-    /// found from x_i; else it is looked for. `p_light` is the light's density, chance of the light
-    /// included, and that chance alone for parallel light. What stands between x_i and x_j, x_j and x_k,
-    /// x_k and the light is for the caller to ask.
+    /// The integrand without the light's radiance, and the densities; those of calls are left out where they do
+    /// not play. `is_first_hit` says that x_k was found from x_i; else it is looked for. `p_light` is the
+    /// light's density, chance of the light included, and that chance alone for parallel light. What stands
+    /// between x_i and x_j, x_j and x_k, x_k and the light is for the caller to ask.
     pub fn evaluate(
         &self,
         ends: &Ends,
         p_light: f64,
         is_first_hit: bool,
+        technique: Technique,
         scores: &mut Scores,
     ) -> Option<(f64, [f64; 4])> {
         let Ends { start, x_j, exit, to_light, light } = *ends;
@@ -156,7 +149,8 @@ impl Model<'_> {
             return None;
         }
         let frame = Frame::about(exit.shading_normal);
-        let through = self.through(frame.to_local(-w_jk), frame.to_local(to_light))?;
+        let [kj, light_side] = [-w_jk, to_light].map(|w| frame.to_local(w));
+        let through = through(self.boundary, kj, light_side, self.defect)?;
 
         let Medium { sigma_t, albedo, phase } = self.medium;
         let (t_ij, t_jk) = (transmittance(sigma_t, d_ij), transmittance(sigma_t, d_jk));
@@ -179,12 +173,15 @@ impl Model<'_> {
         let bsdf = if is_parallel { 0.0 } else { prefix * select * through.fwd };
         let lit = if self.is_smooth() { 0.0 } else { prefix * p_light };
 
+        let [plays_top, plays_bottom] =
+            [TOP_TO_BOTTOM, BOTTOM_TO_TOP].map(|index| technique.plays(index, self));
         let cos_ik = w_ik.dot(exit.normal);
-        let is_probed = is_first_hit
-            || cos_ik > 0.0
-                && (self.defect == Defect::FirstHitIgnored
-                    || self.is_clear(x_k, start.point, Some(&exit), scores));
-        if !is_probed {
+        let is_called = plays_top || plays_bottom;
+        let is_seen = |scores: &mut Scores| {
+            let ignored = self.defect == Defect::FirstHitIgnored;
+            cos_ik > 0.0 && (ignored || self.is_clear(x_k, start.point, Some(&exit), scores))
+        };
+        if !is_called || !(is_first_hit || is_seen(scores)) {
             return Some((value, [bsdf, lit, 0.0, 0.0]));
         }
         let cosine = match self.defect {
@@ -198,20 +195,21 @@ impl Model<'_> {
             Defect::WrongDistance => at_j,
             _ => 1.0 / (d_jk * d_jk),
         };
-        let top = self.pdf_down(-ik, -w_jk, d_jk) * at_j_from_k;
-        let top = probe * p_light * through.rev * top;
-        let towards = TowardsPoint::new(ik).map_or(0.0, |towards| towards.pdf(w_ij));
-        let p_ij = 0.5 * h_i + 0.5 * towards;
-        let along = equiangular(ik, w_ij, f64::INFINITY, d_ij);
-        let bottom = match is_parallel {
-            true => 0.0,
-            false => probe * p_ij * along * at_j * through.fwd,
-        };
-        let bottom = match self.defect {
-            Defect::SelectionInBottom => bottom * through.select,
-            _ => bottom,
-        };
-        Some((value, [bsdf, lit, top, bottom]))
+        let mut densities = [bsdf, lit, 0.0, 0.0];
+        if plays_top {
+            let down = self.pdf_down(-ik, -w_jk, d_jk) * at_j_from_k;
+            densities[TOP_TO_BOTTOM] = probe * p_light * through.rev * down;
+        }
+        if plays_bottom && !is_parallel {
+            let towards = TowardsPoint::new(ik).map_or(0.0, |towards| towards.pdf(w_ij));
+            let along = equiangular(ik, w_ij, f64::INFINITY, d_ij);
+            let bottom = probe * (0.5 * h_i + 0.5 * towards) * along * at_j * through.fwd;
+            densities[BOTTOM_TO_TOP] = match self.defect {
+                Defect::SelectionInBottom => bottom * through.select,
+                _ => bottom,
+            };
+        }
+        Some((value, densities))
     }
 
     /// Density of a distance t from x_k along w_kj: exponential and equiangular towards x_i, half each, on
@@ -219,45 +217,6 @@ impl Model<'_> {
     fn pdf_down(&self, to_start: DVec3, w_kj: DVec3, t: f64) -> f64 {
         0.5 * pdf_distance_exponential(self.medium.sigma_t, t)
             + 0.5 * equiangular(to_start, w_kj, f64::INFINITY, t)
-    }
-
-    /// Refraction between w_kj (inside, z < 0) and w_L (outside, z > 0); Walter et al. 2007, eq. 16, 17, 21,
-    /// for radiance that goes from w_L to w_kj, and visible normals for both densities.
-    fn through(&self, kj: DVec3, to_light: DVec3) -> Option<Through> {
-        let (eta, facets) = self.interface();
-        if kj.z >= 0.0 || to_light.z <= 0.0 {
-            return None;
-        }
-        // Radiance inside is eta^2 times radiance outside.
-        let radiance = if self.defect == Defect::RadianceEtaSquaredMissing { 1.0 } else { eta * eta };
-        let Some(facets) = facets else {
-            let select = 1.0 - fresnel(to_light.z, eta).reflectance;
-            let jacobian = match self.defect {
-                Defect::JacobianMissing => 1.0,
-                _ => eta * eta * -kj.z / to_light.z,
-            };
-            return Some(Through { value: select * radiance, select, fwd: 1.0, rev: jacobian });
-        };
-        let mut h = (to_light + eta * kj).normalize();
-        if h.z < 0.0 {
-            h = -h;
-        }
-        let (out, inn) = (to_light.dot(h), kj.dot(h));
-        if out <= 0.0 || inn >= 0.0 {
-            return None;
-        }
-        let inn = -inn;
-        let denominator = (out - eta * inn) * (out - eta * inn);
-        let (d, g_out, g_in) = (facets.d(h), facets.g1(to_light), facets.g1(kj));
-        let select = 1.0 - fresnel(out, eta).reflectance;
-        let common = d * out * inn / denominator;
-        let inside2 = if self.defect == Defect::ReverseIndex { 1.0 } else { eta * eta };
-        Some(Through {
-            value: common * g_out * g_in * select * radiance / -kj.z,
-            select,
-            fwd: common * g_in / -kj.z,
-            rev: common * g_out * inside2 / to_light.z,
-        })
     }
 
     /// From one side through the interface to the other, refraction being certain; `None` where there is
@@ -275,14 +234,14 @@ impl Model<'_> {
     /// A facet as seen from a direction, on that direction's side.
     fn facet(&self, local: DVec3, u: [f64; 2]) -> DVec3 {
         let sign = 1f64.copysign(local.z);
-        let Some(facets) = self.interface().1 else { return sign * DVec3::Z };
+        let Some(facets) = interface(self.boundary).1 else { return sign * DVec3::Z };
         let h = facets.sample_visible(local.with_z(local.z.abs()), u);
         h.with_z(sign * h.z)
     }
 
     /// Index on a direction's side over the index on the other.
     fn index_ratio(&self, local: DVec3) -> f64 {
-        let eta = self.interface().0;
+        let eta = interface(self.boundary).0;
         if local.z > 0.0 { 1.0 / eta } else { eta }
     }
 
@@ -291,7 +250,7 @@ impl Model<'_> {
     pub fn draw_exit(&self, exit: &Hit, kj: DVec3, u: [f64; 3]) -> Option<DVec3> {
         let local = Frame::about(exit.shading_normal).to_local(kj);
         let h = self.facet(local, [u[1], u[2]]);
-        let select = 1.0 - fresnel(local.dot(h), 1.0 / self.interface().0).reflectance;
+        let select = 1.0 - fresnel(local.dot(h), 1.0 / interface(self.boundary).0).reflectance;
         if u[0] < select { self.draw_through(exit, kj, [u[1], u[2]]) } else { None }
     }
 }
@@ -299,4 +258,87 @@ impl Model<'_> {
 /// Density of an equiangular distance; 0 where there is nothing to sample.
 fn equiangular(offset: DVec3, dir: DVec3, t_max: f64, t: f64) -> f64 {
     Equiangular::towards(offset, dir, t_max).map_or(0.0, |along| along.pdf_distance(t))
+}
+
+/// Relative index, and facets where there are any.
+pub fn interface(boundary: Boundary) -> (f64, Option<Microfacets>) {
+    match boundary {
+        Boundary::Matched => (1.0, None),
+        Boundary::Smooth { eta } => (eta, None),
+        Boundary::Rough { eta, facets } => (eta, Some(facets)),
+    }
+}
+
+/// Refraction between w_kj (inside, z < 0) and w_L (outside, z > 0); Walter et al. 2007, eq. 16, 17, 21,
+/// for radiance that goes from w_L to w_kj, and visible normals for both densities.
+fn through(boundary: Boundary, kj: DVec3, to_light: DVec3, defect: Defect) -> Option<Through> {
+    let (eta, facets) = interface(boundary);
+    if kj.z >= 0.0 || to_light.z <= 0.0 {
+        return None;
+    }
+    // Radiance inside is eta^2 times radiance outside.
+    let radiance = if defect == Defect::RadianceEtaSquaredMissing { 1.0 } else { eta * eta };
+    let Some(facets) = facets else {
+        let select = 1.0 - fresnel(to_light.z, eta).reflectance;
+        let jacobian = match defect {
+            Defect::JacobianMissing => 1.0,
+            _ => eta * eta * -kj.z / to_light.z,
+        };
+        return Some(Through { value: select * radiance, select, fwd: 1.0, rev: jacobian });
+    };
+    let mut h = (to_light + eta * kj).normalize();
+    if h.z < 0.0 {
+        h = -h;
+    }
+    let (out, inn) = (to_light.dot(h), kj.dot(h));
+    if out <= 0.0 || inn >= 0.0 {
+        return None;
+    }
+    let inn = -inn;
+    let denominator = (out - eta * inn) * (out - eta * inn);
+    let (d, g_out, g_in) = (facets.d(h), facets.g1(to_light), facets.g1(kj));
+    let select = 1.0 - fresnel(out, eta).reflectance;
+    let common = d * out * inn / denominator;
+    let inside2 = if defect == Defect::ReverseIndex { 1.0 } else { eta * eta };
+    Some(Through {
+        value: common * g_out * g_in * select * radiance / -kj.z,
+        select,
+        fwd: common * g_in / -kj.z,
+        rev: common * g_out * inside2 / to_light.z,
+    })
+}
+
+/// What must hold to rounding between a rough exit and `surface`, which was written apart from it: the
+/// value, and the density of both directions; and whether it is broken.
+pub fn identities(defect: Defect) -> Vec<(String, bool)> {
+    let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.3 };
+    let boundary = Boundary::Rough { eta: 1.4, facets };
+    let surface = Surface { eta: 1.4, facets, defect: Defect::None };
+    let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+    let names = ["identity exit-value", "identity exit-density", "identity entry-density"];
+    let mut broken = [false; 3];
+    let mut joined = 0;
+    for (kj, to_light) in pairs() {
+        let Some(exit) = through(boundary, kj, to_light, defect) else { continue };
+        let (value, out) = surface.eval(kj, to_light);
+        let (_, back) = surface.eval(to_light, kj);
+        broken[0] |= !close(exit.value, value);
+        broken[1] |= !close(exit.select * exit.fwd, out);
+        broken[2] |= !close(exit.select * exit.rev, back);
+        joined += u32::from(value > 0.0);
+    }
+    names.into_iter().zip(broken).map(|(name, broken)| (name.into(), broken || joined < 50)).collect()
+}
+
+/// Directions inside and outside that facets of moderate slopes join.
+fn pairs() -> impl Iterator<Item = (DVec3, DVec3)> {
+    let direction = |cos: f64, turns: f64| {
+        let (sin_phi, cos_phi) = sin_cos_turns(turns);
+        let sin = (1.0 - cos * cos).sqrt();
+        DVec3::new(sin * cos_phi, sin * sin_phi, cos)
+    };
+    let steps = |n: u32| (0..n).map(move |i| (f64::from(i) + 0.5) / f64::from(n));
+    steps(6).flat_map(move |a| {
+        steps(12).flat_map(move |b| steps(6).map(move |turns| (direction(-a, 0.1), direction(b, turns))))
+    })
 }

@@ -316,7 +316,7 @@ pub const SUBDIVISION: &[Planted] = &[
         "snee-reverse-index",
         Defect::ReverseIndex,
         "the density of refraction into the medium has n1^2 for n2^2",
-        &["alone.rough sky"],
+        &["alone.rough sky", "identity entry-density"],
     ),
     subdivision(
         "snee-jacobian-missing",
@@ -334,7 +334,7 @@ pub const SUBDIVISION: &[Planted] = &[
         "snee-probe-cosine-of-last",
         Defect::ProbeCosineOfLast,
         "the density of x_k from x_i has the cosine of w_jk for that of w_ik",
-        &["alone.rough sky"],
+        &["alone.smooth sky", "alone.smooth cap"],
     ),
     subdivision(
         "snee-probe-cosine-missing",
@@ -352,7 +352,7 @@ pub const SUBDIVISION: &[Planted] = &[
         "snee-eta2-missing",
         Defect::RadianceEtaSquaredMissing,
         "the integrand lacks radiance's eta^2 at the exit, whoever draws",
-        &["subdivision.rough sky"],
+        &["subdivision.rough sky", "identity exit-value"],
     ),
     subdivision(
         "snee-selection-missing",

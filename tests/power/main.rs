@@ -79,9 +79,7 @@ fn registry() -> Registry {
             kind: "photons",
             doc: "an analog light tracer into the bins of a flux, without defects",
             options_schema: || schemars::schema_for!(FluxOptions),
-            build: |options, scene| {
-                Ok(Box::new(Photons { scene, options: read(options)? }))
-            },
+            build: |options, scene| Ok(Box::new(Photons { scene, options: read(options)? })),
         },
     ]);
     registry
@@ -119,6 +117,9 @@ fn identities(row: &Planted) -> Vec<(String, bool)> {
     let mut asked = Vec::new();
     if matches!(row.family, Family::Tracer | Family::Sham) {
         asked.extend(identities::all(row.defect));
+    }
+    if matches!(row.family, Family::Subdivision | Family::Sham) {
+        asked.extend(connection::identities(row.defect));
     }
     if matches!(row.family, Family::Verifier | Family::Sham) {
         asked.extend(verifier::all(row.defect));

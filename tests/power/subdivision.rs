@@ -5,7 +5,6 @@
 
 use std::sync::Arc;
 
-use schemars::JsonSchema;
 use scatterproof::estimators::{Anomaly, Cost, Estimator, History, Scores};
 use scatterproof::geometry::{FaceId, Hit, Ray, Side};
 use scatterproof::math::{DVec3, Frame};
@@ -13,6 +12,7 @@ use scatterproof::sampling::distance::sample_exponential;
 use scatterproof::sampling::stream::{PassKey, Purpose, Stream};
 use scatterproof::sampling::warp::square_to_disc;
 use scatterproof::scene::{Scene, Sensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::alone::{Technique, TwoEnds};
@@ -130,7 +130,7 @@ impl Path<'_> {
             {
                 self.ends.to_a_light(x_j.point, hit);
             }
-        } else if model.interface().1.is_some() {
+        } else if super::connection::interface(model.boundary).1.is_some() {
             let (light, to_light, radiance, p_light) = self.ends.light();
             if let Some((value, pdf)) = meet_value(model.boundary, hit, wo, to_light)
                 && model.is_lit(hit, to_light, self.ends.scores)
@@ -286,10 +286,7 @@ impl Photons {
                     if events == 2 && begins_in_medium && t <= self.options.beyond_mm {
                         return None;
                     }
-                    ray = Ray {
-                        origin: ray.at(t),
-                        dir: medium.phase.sample(ray.dir, stream.draw2()),
-                    };
+                    ray = Ray { origin: ray.at(t), dir: medium.phase.sample(ray.dir, stream.draw2()) };
                     from = None;
                 },
             };
