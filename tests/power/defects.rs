@@ -42,6 +42,24 @@ pub enum Defect {
     NotANumber,
     ClassesSwapped,
     ScoresScaled,
+    // Subdivision next-event estimation.
+    ReverseIndex,
+    JacobianMissing,
+    EscapeDensity,
+    ProbeCosineOfLast,
+    ProbeCosineMissing,
+    WrongDistance,
+    RadianceEtaSquaredMissing,
+    SelectionMissing,
+    SelectionInBottom,
+    SurvivalMissing,
+    FailedEndsRedrawn,
+    FirstHitIgnored,
+    TruncatedTop,
+    TruncatedBottom,
+    CallChanceMissing,
+    MisOmitsBottom,
+    ShadingCosineAtExit,
     // Samplers.
     DensityTilted,
     DensityDoubled,
@@ -75,6 +93,8 @@ pub enum Defect {
 pub enum Family {
     /// In the path tracer.
     Tracer,
+    /// In subdivision next-event estimation.
+    Subdivision,
     /// In a sampler.
     Sampler,
     /// In the verifier's arithmetic.
@@ -295,6 +315,121 @@ pub const TRACER: &[Planted] = &[
     ),
 ];
 
+/// Every defect of subdivision next-event estimation.
+pub const SUBDIVISION: &[Planted] = &[
+    subdivision(
+        "snee-reverse-index",
+        Defect::ReverseIndex,
+        "the density of refraction into the medium has n1^2 for n2^2",
+        &["alone.rough sky", "identity entry-density"],
+    ),
+    subdivision(
+        "snee-jacobian-missing",
+        Defect::JacobianMissing,
+        "a smooth surface's density of refraction into the medium lacks dw_L / dw_kj",
+        &["alone.smooth sky", "subdivision.smooth sun"],
+    ),
+    subdivision(
+        "snee-escape-density",
+        Defect::EscapeDensity,
+        "the flight to the boundary has the density sigma_t T, not the probability T",
+        &["alone.rough sky"],
+    ),
+    subdivision(
+        "snee-probe-cosine-of-last",
+        Defect::ProbeCosineOfLast,
+        "the density of x_k from x_i has the cosine of w_jk for that of w_ik",
+        &["alone.smooth sky", "alone.smooth cap"],
+    ),
+    subdivision(
+        "snee-probe-cosine-missing",
+        Defect::ProbeCosineMissing,
+        "the density of x_k from x_i lacks its cosine",
+        &["alone.rough sky"],
+    ),
+    subdivision(
+        "snee-wrong-distance",
+        Defect::WrongDistance,
+        "the density of top to bottom has 1 / d_ij^2 for 1 / d_jk^2",
+        &["alone.rough sky"],
+    ),
+    subdivision(
+        "snee-eta2-missing",
+        Defect::RadianceEtaSquaredMissing,
+        "the integrand lacks radiance's eta^2 at the exit, whoever draws",
+        &["subdivision.rough sky", "identity exit-value"],
+    ),
+    subdivision(
+        "snee-selection-missing",
+        Defect::SelectionMissing,
+        "the density of interface samples lacks 1 - F, the chance of refraction",
+        &["alone.rough sky"],
+    ),
+    subdivision(
+        "snee-selection-in-bottom",
+        Defect::SelectionInBottom,
+        "the density of bottom to top has 1 - F, where refraction is forced",
+        &["alone.rough sky"],
+    ),
+    subdivision(
+        "snee-survival-missing",
+        Defect::SurvivalMissing,
+        "the densities of interface and light samples lack the survival of roulette",
+        &["alone.rough sky"],
+    ),
+    subdivision(
+        "snee-failures-redrawn",
+        Defect::FailedEndsRedrawn,
+        "samples from the bottom to the top that fail are drawn again",
+        &["alone.rough sky"],
+    ),
+    subdivision(
+        "snee-first-hit-ignored",
+        Defect::FirstHitIgnored,
+        "where x_i does not see x_k, calls have a density all the same",
+        &["bumpy.all"],
+    ),
+    subdivision(
+        "snee-truncated-top",
+        Defect::TruncatedTop,
+        "distances from x_k end in the body, their density does not",
+        &["alone.rough sky"],
+    ),
+    subdivision(
+        "snee-truncated-bottom",
+        Defect::TruncatedBottom,
+        "distances from x_i end in the body, their density does not",
+        &["alone.rough sky"],
+    ),
+    subdivision(
+        "snee-call-chance-missing",
+        Defect::CallChanceMissing,
+        "the densities of a call lack the chance of a call",
+        &["alone.rough sky"],
+    ),
+    subdivision(
+        "snee-mis-omits-bottom",
+        Defect::MisOmitsBottom,
+        "the MIS denominator lacks the density of bottom to top",
+        &["bumpy.all"],
+    ),
+    subdivision(
+        "snee-shading-cosine",
+        Defect::ShadingCosineAtExit,
+        "the cosine of w_jk at the exit, a matter of area, is that to the shading normal",
+        &["bumpy.all"],
+    ),
+];
+
+const fn subdivision(
+    name: &'static str,
+    defect: Defect,
+    what: &'static str,
+    expected: &'static [&'static str],
+) -> Planted {
+    of(Family::Subdivision, row(name, defect, what, expected))
+}
+
 /// Every defect of a sampler.
 pub const SAMPLERS: &[Planted] = &[
     sampler(
@@ -489,7 +624,7 @@ pub const SHAM: Planted = of(Family::Sham, row("sham", Defect::None, "nothing is
 
 /// The sham, then every defect.
 pub fn all() -> Vec<Planted> {
-    let planted = [TRACER, SAMPLERS, VERIFIER].into_iter().flatten();
+    let planted = [TRACER, SUBDIVISION, SAMPLERS, VERIFIER].into_iter().flatten();
     std::iter::once(SHAM).chain(planted.copied()).collect()
 }
 

@@ -13,12 +13,15 @@
 //! the same levels, as for any user. All defects get the same experiments (`*.toml` here), the same budgets,
 //! and streams that their names name.
 
+mod alone;
+mod connection;
 mod defects;
 mod identities;
 mod lobes;
 mod matrix;
 mod plays;
 mod samplers;
+mod subdivision;
 mod surface;
 mod tracer;
 mod verifier;
@@ -29,31 +32,57 @@ use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
 
+use alone::{TwoBounce, TwoBounceOptions};
 use defects::{Defect, Family, Planted, planted};
 use scatterproof::experiment::estimators::{builtin, read};
 use scatterproof::experiment::registry::{Registry, RegistryEntry};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use subdivision::{FluxOptions, Photons, Subdivision};
 use tracer::Tracer;
 
-/// Options of `tracer`.
+/// Options of an estimator that has none.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct TracerOptions {}
+struct NoOptions {}
 
-/// The library's registry, and the tracer with what is planted in this process.
+/// The library's registry, and the test's own estimators with what is planted in this process.
 fn registry() -> Registry {
     let mut registry = builtin();
     registry.samplers.extend(samplers::entries());
-    registry.entries.push(RegistryEntry {
-        kind: "tracer",
-        doc: "the second path tracer, and the defect that is planted in it",
-        options_schema: || schemars::schema_for!(TracerOptions),
-        build: |options, scene| {
-            let TracerOptions {} = read(options)?;
-            Ok(Box::new(Tracer::new(scene, planted())))
+    registry.entries.extend([
+        RegistryEntry {
+            kind: "tracer",
+            doc: "the second path tracer, and the defect that is planted in it",
+            options_schema: || schemars::schema_for!(NoOptions),
+            build: |options, scene| {
+                let NoOptions {} = read(options)?;
+                Ok(Box::new(Tracer::new(scene, planted())))
+            },
         },
-    });
+        RegistryEntry {
+            kind: "two_bounce",
+            doc: "two bounces from one medium vertex by one technique, and the planted defect",
+            options_schema: || schemars::schema_for!(TwoBounceOptions),
+            build: |options, scene| {
+                Ok(Box::new(TwoBounce { scene, options: read(options)?, defect: planted() }))
+            },
+        },
+        RegistryEntry {
+            kind: "subdivision",
+            doc: "paths with subdivision next-event estimation, and the planted defect",
+            options_schema: || schemars::schema_for!(FluxOptions),
+            build: |options, scene| {
+                Ok(Box::new(Subdivision { scene, options: read(options)?, defect: planted() }))
+            },
+        },
+        RegistryEntry {
+            kind: "photons",
+            doc: "an analog light tracer into the bins of a flux, without defects",
+            options_schema: || schemars::schema_for!(FluxOptions),
+            build: |options, scene| Ok(Box::new(Photons { scene, options: read(options)? })),
+        },
+    ]);
     registry
 }
 
@@ -89,6 +118,9 @@ fn identities(row: &Planted) -> Vec<(String, bool)> {
     let mut asked = Vec::new();
     if matches!(row.family, Family::Tracer | Family::Sham) {
         asked.extend(identities::all(row.defect));
+    }
+    if matches!(row.family, Family::Subdivision | Family::Sham) {
+        asked.extend(connection::identities(row.defect));
     }
     if matches!(row.family, Family::Verifier | Family::Sham) {
         asked.extend(verifier::all(row.defect));

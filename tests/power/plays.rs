@@ -59,7 +59,7 @@ impl Outcome {
 }
 
 /// The experiments of this folder, and the family of defects that each is to find.
-const EXPERIMENTS: [(Family, &str, &str); 8] = [
+const EXPERIMENTS: [(Family, &str, &str); 11] = [
     (Family::Tracer, "furnace.toml", include_str!("furnace.toml")),
     (Family::Tracer, "map.toml", include_str!("map.toml")),
     (Family::Tracer, "matched.toml", include_str!("matched.toml")),
@@ -67,6 +67,9 @@ const EXPERIMENTS: [(Family, &str, &str); 8] = [
     (Family::Tracer, "scale.toml", include_str!("scale.toml")),
     (Family::Tracer, "sky.toml", include_str!("sky.toml")),
     (Family::Tracer, "slab.toml", include_str!("slab.toml")),
+    (Family::Subdivision, "alone.toml", include_str!("alone.toml")),
+    (Family::Subdivision, "bumpy.toml", include_str!("bumpy.toml")),
+    (Family::Subdivision, "subdivision.toml", include_str!("subdivision.toml")),
     (Family::Sampler, "samplers.toml", include_str!("samplers.toml")),
 ];
 

@@ -1,7 +1,9 @@
 //! The rough dielectric a second time, written from Walter, Marschner, Li & Torrance 2007 for the test's
 //! own path tracer, with places for defects.
 
-use scatterproof::math::DVec3;
+use scatterproof::geometry::Hit;
+use scatterproof::math::{DVec3, Frame};
+use scatterproof::optics::boundary::Boundary;
 use scatterproof::optics::fresnel::fresnel;
 use scatterproof::optics::microfacet::Microfacets;
 
@@ -117,9 +119,75 @@ impl Surface {
 
     /// Snell's law in vectors; `None` under total reflection.
     fn refract(&self, wo: DVec3, h: DVec3) -> Option<DVec3> {
-        let ratio = self.index(wo) / self.index(-wo);
-        let cos = wo.dot(h);
-        let sin2 = ratio * ratio * (1.0 - cos * cos);
-        (sin2 < 1.0).then(|| (ratio * cos - (1.0 - sin2).sqrt()) * h - ratio * wo)
+        refract(wo, h, self.index(wo) / self.index(-wo))
     }
+}
+
+/// The direction beyond a facet h (on w's side) by Snell's law, `ratio` the index on w's side over the
+/// other; `None` under total reflection.
+pub fn refract(w: DVec3, h: DVec3, ratio: f64) -> Option<DVec3> {
+    let cos = w.dot(h);
+    let sin2 = ratio * ratio * (1.0 - cos * cos);
+    (cos > 0.0 && sin2 < 1.0).then(|| (ratio * cos - (1.0 - sin2).sqrt()) * h - ratio * w)
+}
+
+/// How a path goes on from a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Meeting {
+    pub dir: DVec3,
+    /// Of radiance, and of photons, which have no eta^2.
+    pub weight: f64,
+    pub photon_weight: f64,
+    /// Density of the direction; `None` of a smooth surface.
+    pub pdf: Option<f64>,
+    pub crosses: bool,
+}
+
+/// A path's meeting with a smooth or rough surface, `wo` back along the path; `None` where the surface
+/// swallows it.
+pub fn meet(boundary: Boundary, hit: &Hit, wo: DVec3, u: [f64; 3]) -> Option<Meeting> {
+    let frame = Frame::about(hit.shading_normal);
+    let local = frame.to_local(wo);
+    let (wi, weight, pdf, eta) = match boundary {
+        Boundary::Matched => (-local, 1.0, None, 1.0),
+        Boundary::Rough { eta, facets } => {
+            let surface = Surface { eta, facets, defect: Defect::None };
+            let drawn = surface.sample(local, u)?;
+            (drawn.wi, drawn.weight, Some(drawn.pdf), eta)
+        }
+        Boundary::Smooth { eta } => {
+            let inside = local.z < 0.0;
+            let far = if inside { 1.0 / eta } else { eta };
+            let up = DVec3::Z * 1f64.copysign(local.z);
+            if u[0] < fresnel(local.z.abs(), far).reflectance {
+                (2.0 * local.dot(up) * up - local, 1.0, None, eta)
+            } else {
+                (refract(local, up, 1.0 / far)?, 1.0 / (far * far), None, eta)
+            }
+        }
+    };
+    let crosses = wi.z * local.z < 0.0;
+    // The eta^2 of radiance: (n_o / n_i)^2.
+    let radiance = match (crosses, local.z > 0.0) {
+        (false, _) => 1.0,
+        (true, true) => 1.0 / (eta * eta),
+        (true, false) => eta * eta,
+    };
+    let dir = frame.to_world(wi);
+    let agrees = |world: DVec3, local: DVec3| (world.dot(hit.normal) > 0.0) == (local.z > 0.0);
+    let is_told = agrees(wo, local) && agrees(dir, wi);
+    is_told.then_some(Meeting { dir, weight, photon_weight: weight / radiance, pdf, crosses })
+}
+
+/// f |cos| of light from outside and the density with which [`meet`] draws its direction, at a rough
+/// surface.
+pub fn meet_value(boundary: Boundary, hit: &Hit, wo: DVec3, to_light: DVec3) -> Option<(f64, f64)> {
+    let Boundary::Rough { eta, facets } = boundary else { return None };
+    let frame = Frame::about(hit.shading_normal);
+    let (local, wi) = (frame.to_local(wo), frame.to_local(to_light));
+    let is_outside = wi.z > 0.0 && to_light.dot(hit.normal) > 0.0;
+    let agrees = (wo.dot(hit.normal) > 0.0) == (local.z > 0.0);
+    let surface = Surface { eta, facets, defect: Defect::None };
+    let (value, pdf) = if is_outside && agrees { surface.eval(local, wi) } else { (0.0, 0.0) };
+    (value > 0.0).then_some((value, pdf))
 }
