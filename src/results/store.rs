@@ -6,6 +6,7 @@
 //! record/cells/<NNN>/<estimator>.gates.npy, <estimator>.costs.npy, <estimator>.pixels.npy
 //! record/samplers/<NNN>.coarse.npy, .fine.npy, .serial.npy
 //! timing.json, provenance.json    beside the record, never byte-identical
+//! pictures.json                   what pictures are wanted beside those of every run
 //! ```
 //! and beside those the derived views. The record appears whole or not at all.
 
@@ -18,6 +19,7 @@ use serde::de::DeserializeOwned;
 
 use super::json::{canonical, hash_hex};
 use super::npy::Array;
+use super::pictures::Split;
 use super::record::{EstimatorRun, Quantity, Record, SCHEMA_VERSION};
 use super::{atomic, provenance::Provenance, timing::Timing};
 use crate::error::{Error, Result};
@@ -196,6 +198,25 @@ impl RecordFolder {
     /// Reads `timing.json`, where it is there.
     pub fn read_timing(&self) -> Result<Option<Timing>> {
         self.read_json("timing.json")
+    }
+
+    /// Writes `pictures.json`, or removes it where no picture is asked for.
+    pub fn write_pictures(&self, pictures: &[Split]) -> Result<()> {
+        let path = self.root.join("pictures.json");
+        if !pictures.is_empty() {
+            return self.write_view("pictures.json", canonical(&pictures).as_bytes());
+        }
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(Error::io(&path, "remove the pictures of an earlier run")(error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Reads `pictures.json`; nothing where it is not there.
+    pub fn read_pictures(&self) -> Result<Vec<Split>> {
+        Ok(self.read_json("pictures.json")?.unwrap_or_default())
     }
 
     /// Writes `provenance.json`.
