@@ -57,6 +57,16 @@ pub fn set_gates(stored: &mut Stored, estimator: &str, score: impl Fn(u64, usize
     stored.arrays.insert(gates_path(0, estimator), gates(PASSES, score));
 }
 
+/// What pairs of passes show of 16 pixels whose standard deviation is `noise`: see [`Image::spread`].
+pub fn pairs(noise: f64, first: u64) -> impl Fn(u64, usize) -> f64 {
+    move |pair, band| {
+        let score = |i: u64| noise * uniform(first + 32 * pair + i + 100_000 * band as u64);
+        let squares =
+            (0..16).map(|i| (score(2 * i) - score(2 * i + 1)) * (score(2 * i) - score(2 * i + 1)));
+        0.5 * squares.sum::<f64>() / 16.0
+    }
+}
+
 /// Replaces the spread of an estimator's pixels by what `spread(pair, band)` says.
 pub fn set_spread(stored: &mut Stored, estimator: &str, spread: impl Fn(u64, usize) -> f64) {
     set_spread_of(&mut stored.arrays, estimator, spread);
@@ -84,10 +94,7 @@ fn run(e: usize, name: &str, noise: f64, arrays: &mut Arrays) -> EstimatorRun {
     arrays.insert(gates_path(0, name), gates(PASSES, score));
     let pixels = (0..24).map(|i| if i < 12 { 0.1 * i as f64 } else { 0.01 }).collect();
     arrays.insert(pixels_path(0, name), Array::new(vec![2, 2, 3, 2], pixels));
-    set_spread_of(arrays, name, |i, b| {
-        let values = [0, 1].map(|k| uniform(2 * i + k + 1000 * (4 * e + b) as u64));
-        0.5 * noise * noise * (values[0] - values[1]) * (values[0] - values[1])
-    });
+    set_spread_of(arrays, name, pairs(noise, 1_000_000 * e as u64));
     let costs = (0..PASSES / 4).map(|_| 16.0).collect(); // batches of 4 passes, 4 rays each
     arrays.insert(costs_path(0, name), Array::new(vec![PASSES as usize / 4, 1], costs));
     let observable = |class: &str| Observable { name: "mean".into(), class: class.into() };

@@ -288,11 +288,10 @@ mod tests {
     fn every_pair_has_a_row_and_a_reason() {
         let mut stored = sample::stored(0.1);
         // `snee` has a quarter of the variance at the same counted cost; no time was measured.
-        let score = |i, o, b| 0.05 * uniform(i + 7000 + (1000 * (2 * o + b)) as u64);
-        set_gates(&mut stored, "snee", |i, o, b| 1.0 + score(i, o, b));
-        sample::set_spread(&mut stored, "snee", |i, b| {
-            0.5 * (score(2 * i, 0, b) - score(2 * i + 1, 0, b)).powi(2)
+        set_gates(&mut stored, "snee", |i, o, b| {
+            1.0 + 0.05 * uniform(i + 7000 + (1000 * (2 * o + b)) as u64)
         });
+        sample::set_spread(&mut stored, "snee", sample::pairs(0.05, 7_000_000));
         let rows = comparisons(&stored);
         assert_eq!(rows.len(), 3 * 2 * 2, "two classes and the pixels, bands, measures");
         let counted: Vec<&Row> = rows.iter().filter(|r| r.cost == CostMeasure::Counters).collect();
