@@ -58,7 +58,7 @@ fn playing_rivals_side_by_side_changes_no_byte() {
         work.run("run x.toml -q --threads 1").exits(0);
         let first = work.record("results");
         for name in ["mis", "analog"] {
-            for kind in ["gates", "costs"] {
+            for kind in ["gates", "costs", "spread", "pixels"] {
                 let path = format!("cells/000/{name}.{kind}.npy");
                 assert!(first[&path] == alone[&path], "{path} is another than without a rival");
             }

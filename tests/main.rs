@@ -9,6 +9,7 @@ mod interruption;
 mod judging;
 mod layering;
 mod looks;
+mod pictures;
 mod reproducibility;
 mod samplers;
 mod tokens;

@@ -39,7 +39,8 @@ pub struct Faster {
     /// What counts as cost.
     #[serde(default)]
     pub cost: CostMeasure,
-    /// The observable; the sensor's first one without it.
+    /// The observable; the sensor's first one without it. `pixels` for the variance of a pixel, averaged over
+    /// the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
     /// The transport class; `all` without it.
@@ -71,7 +72,8 @@ pub struct NotSlower {
     /// What counts as cost.
     #[serde(default)]
     pub cost: CostMeasure,
-    /// The observable; the sensor's first one without it.
+    /// The observable; the sensor's first one without it. `pixels` for the variance of a pixel, averaged over
+    /// the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
     /// The transport class; `all` without it.

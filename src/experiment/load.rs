@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 
 use super::document::{self, Node, Value};
+use super::picture::PictureEntry;
 use super::registry::Registry;
 use super::rules::{self, At, CELL_KEYS, Findings, Known};
 use super::schema::{Bands, ClaimEntry, ExperimentFile};
@@ -132,6 +133,13 @@ impl Loader<'_> {
                 rules::claim(claims.item(i), &claim, &known);
             }
         }
+        let pictures = at.to("picture");
+        let entries = self.root.get("picture").map(Node::items).unwrap_or_default();
+        for (i, entry) in entries.iter().enumerate() {
+            if let Some(picture) = typed::<PictureEntry>(entry) {
+                rules::picture(pictures.item(i), &picture, &known);
+            }
+        }
     }
 
     /// The walk and the rules of object, sensor and lights in one cell.
@@ -147,6 +155,9 @@ impl Loader<'_> {
         if let Some(sensor) = at.typed("sensor") {
             let shape = at.to("object").typed("shape");
             rules::sensor(at.to("sensor"), &sensor, shape.as_ref());
+            if let Some(pictures) = self.root.get("picture") {
+                rules::has_pixels(At::new(pictures, &self.findings), &sensor);
+            }
         }
     }
 

@@ -28,6 +28,9 @@ mod origins;
 /// Setting values by dotted key.
 mod overrides;
 
+/// What pictures a file may ask for.
+pub mod picture;
+
 /// The estimators and samplers that a program knows by name.
 pub mod registry;
 

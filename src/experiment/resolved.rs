@@ -25,11 +25,11 @@ impl CellSpec {
 }
 
 impl Experiment {
-    /// The whole experiment without its claims, as a file of its own: overrides applied, defaults
-    /// written out, object, sensor and lights of the first cell, sweeps as rows. Loading it again
+    /// The whole experiment without its claims and pictures, as a file of its own: overrides applied,
+    /// defaults written out, object, sensor and lights of the first cell, sweeps as rows. Loading it again
     /// gives the same cells.
     pub fn resolved(&self) -> Json {
-        json(&ExperimentFile { claim: Vec::new(), ..self.file.clone() })
+        json(&ExperimentFile { claim: Vec::new(), picture: Vec::new(), ..self.file.clone() })
     }
 }
 

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use super::duel::{CONTROL, CostMeasure, Duel, Faster, NotSlower};
+use super::picture::PictureEntry;
 
 /// One experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -51,6 +52,9 @@ pub struct ExperimentFile {
     /// What must hold.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub claim: Vec<ClaimEntry>,
+    /// Pictures beside those of every run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub picture: Vec<PictureEntry>,
     /// Named sets of overrides, chosen by `--setting NAME`: dotted key -> value. Tables in braces are
     /// values, others only group keys.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]

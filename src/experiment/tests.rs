@@ -104,5 +104,6 @@ fn a_good_file_is_accepted() {
 mod cells;
 mod claims;
 mod objects;
+mod pictures;
 mod robust;
 mod walk;

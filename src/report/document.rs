@@ -26,6 +26,8 @@ pub enum Block {
     Table(Table),
     /// Pictures that stand side by side.
     Figures(Vec<FigureBlock>),
+    /// One picture over the width of the page.
+    Wide(FigureBlock),
 }
 
 /// One picture.
@@ -56,12 +58,11 @@ fn markdown(block: &Block) -> String {
         Block::List(items) => items.iter().map(|item| format!("- {item}\n")).collect(),
         Block::Code(code) => format!("```\n{code}\n```\n"),
         Block::Table(table) => table.to_markdown(),
-        Block::Figures(figures) => figures
-            .iter()
-            .map(|f| {
-                format!("![{}]({})\n{}: {}\n", f.title, f.path.replace(' ', "%20"), f.title, f.caption)
-            })
-            .collect::<Vec<_>>()
-            .join("\n"),
+        Block::Figures(figures) => figures.iter().map(figure).collect::<Vec<_>>().join("\n"),
+        Block::Wide(f) => figure(f),
     }
+}
+
+fn figure(f: &FigureBlock) -> String {
+    format!("![{}]({})\n{}: {}\n", f.title, f.path.replace(' ', "%20"), f.title, f.caption)
 }

@@ -28,6 +28,7 @@ fn block(block: &Block) -> String {
         }
         Block::Code(code) => format!("<pre>{}</pre>\n", escape(code)),
         Block::Table(t) => table(t),
+        Block::Wide(f) => format!("<div class=\"wide\">\n{}</div>\n", figure(f)),
         Block::Figures(figures) => {
             format!(
                 "<div class=\"figures\">\n{}</div>\n",

@@ -25,6 +25,8 @@ pub mod html;
 pub mod number;
 /// What the page says.
 mod page;
+/// Two estimators in one picture.
+pub mod split;
 /// Aligned text, Markdown and CSV.
 pub mod table;
 /// For the terminal.
@@ -48,6 +50,8 @@ pub struct Material {
     pub comparisons: Vec<comparisons::Row>,
     /// The pictures, in the order of cells and estimators.
     pub figures: Vec<Figure>,
+    /// Grids of split pictures.
+    pub splits: Vec<split::SplitFigure>,
 }
 
 /// A picture of one run.
@@ -81,8 +85,9 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     let rows = measurements(&stored, timing.as_ref());
     let figures = write_figures(folder, &stored)?;
     let stored = Stored { timing: timing.clone(), ..stored };
+    let splits = split::write_splits(folder, &stored, &folder.read_pictures()?)?;
     let comparisons = comparisons::comparisons(&stored);
-    let material = Material { stored, timing, provenance, verdicts, rows, comparisons, figures };
+    let material = Material { stored, timing, provenance, verdicts, rows, comparisons, figures, splits };
     let page = page::page(&material);
     let views = [
         ("measurements.csv", measurements::to_csv(&material.rows)),

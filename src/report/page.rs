@@ -15,6 +15,7 @@ pub(super) fn page(material: &Material) -> Document {
     let mut blocks = claims(material);
     if material.stored.record.samplers.is_empty() {
         blocks.extend(measured(material));
+        blocks.extend(super::split::blocks(&material.splits));
         blocks.extend(efficiency(material));
         blocks.extend(cost(material));
         blocks.extend(notes(material));

@@ -74,19 +74,48 @@ pub struct Png {
 
 /// An 8-bit sRGB picture: radiance times 2^stops, clipped to [0, 1], sRGB transfer, nothing else.
 pub fn to_png(picture: &Picture, exposure_stops: f64) -> Result<Png> {
-    let gain = math::pow(2.0, exposure_stops);
+    let gain = gain(exposure_stops);
     let (mut clipped, mut out_of_gamut) = (0, 0);
     let mut data = Vec::with_capacity(3 * picture.width * picture.height);
     for rgb in picture.rgb() {
-        let exposed = rgb.map(|c| c * gain);
-        clipped += usize::from(exposed.iter().any(|c| *c > 1.0));
-        out_of_gamut += usize::from(exposed.iter().any(|c| *c < 0.0 || !c.is_finite()));
-        data.extend(exposed.map(|c| (srgb_transfer(c.clamp(0.0, 1.0)) * 255.0).round() as u8));
+        let shown = show(rgb, gain);
+        clipped += usize::from(shown.clipped);
+        out_of_gamut += usize::from(shown.out_of_gamut);
+        data.extend(shown.bytes);
     }
-    let bytes = encode(picture.width, picture.height, &data).map_err(|e| {
-        Error::input(format!("an image of {}x{} pixels: {e}", picture.width, picture.height))
-    })?;
+    let bytes = encoded(picture.width, picture.height, &data)?;
     Ok(Png { bytes, clipped, out_of_gamut })
+}
+
+/// The factor of an exposure in stops.
+pub fn gain(exposure_stops: f64) -> f64 {
+    math::pow(2.0, exposure_stops)
+}
+
+/// A pixel on a display.
+pub(super) struct Shown {
+    /// sRGB.
+    pub bytes: [u8; 3],
+    /// A channel above 1 is shown as 1.
+    pub clipped: bool,
+    /// A channel is negative or not finite.
+    pub out_of_gamut: bool,
+}
+
+/// Linear sRGB times `gain`, clipped to [0, 1], through the sRGB transfer.
+pub(super) fn show(rgb: [f64; 3], gain: f64) -> Shown {
+    let exposed = rgb.map(|c| c * gain);
+    Shown {
+        bytes: exposed.map(|c| (srgb_transfer(c.clamp(0.0, 1.0)) * 255.0).round() as u8),
+        clipped: exposed.iter().any(|c| *c > 1.0),
+        out_of_gamut: exposed.iter().any(|c| *c < 0.0 || !c.is_finite()),
+    }
+}
+
+/// A PNG of 8-bit sRGB values, row by row from the top.
+pub(super) fn encoded(width: usize, height: usize, data: &[u8]) -> Result<Vec<u8>> {
+    encode(width, height, data)
+        .map_err(|e| Error::input(format!("an image of {width}x{height} pixels: {e}")))
 }
 
 /// Writes the PNG and says what it could not show.
@@ -101,8 +130,7 @@ pub fn write_png(path: &Path, picture: &Picture, exposure_stops: f64) -> Result<
 pub fn write_diverging_png(path: &Path, width: usize, values: &[f64], limit: f64) -> Result<()> {
     let height = values.len() / width.max(1);
     let data: Vec<u8> = values.iter().flat_map(|x| diverging(x / limit)).collect();
-    let bytes = encode(width, height, &data)
-        .map_err(|e| Error::input(format!("an image of {width}x{height} pixels: {e}")))?;
+    let bytes = encoded(width, height, &data)?;
     atomic::write(path, &bytes, "write the picture")
 }
 
@@ -140,18 +168,21 @@ fn srgb_transfer(x: f64) -> f64 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * math::pow(x, 1.0 / 2.4) - 0.055 }
 }
 
+/// Width, height and values of a PNG file, which says that they are sRGB.
+#[cfg(test)]
+pub(crate) fn decoded(bytes: &[u8]) -> (usize, usize, Vec<u8>) {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().expect("a PNG");
+    assert!(reader.info().srgb.is_some());
+    let (width, height) = reader.info().size();
+    let mut data = vec![0; reader.output_buffer_size().expect("a size")];
+    reader.next_frame(&mut data).expect("a frame");
+    (width as usize, height as usize, data)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::sample;
     use super::*;
-
-    fn decoded(bytes: &[u8]) -> Vec<u8> {
-        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().expect("a PNG");
-        assert!(reader.info().srgb.is_some());
-        let mut data = vec![0; reader.output_buffer_size().expect("a size")];
-        reader.next_frame(&mut data).expect("a frame");
-        data
-    }
 
     // Linear 0.5 is 188 in sRGB, 0.2 is 124, 0.18 is 118 (IEC 61966-2-1).
     #[test]
@@ -186,6 +217,6 @@ mod tests {
         let picture = Picture::of(&stored, &stored.record.cells[0].runs[0]).expect("a picture");
         let png = to_png(&picture, 1.0).expect("a PNG");
         assert_eq!((png.clipped, png.out_of_gamut), (3, 1));
-        assert_eq!(decoded(&png.bytes)[..6], [188, 118, 0, 0, 0, 0]);
+        assert_eq!(decoded(&png.bytes).2[..6], [188, 118, 0, 0, 0, 0]);
     }
 }

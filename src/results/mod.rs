@@ -3,6 +3,8 @@
 
 /// Files that are there whole or not at all.
 pub mod atomic;
+/// A sheet of pictures.
+pub mod canvas;
 /// Comma-separated text.
 pub mod csv_text;
 /// OpenEXR files.
@@ -15,6 +17,8 @@ pub mod json;
 pub mod measurements;
 /// NumPy's array files.
 pub mod npy;
+/// What pictures an experiment asks for.
+pub mod pictures;
 /// What built and ran it.
 pub mod provenance;
 /// The record's layout.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::sampler::SamplerRun;
 
 /// Version of this layout; a reader refuses others.
-pub const SCHEMA_VERSION: u32 = 2;
+pub const SCHEMA_VERSION: u32 = 3;
 
 /// `record.json`: everything but the arrays, which stand in `.npy` files beside it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -146,6 +146,22 @@ pub struct Observable {
     pub class: String,
 }
 
+/// The observable of claims of efficiency that stands for all pixels at once: its variance is that of a pixel,
+/// averaged over the pixels. It has no mean; that of the sensor's first observable stands for it.
+pub const PIXELS: &str = "pixels";
+
+impl Observable {
+    /// [`PIXELS`], of all classes together: images are not kept by class.
+    pub fn pixels() -> Observable {
+        Observable { name: PIXELS.into(), class: "all".into() }
+    }
+
+    /// Is it [`Observable::pixels`]?
+    pub fn is_pixels(&self) -> bool {
+        self.name == PIXELS
+    }
+}
+
 /// The pixel arrays of one run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -156,6 +172,11 @@ pub struct Image {
     pub height: usize,
     /// Path of the `[2][row][column][band]` f64 array: mean over passes, and its standard error.
     pub pixels: String,
+    /// Path of the `[batch][band][5]` f64 array: the moments, as of `gates`, of half the squared difference of
+    /// passes 2i and 2i + 1, averaged over the pixels. Its mean is the variance of a pixel in one pass, averaged
+    /// over the pixels. The batches are those of `gates`, but at least 2 passes each; a last pass without a
+    /// partner is in none.
+    pub spread: String,
 }
 
 /// Which number of a record: one band of one observable of one estimator in one cell.

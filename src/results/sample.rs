@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::npy::Array;
 use super::record::*;
-use super::store::{Arrays, Stored, costs_path, gates_path, pixels_path};
+use super::store::{Arrays, Stored, costs_path, gates_path, pixels_path, spread_path};
 use crate::stats::moments::Moments;
 use crate::stats::tree::{Counter, batch_level};
 
@@ -57,6 +57,29 @@ pub fn set_gates(stored: &mut Stored, estimator: &str, score: impl Fn(u64, usize
     stored.arrays.insert(gates_path(0, estimator), gates(PASSES, score));
 }
 
+/// What pairs of passes show of 16 pixels whose standard deviation is `noise`: see [`Image::spread`].
+pub fn pairs(noise: f64, first: u64) -> impl Fn(u64, usize) -> f64 {
+    move |pair, band| {
+        let score = |i: u64| noise * uniform(first + 32 * pair + i + 100_000 * band as u64);
+        let squares =
+            (0..16).map(|i| (score(2 * i) - score(2 * i + 1)) * (score(2 * i) - score(2 * i + 1)));
+        0.5 * squares.sum::<f64>() / 16.0
+    }
+}
+
+/// Replaces the spread of an estimator's pixels by what `spread(pair, band)` says.
+pub fn set_spread(stored: &mut Stored, estimator: &str, spread: impl Fn(u64, usize) -> f64) {
+    set_spread_of(&mut stored.arrays, estimator, spread);
+}
+
+fn set_spread_of(arrays: &mut Arrays, estimator: &str, spread: impl Fn(u64, usize) -> f64) {
+    let mut tree = Counter::new(0, batch_level(PASSES) - 1);
+    (0..PASSES / 2).for_each(|i| tree.push([0, 1].map(|b| Moments::of(spread(i, b))).to_vec()));
+    let batches = tree.batches();
+    let data = batches.iter().flatten().flat_map(Moments::to_array).collect();
+    arrays.insert(spread_path(0, estimator), Array::new(vec![batches.len(), 2, 5], data));
+}
+
 fn gates(passes: u64, score: impl Fn(u64, usize, usize) -> f64) -> Array {
     let mut tree = Counter::new(0, batch_level(passes));
     let pass = |i| (0..4).map(|k| Moments::of(score(i, k / 2, k % 2))).collect::<Vec<_>>();
@@ -71,6 +94,7 @@ fn run(e: usize, name: &str, noise: f64, arrays: &mut Arrays) -> EstimatorRun {
     arrays.insert(gates_path(0, name), gates(PASSES, score));
     let pixels = (0..24).map(|i| if i < 12 { 0.1 * i as f64 } else { 0.01 }).collect();
     arrays.insert(pixels_path(0, name), Array::new(vec![2, 2, 3, 2], pixels));
+    set_spread_of(arrays, name, pairs(noise, 1_000_000 * e as u64));
     let costs = (0..PASSES / 4).map(|_| 16.0).collect(); // batches of 4 passes, 4 rays each
     arrays.insert(costs_path(0, name), Array::new(vec![PASSES as usize / 4, 1], costs));
     let observable = |class: &str| Observable { name: "mean".into(), class: class.into() };
@@ -84,7 +108,12 @@ fn run(e: usize, name: &str, noise: f64, arrays: &mut Arrays) -> EstimatorRun {
         observables: vec![observable("all"), observable("single")],
         gates: gates_path(0, name),
         costs: costs_path(0, name),
-        image: Some(Image { width: 3, height: 2, pixels: pixels_path(0, name) }),
+        image: Some(Image {
+            width: 3,
+            height: 2,
+            pixels: pixels_path(0, name),
+            spread: spread_path(0, name),
+        }),
         cost: BTreeMap::from([("rays".into(), 1024)]),
         anomalies: BTreeMap::new(),
     }

@@ -3,9 +3,10 @@
 //! ```text
 //! record/record.json              everything but the arrays (see results::record)
 //! record/record.json.b3           its hash, as b3sum writes and checks it
-//! record/cells/<NNN>/<estimator>.gates.npy, <estimator>.costs.npy, <estimator>.pixels.npy
+//! record/cells/<NNN>/<estimator>.gates.npy, <estimator>.costs.npy, <estimator>.pixels.npy, .spread.npy
 //! record/samplers/<NNN>.coarse.npy, .fine.npy, .serial.npy
 //! timing.json, provenance.json    beside the record, never byte-identical
+//! pictures.json                   what pictures are wanted beside those of every run
 //! ```
 //! and beside those the derived views. The record appears whole or not at all.
 
@@ -18,6 +19,7 @@ use serde::de::DeserializeOwned;
 
 use super::json::{canonical, hash_hex};
 use super::npy::Array;
+use super::pictures::Split;
 use super::record::{EstimatorRun, Quantity, Record, SCHEMA_VERSION};
 use super::{atomic, provenance::Provenance, timing::Timing};
 use crate::error::{Error, Result};
@@ -52,6 +54,11 @@ pub fn pixels_path(cell: usize, estimator: &str) -> String {
     format!("cells/{cell:03}/{estimator}.pixels.npy")
 }
 
+/// Where the spread of a run's pixels stands, relative to the record's folder.
+pub fn spread_path(cell: usize, estimator: &str) -> String {
+    format!("cells/{cell:03}/{estimator}.spread.npy")
+}
+
 impl Stored {
     /// The run that measured a quantity.
     pub fn run(&self, quantity: &Quantity) -> Option<&EstimatorRun> {
@@ -83,6 +90,16 @@ impl Stored {
         Some((0..batches).map(|batch| Moments::from_array(row(batch))).collect())
     }
 
+    /// By batch, the moments of the pixels' variance in one band of a run, by index: see
+    /// [`super::record::Image::spread`].
+    pub fn spread(&self, run: &EstimatorRun, band: usize) -> Option<Vec<Moments>> {
+        let array = self.arrays.get(&run.image.as_ref()?.spread)?;
+        let [batches, bands, 5] = array.shape[..] else { return None };
+        let rows = array.data.as_chunks::<5>().0;
+        let row = |batch| Moments::from_array(rows[batch * bands + band]);
+        (band < bands).then(|| (0..batches).map(row).collect())
+    }
+
     /// What does not fit together, as a sentence.
     fn defect(&self) -> Option<String> {
         let bands = self.record.bands.len();
@@ -100,6 +117,10 @@ impl Stored {
             let shape = self.arrays.get(&image.pixels).map(|a| &a.shape[..]);
             if shape != Some(&[2, image.height, image.width, bands][..]) {
                 return Some(format!("pixels of {} have shape {shape:?}", run.estimator));
+            }
+            let shape = self.arrays.get(&image.spread).map(|a| &a.shape[..]);
+            if !matches!(shape, Some(&[_, b, 5]) if b == bands) {
+                return Some(format!("the spread of {} has shape {shape:?}", run.estimator));
             }
         }
         super::sampler::defect(&self.record, &self.arrays)
@@ -196,6 +217,25 @@ impl RecordFolder {
     /// Reads `timing.json`, where it is there.
     pub fn read_timing(&self) -> Result<Option<Timing>> {
         self.read_json("timing.json")
+    }
+
+    /// Writes `pictures.json`, or removes it where no picture is asked for.
+    pub fn write_pictures(&self, pictures: &[Split]) -> Result<()> {
+        let path = self.root.join("pictures.json");
+        if !pictures.is_empty() {
+            return self.write_view("pictures.json", canonical(&pictures).as_bytes());
+        }
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(Error::io(&path, "remove the pictures of an earlier run")(error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Reads `pictures.json`; nothing where it is not there.
+    pub fn read_pictures(&self) -> Result<Vec<Split>> {
+        Ok(self.read_json("pictures.json")?.unwrap_or_default())
     }
 
     /// Writes `provenance.json`.

@@ -74,7 +74,7 @@ fn truncated_json() {
 #[test]
 fn another_version() {
     let (_temp, folder, _) = written();
-    tamper(&folder, "\"schema_version\": 2", "\"schema_version\": 7", false);
+    tamper(&folder, "\"schema_version\": 3", "\"schema_version\": 7", false);
     refused(&folder, &["schema version 7", "reads 2"]);
 }
 

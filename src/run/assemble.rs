@@ -15,7 +15,7 @@ use crate::results::json::hash_json;
 use crate::results::npy::Array;
 use crate::results::provenance::fingerprint;
 use crate::results::record::{Bias, Cell, EstimatorRun, Image, Record, Replay, SCHEMA_VERSION};
-use crate::results::store::{Arrays, costs_path, gates_path, pixels_path};
+use crate::results::store::{Arrays, costs_path, gates_path, pixels_path, spread_path};
 use crate::results::timing::{self, Timing};
 
 /// A record before it is written.
@@ -126,7 +126,10 @@ fn estimator_run(
         data.extend(errors);
         let pixels = pixels_path(job.cell, name);
         arrays.insert(pixels.clone(), Array::new(vec![2, height, width, bands], data));
-        Image { width, height, pixels }
+        let spread = spread_path(job.cell, name);
+        let pairs = finished.spread.iter().flatten().flat_map(|moments| moments.to_array()).collect();
+        arrays.insert(spread.clone(), Array::new(vec![finished.spread.len(), bands, 5], pairs));
+        Image { width, height, pixels, spread }
     });
     let counts = |names: Vec<&str>, values: &[u64]| {
         names.into_iter().map(str::to_string).zip(values.iter().copied()).collect()

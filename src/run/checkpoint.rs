@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::job::{Block, Origin, Tally, Work};
+use super::job::{Block, Origin, Tally, Work, pair_level};
 use crate::error::Result;
 use crate::results::atomic;
 use crate::results::json::{canonical, hash_bytes};
@@ -23,6 +23,8 @@ struct Header {
     gates: Vec<(u32, usize)>,
     /// Level, passes and number of values of every image node.
     pixels: Vec<(u32, u64, usize)>,
+    /// Level and number of values of every node of pairs.
+    spread: Vec<(u32, usize)>,
     /// Level and value of every node of work.
     work: Vec<(u32, Work)>,
 }
@@ -35,20 +37,22 @@ pub fn path(root: &Path, identity: &str) -> PathBuf {
 /// Writes the state of a job whose passes start at 0.
 pub fn save(path: &Path, identity: &str, block: &Block) -> Result<()> {
     let gates = block.gates.nodes();
-    let pixels = block.pixels.nodes();
+    let (pixels, spread) = (block.pixels.nodes(), block.spread.nodes());
     let header = Header {
         identity: identity.into(),
         origin: block.origin.clone(),
         tally: block.tally,
         gates: gates.iter().map(|n| (n.level, n.value.len())).collect(),
         pixels: pixels.iter().map(|n| (n.level, n.value.n, n.value.mean.len())).collect(),
+        spread: spread.iter().map(|n| (n.level, n.value.len())).collect(),
         work: block.work.nodes().iter().map(|n| (n.level, n.value)).collect(),
     };
     let header = canonical(&header);
     let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
     bytes.extend(header.as_bytes());
     let mut put = |x: f64| bytes.extend(x.to_le_bytes());
-    gates.iter().flat_map(|n| &n.value).flat_map(|m| m.to_array()).for_each(&mut put);
+    let moments = gates.iter().chain(spread).flat_map(|n| &n.value);
+    moments.flat_map(|m| m.to_array()).for_each(&mut put);
     pixels.iter().flat_map(|n| n.value.mean.iter().chain(&n.value.m2)).for_each(|&x| put(x));
     let checksum = hash_bytes(&bytes);
     bytes.extend(checksum);
@@ -92,6 +96,14 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
         let moments = values.as_chunks::<5>().0.iter().map(|m| Moments::from_array(*m)).collect();
         block.gates.push_node(level, moments);
     }
+    for (level, length) in header.spread {
+        if level > pair_level(keep_level) {
+            return None;
+        }
+        let values = take(5 * length)?;
+        let moments = values.as_chunks::<5>().0.iter().map(|m| Moments::from_array(*m)).collect();
+        block.spread.push_node(level, moments);
+    }
     for (level, n, length) in header.pixels {
         let (mean, m2) = (take(length)?, take(length)?);
         block.pixels.push_node(level, ImageMoments { n, mean, m2 });
@@ -105,11 +117,14 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
     block.tally = header.tally;
     block.origin = header.origin;
     let ends = [block.pixels.next_pass(), block.work.next_pass()];
-    ends.iter().all(|end| *end == block.gates.next_pass()).then_some(block)
+    let fits = ends.iter().all(|end| *end == block.gates.next_pass())
+        && block.spread.next_pass() == block.gates.next_pass() / 2;
+    fits.then_some(block)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::job::spread;
     use super::*;
 
     fn work(pass: u64) -> Work {
@@ -117,14 +132,28 @@ mod tests {
     }
 
     fn block(passes: u64, keep_level: u32) -> Block {
-        let mut block = Block::empty(0, keep_level);
-        for pass in 0..passes {
+        let mut block = played(0, passes, keep_level);
+        block.tally.cost[0] = 7;
+        block
+    }
+
+    /// Images of 2 pixels in 2 bands.
+    fn image(pass: u64) -> Vec<f64> {
+        let x = 1.0 / (pass as f64 + 3.0);
+        vec![x, 2.0 * x, x * x, 7.0 * x]
+    }
+
+    fn played(start: u64, end: u64, keep_level: u32) -> Block {
+        let mut block = Block { bands: 2, ..Block::empty(start, keep_level) };
+        for pass in start..end {
             let x = 1.0 / (pass as f64 + 3.0);
             block.gates.push(vec![Moments::of(x), Moments::of(-x)]);
-            block.pixels.push(ImageMoments::of(vec![x, 2.0 * x, x * x]));
+            if pass % 2 == 1 && pass > start {
+                block.spread.push(spread(&image(pass - 1), &image(pass), 2));
+            }
+            block.pixels.push(ImageMoments::of(image(pass)));
             block.work.push(work(pass));
         }
-        block.tally.cost[0] = 7;
         block
     }
 
@@ -134,7 +163,8 @@ mod tests {
         let path = folder.path().join("a.state");
         let block = block(13, 2);
         save(&path, "me", &block).expect("saved");
-        assert_eq!(load(&path, "me", 2), Some(block.clone()));
+        // How many bands an image has is said by what is played next.
+        assert_eq!(load(&path, "me", 2), Some(Block { bands: 0, ..block.clone() }));
         assert!(load(&path, "you", 2).is_none(), "another job");
         assert!(load(&path, "me", 1).is_none(), "coarser than asked");
         // A longer run keeps wider batches: the nodes merge on.
@@ -153,17 +183,14 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.state");
         let whole = block(29, 3);
-        let mut later = Block::empty(11, 3);
-        for pass in 11..29 {
-            let x = 1.0 / (pass as f64 + 3.0);
-            later.gates.push(vec![Moments::of(x), Moments::of(-x)]);
-            later.pixels.push(ImageMoments::of(vec![x, 2.0 * x, x * x]));
-            later.work.push(work(pass));
-        }
+        let later = played(11, 29, 3);
         save(&path, "me", &block(11, 0)).expect("saved");
         let mut resumed = load(&path, "me", 3).expect("a state");
         resumed.append(later);
         assert_eq!((resumed.gates, resumed.pixels), (whole.gates, whole.pixels));
         assert_eq!(resumed.work, whole.work);
+        // Passes 10 and 11 are a pair, of which the state held the first.
+        assert_eq!(resumed.spread.nodes().len(), 5);
+        assert_eq!(resumed.spread, whole.spread);
     }
 }

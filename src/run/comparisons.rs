@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
-use crate::experiment::schema::{Agree, ClaimEntry, CostMeasure, Differs, Duel, Equals};
+use crate::experiment::schema::{Agree, ClaimEntry, CostMeasure, Differs, Duel, Equals, Sensor};
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::record::{self, Against, Band, Comparison, Observable, Quantity};
 
@@ -122,7 +122,7 @@ impl Scope<'_> {
         };
         let mut comparisons = Vec::new();
         for cell in self.cells(duel.only) {
-            let observable = self.observable(claim, cell, duel.observable, duel.class)?;
+            let observable = self.varying(claim, cell, duel)?;
             for band in 0..self.bands.len() {
                 let baseline = quantity(cell, duel.baseline, &observable, band);
                 comparisons.push(Comparison {
@@ -134,6 +134,37 @@ impl Scope<'_> {
             }
         }
         Ok(comparisons)
+    }
+
+    /// The observable whose variance a claim of efficiency is about: one of the sensor's, or its pixels.
+    fn varying(&self, claim: usize, cell: usize, duel: &Duel) -> Result<Observable> {
+        if duel.observable.as_deref() != Some(record::PIXELS) {
+            return self.observable(claim, cell, duel.observable, duel.class);
+        }
+        let place = || {
+            format!(
+                "claim {} is about `{}` in cell `{}`",
+                claim + 1,
+                record::PIXELS,
+                self.experiment.cells[cell].label
+            )
+        };
+        match self.experiment.cells[cell].sensor {
+            Sensor::Orthographic { .. } | Sensor::Perspective { .. } => {}
+            Sensor::Probe { .. } | Sensor::Flux { .. } => {
+                return Err(Error::input_help(
+                    format!("{}, whose sensor has none", place()),
+                    "leave `observable` out, or take an `orthographic` or a `perspective` sensor",
+                ));
+            }
+        }
+        match duel.class.as_deref() {
+            None | Some("all") => Ok(Observable::pixels()),
+            Some(class) => Err(Error::input_help(
+                format!("{} and class `{class}`: images are not kept by class", place()),
+                "leave `class` out, or compare the image's mean: `observable = \"mean\"`",
+            )),
+        }
     }
 
     fn pairs(&self, claim: usize, words: &Pairs) -> Result<Vec<Comparison>> {

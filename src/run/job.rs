@@ -60,6 +60,12 @@ pub struct Block {
     pub gates: Counter<Vec<Moments>>,
     /// Moments of `[pixel][band]`.
     pub pixels: Counter<ImageMoments>,
+    /// Moments of `[band]` over pairs of passes, kept by batch: the variance of a pixel as passes 2i and 2i + 1
+    /// show it ([`spread`]). Pairs are counted from pass 0, so that this too is the same for every cut into
+    /// blocks; empty without an image.
+    pub spread: Counter<Vec<Moments>>,
+    /// Number of bands; 0 where nothing was played.
+    pub bands: usize,
     /// Work and time, kept by batch like the gates.
     pub work: Counter<Work>,
     /// Work and time.
@@ -138,15 +144,45 @@ pub fn band_groups(band_use: BandUse, bands: usize) -> Vec<Vec<usize>> {
     }
 }
 
+/// Half the squared difference of two images of one expectation, averaged over the pixels, by band: its
+/// expectation is the variance of a pixel, averaged over the pixels.
+pub fn spread(a: &[f64], b: &[f64], bands: usize) -> Vec<Moments> {
+    if a.is_empty() {
+        return Vec::new();
+    }
+    let pixels = (a.len() / bands) as f64;
+    let squares = |band: usize| {
+        let values = a.iter().zip(b).skip(band).step_by(bands);
+        values.map(|(a, b)| (a - b) * (a - b)).sum::<f64>()
+    };
+    (0..bands).map(|band| Moments::of(0.5 * squares(band) / pixels)).collect()
+}
+
+/// The level at which pairs are kept in batches of 2^level passes.
+pub fn pair_level(keep_level: u32) -> u32 {
+    keep_level.saturating_sub(1)
+}
+
 impl Block {
     /// No passes yet, from pass `start` on.
     pub fn empty(start: u64, keep_level: u32) -> Block {
         Block {
             gates: Counter::new(start, keep_level),
             pixels: Counter::new(start, Counter::<ImageMoments>::MERGE_ALL),
+            spread: Counter::new(start.div_ceil(2), pair_level(keep_level)),
+            bands: 0,
             work: Counter::new(start, keep_level),
             tally: Tally::default(),
             origin: Origin::default(),
+        }
+    }
+
+    /// Pairs the image of the pass that comes next with that of the pass before it, where these two are a pair
+    /// and this block holds the first of them: its node has then merged with none.
+    fn pair_with(&mut self, next: &[f64]) {
+        let is_second = !self.next_pass().is_multiple_of(2);
+        if is_second && let Some(first) = self.pixels.nodes().last() {
+            self.spread.push(spread(&first.value.mean, next, self.bands));
         }
     }
 
@@ -164,8 +200,13 @@ impl Block {
         self.work = settled;
     }
 
-    /// Appends the passes that follow.
+    /// Appends the passes that follow, at least one.
     pub fn append(&mut self, later: Block) {
+        self.bands = later.bands;
+        if let Some(first) = later.pixels.nodes().first() {
+            self.pair_with(&first.value.mean);
+        }
+        self.spread.append(later.spread);
         self.gates.append(later.gates);
         self.pixels.append(later.pixels);
         self.work.append(later.work);
@@ -182,6 +223,8 @@ pub struct Finished {
     pub batches: Vec<Vec<Moments>>,
     /// Moments of `[pixel][band]` over all passes.
     pub image: ImageMoments,
+    /// Moments of `[band]` over pairs of passes, by batch.
+    pub spread: Vec<Vec<Moments>>,
     /// Work and time by batch.
     pub work: Vec<Work>,
     /// Work and time.
@@ -197,6 +240,7 @@ impl Block {
             passes: self.next_pass(),
             batches: self.gates.batches(),
             image: self.pixels.finish().unwrap_or_default(),
+            spread: self.spread.batches(),
             work: self.work.batches(),
             tally: self.tally,
             origin: self.origin,
@@ -214,7 +258,7 @@ impl Job {
         keep_level: u32,
         stop: &dyn Fn() -> bool,
     ) -> Option<Block> {
-        let mut block = Block::empty(start, keep_level);
+        let mut block = Block { bands: self.layout.bands(), ..Block::empty(start, keep_level) };
         let mut scores = Scores::new(self.layout.clone());
         let mut cpu = Duration::ZERO;
         let wall = Instant::now();
@@ -239,9 +283,10 @@ impl Job {
                 cpu_seconds: spent.as_secs_f64(),
                 settled: 0,
             });
-            block.gates.push(scores.gates.iter().map(|&x| Moments::of(x)).collect());
             // Blocks are appended to each other, so that those without an image hold empty ones.
             let image = if stage == Stage::Main { scores.pixels.clone() } else { Vec::new() };
+            block.pair_with(&image);
+            block.gates.push(scores.gates.iter().map(|&x| Moments::of(x)).collect());
             block.pixels.push(ImageMoments::of(image));
         }
         block.tally = Tally {
@@ -253,5 +298,59 @@ impl Job {
             processes: 0,
         };
         Some(block)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(pass: u64) -> Vec<f64> {
+        (0..6).map(|i| ((pass * 6 + i) as f64 * 0.618_033_988_749_895).fract().powi(3)).collect()
+    }
+
+    /// Passes of images of 3 pixels in 2 bands.
+    fn played(start: u64, end: u64, keep_level: u32) -> Block {
+        let mut block = Block { bands: 2, ..Block::empty(start, keep_level) };
+        for pass in start..end {
+            block.pair_with(&image(pass));
+            block.gates.push(vec![Moments::of(pass as f64)]);
+            block.pixels.push(ImageMoments::of(image(pass)));
+            block.work.push(Work::default());
+        }
+        block
+    }
+
+    // (1 - 3)^2 / 2 = 2 and (0 - 1)^2 / 2 in the first band of two pixels, 0 and 8 in the second.
+    #[test]
+    fn spread_of_two_images() {
+        let found = spread(&[1.0, 5.0, 0.0, 2.0], &[3.0, 5.0, 1.0, 6.0], 2);
+        assert_eq!(found, [Moments::of(1.25), Moments::of(4.0)]);
+        assert_eq!(spread(&[], &[], 2), []);
+    }
+
+    // Pairs are of passes 2i and 2i + 1, whatever blocks these stood in; a last pass alone is in none.
+    #[test]
+    fn pairs_do_not_know_of_blocks() {
+        for (cuts, keep_level) in
+            [(vec![0, 1, 2, 3, 4, 5], 0), (vec![0, 3, 4, 9, 16], 1), (vec![0, 7, 8, 15, 29], 2)]
+        {
+            let end = cuts[cuts.len() - 1];
+            let whole = played(0, end, keep_level);
+            let mut joined = Block::empty(0, keep_level);
+            cuts.windows(2).for_each(|cut| joined.append(played(cut[0], cut[1], keep_level)));
+            assert_eq!((&joined.spread, &joined.pixels), (&whole.spread, &whole.pixels), "{cuts:?}");
+            let batches = joined.spread.batches();
+            let pairs: u64 = batches.iter().map(|batch| batch[0].n).sum();
+            assert_eq!(pairs, end / 2);
+            let largest = batches.iter().map(|batch| batch[0].n).max();
+            assert_eq!(largest, Some(1 << pair_level(keep_level)));
+            let mean: f64 =
+                (0..end / 2).map(|i| spread(&image(2 * i), &image(2 * i + 1), 2)[1].mean).sum::<f64>()
+                    / (end / 2) as f64;
+            let found =
+                batches.iter().map(|b| b[1].n as f64 * b[1].mean).sum::<f64>() / (end / 2) as f64;
+            assert!((found - mean).abs() < 1e-14, "{found} {mean}");
+        }
     }
 }

@@ -26,6 +26,7 @@ mod retest;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::experiment::picture;
 use crate::experiment::registry::Registry;
 use crate::experiment::{Experiment, Loaded};
 use crate::results::provenance::{self, Provenance};
@@ -77,7 +78,10 @@ pub fn run(
     interrupt: &Interrupt,
 ) -> Result<(RecordFolder, Stored)> {
     let plan = plan(experiment, registry)?;
-    play(experiment, &plan, &options.folder(&experiment.file.name), options, interrupt)
+    let (folder, stored) =
+        play(experiment, &plan, &options.folder(&experiment.file.name), options, interrupt)?;
+    folder.write_pictures(&picture::wanted(&experiment.file.picture))?;
+    Ok((folder, stored))
 }
 
 /// Runs an experiment of either sort.
@@ -153,13 +157,17 @@ fn replays(
     })
 }
 
-/// Whether the folder holds a record of exactly this experiment, its claims included, by this build.
+/// Whether the folder holds a record of exactly this experiment, its claims and pictures included, by this
+/// build.
 pub fn has_record(experiment: &Experiment, out: &Path) -> bool {
     let folder = RecordFolder::new(out.join(&experiment.file.name));
     let same_build =
         || matches!(folder.read_provenance(), Ok(Some(p)) if p.build == provenance::build());
+    let same_pictures =
+        || folder.read_pictures().is_ok_and(|there| there == picture::wanted(&experiment.file.picture));
     folder.exists()
         && same_build()
+        && same_pictures()
         && folder.read().is_ok_and(|stored| {
             stored.record.experiment_hash == assemble::experiment_hash(experiment)
                 && stored.record.claims == serde_json::json!(experiment.file.claim)

@@ -20,6 +20,14 @@
 //! keeps the covariance of blocks that ran side by side. Arms with different numbers of blocks are
 //! independent: their variances add, and Satterthwaite's dof holds.
 //!
+//! *Variances as values.* Where a pass is an image, V is the variance of a pixel, averaged over the pixels. Of
+//! every two consecutive passes x and y, d = (x - y)^2 / 2, averaged over the pixels, is an unbiased estimate
+//! of it, and the pairs are independent: V is the mean of d ([`Values::Variances`]), whatever correlation
+//! there is between the pixels of one pass. By itself a pair of passes is a poor estimate, with
+//! var(d) / V^2 = (kurtosis + 1) / 2 for one pixel; the mean of n / 2 of them has (kurtosis + 1) / n, where the
+//! variance of all n values has (kurtosis - 1) / n: nothing is lost where tails are heavy, and where they are
+//! not, the pixels average it out.
+//!
 //! The quoted R is the plain one, not bias-corrected: its bias is of order 1/n, its error of order
 //! 1/sqrt(n).
 
@@ -36,6 +44,36 @@ pub const FEWEST_BLOCKS: usize = 8;
 
 /// The largest share of an arm's sum of squares that one pass may hold.
 pub const LARGEST_SHARE: f64 = 0.05;
+
+/// What the values of a block are, and so what V is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Values {
+    /// Scores of passes: V is their variance.
+    Scores,
+    /// Unbiased estimates of V: their mean is.
+    Variances,
+}
+
+impl Values {
+    fn variance(self, moments: &Moments) -> f64 {
+        match self {
+            Values::Scores => moments.variance(),
+            Values::Variances => moments.mean,
+        }
+    }
+
+    /// Of a block, the sum of the terms that V is the mean of, and of their squares; `mean` is that of all
+    /// scores.
+    fn terms(self, moments: &Moments, mean: f64) -> (f64, f64) {
+        match self {
+            Values::Scores => about(moments, mean),
+            Values::Variances => {
+                let sum = moments.n as f64 * moments.mean;
+                (sum, moments.m2 + sum * moments.mean)
+            }
+        }
+    }
+}
 
 /// Passes that ran together.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,11 +143,13 @@ pub struct Arm {
     pub moments: Moments,
     /// Cost of a pass.
     pub cost: f64,
-    /// Kurtosis of a pass (3 for a normal). The variance of log V is about (kurtosis - 1) / n.
+    /// Kurtosis of a pass (3 for a normal). The variance of log V is about (kurtosis - 1) / n. NaN for variances,
+    /// which have none.
     pub kurtosis: f64,
-    /// The largest share of M2 (about the mean of all passes) that one block holds.
+    /// The largest share of M2 (about the mean of all passes) that one block holds; of variances, of their sum.
     pub largest_block: f64,
-    /// A lower and an upper bound of the largest share of M2 that one pass holds: see [`one_pass_share`].
+    /// A lower and an upper bound of the largest share of M2 that one pass holds, or of the sum of variances
+    /// that one of them is: see [`one_pass_share`].
     pub largest_pass: (f64, f64),
 }
 
@@ -144,12 +184,13 @@ pub struct Efficiency {
 /// the terms of Q4 is the square of the largest of Q2, so that is at most sqrt(Q4); and Q4 <= (largest term)
 /// Q2, so it is at least Q4 / Q2. With M2 = sum of all Q2:
 ///   max_k Q4 / (Q2 M2) <= s <= max_k sqrt(Q4) / M2.
-/// Over one block the bounds are kurtosis / n and sqrt(kurtosis / n).
-pub fn one_pass_share(blocks: &[Block], mean: f64) -> (f64, f64) {
-    let about = |b: &Block| about(&b.moments, mean);
-    let m2: f64 = blocks.iter().map(|b| about(b).0).sum();
+/// Over one block the bounds are kurtosis / n and sqrt(kurtosis / n). With the sum of a block's variances for Q2
+/// and that of their squares for Q4, the same holds of the largest variance.
+pub fn one_pass_share(blocks: &[Block], values: Values, mean: f64) -> (f64, f64) {
+    let terms = |b: &Block| values.terms(&b.moments, mean);
+    let m2: f64 = blocks.iter().map(|b| terms(b).0).sum();
     let bounds = blocks.iter().map(|b| {
-        let (q2, q4) = about(b);
+        let (q2, q4) = terms(b);
         (if q2 > 0.0 { q4 / (q2 * m2) } else { 0.0 }, q4.sqrt() / m2)
     });
     let (low, high) = bounds.fold((0.0f64, 0.0f64), |s, b| (s.0.max(b.0), s.1.max(b.1)));
@@ -165,15 +206,29 @@ fn about(moments: &Moments, mean: f64) -> (f64, f64) {
     (moments.m2 + n * d2, q4.max(0.0))
 }
 
-/// Compares arms at `confidence`: 0.95 to show, 0.999 to decide.
+/// Compares arms of scores at `confidence`: 0.95 to show, 0.999 to decide.
 ///
 /// # Errors
 ///
 /// [`NoRatio`].
 pub fn compare(a: &[Block], b: &[Block], confidence: f64) -> Result<Efficiency, NoRatio> {
-    let (left, right) = (Jackknife::of(a)?, Jackknife::of(b)?);
+    compare_values(a, b, Values::Scores, confidence)
+}
+
+/// The same of arms whose values are `values`.
+///
+/// # Errors
+///
+/// [`NoRatio`].
+pub fn compare_values(
+    a: &[Block],
+    b: &[Block],
+    values: Values,
+    confidence: f64,
+) -> Result<Efficiency, NoRatio> {
+    let (left, right) = (Jackknife::of(a, values)?, Jackknife::of(b, values)?);
     let work = left.over(&right, |j| &j.work, confidence);
-    let half = |blocks: &[Block]| Totals::of(&blocks[..blocks.len() / 2]).work();
+    let half = |blocks: &[Block]| Totals::of(&blocks[..blocks.len() / 2]).work(values);
     let moved = (half(a) - half(b) - work.log.value).abs();
     let (a, b) = (left.arm(a), right.arm(b));
     let is_shared = a.largest_pass.1 <= LARGEST_SHARE && b.largest_pass.1 <= LARGEST_SHARE;
@@ -208,16 +263,16 @@ impl Totals {
         Totals { moments: self.moments.merge(later.moments), cost: self.cost + later.cost }
     }
 
-    fn log_variance(&self) -> f64 {
-        ln(self.moments.variance())
+    fn log_variance(&self, values: Values) -> f64 {
+        ln(values.variance(&self.moments))
     }
 
     fn log_cost(&self) -> f64 {
         ln(self.cost / self.moments.n as f64)
     }
 
-    fn work(&self) -> f64 {
-        self.log_variance() + self.log_cost()
+    fn work(&self, values: Values) -> f64 {
+        self.log_variance(values) + self.log_cost()
     }
 }
 
@@ -230,6 +285,7 @@ struct Deviations {
 
 /// One arm's log variance, log cost and their sum.
 struct Jackknife {
+    values: Values,
     total: Totals,
     variance: Deviations,
     cost: Deviations,
@@ -237,7 +293,7 @@ struct Jackknife {
 }
 
 impl Jackknife {
-    fn of(blocks: &[Block]) -> Result<Jackknife, NoRatio> {
+    fn of(blocks: &[Block], values: Values) -> Result<Jackknife, NoRatio> {
         if blocks.len() < FEWEST_BLOCKS || blocks.iter().any(|b| b.moments.n == 0) {
             return Err(NoRatio::TooFewBlocks);
         }
@@ -249,11 +305,15 @@ impl Jackknife {
         }
         let without = without_each(blocks);
         let total = Totals::of(blocks);
-        if !without.iter().chain([&total]).all(|t| t.moments.m2 > 0.0) {
+        let varies = |t: &Totals| match values {
+            Values::Scores => t.moments.m2 > 0.0,
+            Values::Variances => t.moments.mean > 0.0,
+        };
+        if !without.iter().chain([&total]).all(varies) {
             return Err(NoRatio::NoVariance);
         }
         let n = total.moments.n as f64;
-        let deviations = |f: fn(&Totals) -> f64| {
+        let deviations = |f: &dyn Fn(&Totals) -> f64| {
             let (value, count) = (f(&total), blocks.len() as f64);
             let h: Vec<f64> = blocks.iter().map(|b| n / b.moments.n as f64).collect();
             let pseudo: Vec<f64> =
@@ -262,19 +322,24 @@ impl Jackknife {
             let each = pseudo.iter().zip(&h).map(|(p, h)| (p - centre) / (count * (h - 1.0)).sqrt());
             Deviations { value, each: each.collect() }
         };
-        let (variance, cost) = (deviations(Totals::log_variance), deviations(Totals::log_cost));
-        Ok(Jackknife { total, variance, cost, work: deviations(Totals::work) })
+        let variance = deviations(&|t| t.log_variance(values));
+        let cost = deviations(&Totals::log_cost);
+        Ok(Jackknife { values, total, variance, cost, work: deviations(&|t| t.work(values)) })
     }
 
     fn arm(&self, blocks: &[Block]) -> Arm {
-        let moments = self.total.moments;
-        let share = |b: &Block| about(&b.moments, moments.mean).0 / moments.m2;
+        let (moments, values) = (self.total.moments, self.values);
+        let all = values.terms(&moments, moments.mean).0;
+        let share = |b: &Block| values.terms(&b.moments, moments.mean).0 / all;
         Arm {
             moments,
             cost: self.total.cost / moments.n as f64,
-            kurtosis: moments.kurtosis(),
+            kurtosis: match values {
+                Values::Scores => moments.kurtosis(),
+                Values::Variances => f64::NAN,
+            },
             largest_block: blocks.iter().map(share).fold(0.0, f64::max),
-            largest_pass: one_pass_share(blocks, moments.mean),
+            largest_pass: one_pass_share(blocks, values, moments.mean),
         }
     }
 
@@ -461,16 +526,51 @@ mod tests {
         let blocks: Vec<Block> = values.chunks(64).map(|v| block(v, 1.0)).collect();
         let total = Totals::of(&blocks).moments;
         let share = (60.0 - total.mean).powi(2) / total.m2;
-        let (low, high) = one_pass_share(&blocks, total.mean);
+        let (low, high) = one_pass_share(&blocks, Values::Scores, total.mean);
         assert!(low <= share && share <= high && high < 1.1 * share, "{low} {share} {high}");
         let one = [Block { moments: total, cost: 1.0 }];
-        let (low, high) = one_pass_share(&one, total.mean);
+        let (low, high) = one_pass_share(&one, Values::Scores, total.mean);
         close(low, total.kurtosis() / 640.0, 1e-12);
         close(high, (total.kurtosis() / 640.0).sqrt(), 1e-12);
         // The ratio of such an arm is not to be quoted, and of one without the spike it is.
         let calm: Vec<Block> = blocks.iter().map(|b| Block { cost: 1.0, ..*b }).skip(2).collect();
         assert!(!compare(&blocks, &calm, 0.95).expect("a ratio").resolved);
         assert!(compare(&calm, &calm, 0.95).expect("a ratio").resolved);
+    }
+
+    // Blocks of variances: the ratio of their means, with Tukey's error of its logarithm, and the largest of
+    // them as the one that must not decide.
+    #[test]
+    fn variances_are_compared_by_their_means() {
+        let (a, b) = (blocks(12, 16, 0.3), blocks(12, 16, 70.7));
+        let of = |blocks: &[Block]| {
+            let total = Totals::of(blocks);
+            (total.moments.mean * total.cost / total.moments.n as f64).ln()
+        };
+        let found = compare_values(&a, &b, Values::Variances, 0.95).expect("a ratio");
+        close(found.work.log.value, of(&a) - of(&b), 1e-12);
+        let drop = |blocks: &[Block], k: usize| of(&[&blocks[..k], &blocks[k + 1..]].concat());
+        let values: Vec<f64> = (0..12).map(|k| drop(&a, k) - drop(&b, k)).collect();
+        let mean = values.iter().sum::<f64>() / 12.0;
+        let variance = 11.0 / 12.0 * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+        close(found.work.log.std_error, variance.sqrt(), 1e-10);
+        assert!(found.a.kurtosis.is_nan());
+
+        let mut values: Vec<f64> = (0..640).map(|i| 1.0 + f64::from(i % 7)).collect();
+        let calm: Vec<Block> = values.chunks(64).map(|v| block(v, 1.0)).collect();
+        values[77] = 300.0;
+        let loud: Vec<Block> = values.chunks(64).map(|v| block(v, 1.0)).collect();
+        let share = 300.0 / values.iter().sum::<f64>();
+        let found = compare_values(&loud, &calm, Values::Variances, 0.999).expect("a ratio");
+        let (low, high) = found.a.largest_pass;
+        assert!(low <= share && share <= high && high < 1.05 * share, "{low} {share} {high}");
+        assert!(!found.resolved);
+        assert!(compare_values(&calm, &calm, Values::Variances, 0.999).expect("a ratio").resolved);
+        let none = vec![block(&[0.0, 0.0], 1.0); 16];
+        assert_eq!(
+            compare_values(&none, &calm, Values::Variances, 0.95).err(),
+            Some(NoRatio::NoVariance)
+        );
     }
 
     // The second half of A is three times as wide as the first: the log ratio moves by log 5 when the passes

@@ -4,9 +4,10 @@
 //! Every ratio is the baseline's over the candidate's: above 1 the candidate is the better. An efficiency is
 //! quoted where the means agree, by the test that an `agree` claim would make, at a level of 1e-3 over the
 //! whole table (Bonferroni); its interval is for the reader, at 95 %. Whether it is resolved is judged as
-//! for claims (`verify::efficiency`). Controls stand in the table as candidates, by CPU time alone.
+//! for claims (`verify::efficiency`). The metric is the sensor's first observable, by class; where it has pixels,
+//! `pixels` beside it: the variance of a pixel, averaged over the image. Controls stand in the table as candidates, by CPU time alone.
 
-use super::efficiency::{CONFIDENCE, contest};
+use super::efficiency::{CONFIDENCE, contest, mean_of, of_means};
 use super::trial::{Evidence, trial};
 use super::weights;
 use crate::results::csv_text::{self, number};
@@ -33,7 +34,7 @@ pub struct Row {
     pub band: String,
     /// Transport class.
     pub class: String,
-    /// Observable name; its variance is that of one pass.
+    /// Observable name; its variance is that of one pass. `pixels` for the variance of a pixel.
     pub metric: String,
     /// The estimator that the other is held against.
     pub baseline: String,
@@ -120,7 +121,9 @@ fn subjects(stored: &Stored) -> Vec<Subject<'_>> {
         let own = |run: &&EstimatorRun| run.control_of.as_ref().is_none_or(|of| *of == first.estimator);
         for run in others.filter(own) {
             let metric = first.observables.first().map(|o| &o.name);
-            for observable in first.observables.iter().filter(|o| Some(&o.name) == metric) {
+            let pixels = [first, run].iter().all(|run| run.image.is_some()).then(Observable::pixels);
+            let classes = first.observables.iter().filter(|o| Some(&o.name) == metric);
+            for observable in classes.chain(&pixels) {
                 for band in 0..stored.record.bands.len() {
                     let quantity = |run: &EstimatorRun| Quantity {
                         cell: index,
@@ -147,7 +150,7 @@ fn subjects(stored: &Stored) -> Vec<Subject<'_>> {
 }
 
 fn is_silent(stored: &Stored, quantity: &Quantity) -> bool {
-    let all = stored.batches(quantity).and_then(total);
+    let all = stored.batches(&mean_of(stored, quantity)).and_then(total);
     all.is_none_or(|all| all.mean == 0.0 && all.m2 == 0.0)
 }
 
@@ -219,7 +222,7 @@ fn means_objection(
     let against = Against::Quantity { other: baseline.clone(), paired: false };
     let comparison =
         Comparison { claim: usize::MAX, quantity: candidate.clone(), against, detect: None };
-    match trial(stored, 0, &comparison).evidence {
+    match trial(stored, 0, &of_means(stored, &comparison, baseline)).evidence {
         Evidence::Test { test, .. } if test.p_value >= level => None,
         Evidence::Test { test, .. } => Some(format!("the means differ, p = {:.1e}", test.p_value)),
         Evidence::None(reason) => Some(format!("no mean test: {reason}")),
@@ -288,8 +291,9 @@ mod tests {
         set_gates(&mut stored, "snee", |i, o, b| {
             1.0 + 0.05 * uniform(i + 7000 + (1000 * (2 * o + b)) as u64)
         });
+        sample::set_spread(&mut stored, "snee", sample::pairs(0.05, 7_000_000));
         let rows = comparisons(&stored);
-        assert_eq!(rows.len(), 2 * 2 * 2, "classes, bands, measures");
+        assert_eq!(rows.len(), 3 * 2 * 2, "two classes and the pixels, bands, measures");
         let counted: Vec<&Row> = rows.iter().filter(|r| r.cost == CostMeasure::Counters).collect();
         for row in &counted {
             assert!(row.resolved, "{row:?}");
@@ -302,7 +306,7 @@ mod tests {
         assert!(csv.starts_with(
             "experiment,cell,band,class,metric,baseline,candidate,efficiency_ratio,ci_low,ci_high,"
         ));
-        assert_eq!(csv.lines().count(), 9);
+        assert_eq!(csv.lines().count(), 13);
     }
 
     #[test]

@@ -5,6 +5,12 @@
 //! that E exceeds a bound e: `faster` e = ratio, `not_slower` e = 1 / margin, because the ratio of inverse
 //! efficiencies is 1 / E. ln E has a Student interval from a jackknife over blocks (`stats::efficiency`).
 //!
+//! Of the observable `pixels`, V is the variance of a pixel in one pass, averaged over the pixels, as the pairs
+//! of passes show it (`results::record::Image::spread`); the means that must agree are those of the sensor's
+//! first observable. Where the pixels of a pass are independent, the variance of the image's mean is V over
+//! their number, and the ratio is that of `mean`, which knows it less well: it is the variance of n numbers, not
+//! of n times the pixels. Where an estimator's pixels share paths, the two differ.
+//!
 //! Before any number is quoted
 //!   the two means agree: the test that an `agree` claim would make. An objection to it voids the claim;
 //!   E is resolved: it moved by no more than its 99.9 % interval when the passes doubled, and no pass may
@@ -26,9 +32,9 @@ use super::judge::POWER;
 use super::trial::{Evidence, Trial};
 use super::verdict::Outcome;
 use super::weights;
-use crate::results::record::{CostMeasure, EstimatorRun, Quantity};
+use crate::results::record::{Against, Comparison, CostMeasure, EstimatorRun, Quantity};
 use crate::results::store::Stored;
-use crate::stats::efficiency::{Block, Efficiency, LogRatio, compare};
+use crate::stats::efficiency::{Block, Efficiency, LogRatio, Values, compare_values};
 use crate::stats::hypothesis::{Estimate, Test};
 use crate::stats::moments::Moments;
 use crate::stats::tree::Merge;
@@ -70,12 +76,32 @@ pub fn contest(
             }
         }
     };
-    let efficiency = compare(&b, &a, confidence).map_err(|why| why.to_string())?;
+    let values = match baseline.observable.is_pixels() {
+        true => Values::Variances,
+        false => Values::Scores,
+    };
+    let efficiency = compare_values(&b, &a, values, confidence).map_err(|why| why.to_string())?;
     Ok(Contest { efficiency, side_by_side })
+}
+
+/// The quantity whose mean stands for that of `quantity`: itself, or the sensor's first observable for `pixels`.
+pub(super) fn mean_of(stored: &Stored, quantity: &Quantity) -> Quantity {
+    let first = stored.run(quantity).and_then(|run| run.observables.first());
+    match first.filter(|_| quantity.observable.is_pixels()) {
+        Some(first) => Quantity { observable: first.clone(), ..quantity.clone() },
+        None => quantity.clone(),
+    }
+}
+
+/// The comparison of means that a claim of efficiency rests on.
+pub(super) fn of_means(stored: &Stored, comparison: &Comparison, baseline: &Quantity) -> Comparison {
+    let against = Against::Quantity { other: mean_of(stored, baseline), paired: false };
+    Comparison { against, quantity: mean_of(stored, &comparison.quantity), ..comparison.clone() }
 }
 
 /// The batches of one arm.
 struct Side {
+    /// Moments of scores, or of the variances that pairs of passes show.
     batches: Vec<Moments>,
     costs: Vec<f64>,
     settled: Vec<bool>,
@@ -86,7 +112,7 @@ impl Side {
         let name = &quantity.estimator;
         let missing = || format!("the record does not hold this quantity of {name}");
         let run = stored.run(quantity).ok_or_else(missing)?;
-        let batches = stored.batches(quantity).ok_or_else(missing)?;
+        let batches = stored.batches(&mean_of(stored, quantity)).ok_or_else(missing)?;
         let (costs, settled) = match measure {
             CostMeasure::Counters => {
                 let costs = weights::counted(stored, run)?;
@@ -103,7 +129,39 @@ impl Side {
         if costs.len() != batches.len() || settled.len() != batches.len() {
             return Err(format!("costs of {name} are not of the record's {} batches", batches.len()));
         }
+        if quantity.observable.is_pixels() {
+            let pairs = stored.spread(run, quantity.band).ok_or_else(missing)?;
+            return Side::of_pairs(&batches, &pairs, &costs, &settled).ok_or_else(|| {
+                format!("the spread of {name} is not of the record's {} batches", batches.len())
+            });
+        }
         Ok(Side { batches, costs, settled })
+    }
+
+    /// Batches of pairs with what their passes cost. A batch of pairs is one of passes, or two where those are of
+    /// one pass each. The cost of a pair is put down as that of one pass, and of a batch's odd pass not at all.
+    fn of_pairs(
+        batches: &[Moments],
+        pairs: &[Moments],
+        costs: &[f64],
+        settled: &[bool],
+    ) -> Option<Side> {
+        let width = if batches.first()?.n == 1 { 2 } else { 1 };
+        let mut side = Side { batches: Vec::new(), costs: Vec::new(), settled: Vec::new() };
+        for (index, &pair) in pairs.iter().enumerate() {
+            let of = index * width..(index + 1) * width;
+            let passes: u64 = batches.get(of.clone())?.iter().map(|batch| batch.n).sum();
+            if passes / 2 != pair.n {
+                return None;
+            }
+            side.batches.push(pair);
+            side.costs.push(costs[of.clone()].iter().sum::<f64>() * pair.n as f64 / passes as f64);
+            side.settled.push(settled[of].iter().all(|is_settled| *is_settled));
+        }
+        // What is in no pair is one last pass.
+        let paired: u64 = pairs.iter().map(|pair| 2 * pair.n).sum();
+        let passes: u64 = batches.iter().map(|batch| batch.n).sum();
+        (passes - paired <= 1).then_some(side)
     }
 
     fn blocks(&self) -> Vec<Block> {

@@ -5,8 +5,8 @@ use serde_json::json;
 use super::super::judge::judge_alone;
 use super::super::verdict::Verdict;
 use super::*;
-use crate::results::record::{Against, Bias, Comparison};
-use crate::results::sample::{quantity, set_gates, stored, uniform};
+use crate::results::record::{Against, Bias, Comparison, Observable};
+use crate::results::sample::{pairs, quantity, set_gates, set_spread, stored, uniform};
 use crate::results::store::gates_path;
 use crate::results::timing::{Batches, Timing};
 
@@ -205,4 +205,56 @@ fn cpu_time_needs_its_conditions() {
 
     let zero = timed(scored(0.1, 0.05), |_, _| 0.0);
     assert_invalid(&by_cpu(zero, 1.5), "not finite, or a cost is not positive");
+}
+
+/// A claim about the pixels that `snee` is more than `bound` times as efficient, judged.
+fn of_pixels(mut s: Stored, bound: f64) -> Verdict {
+    let pixels = |name| Quantity { observable: Observable::pixels(), ..quantity(name, 0) };
+    s.record.claims = json!([{"name": "c", "faster": {}}]);
+    let (baseline, cost) = (pixels("mis"), CostMeasure::Counters);
+    let against = Against::Efficiency { baseline, exceeds: bound, cost };
+    s.record.comparisons =
+        vec![Comparison { claim: 0, quantity: pixels("snee"), against, detect: None }];
+    judge_alone(&s).remove(0)
+}
+
+/// The images' means know nothing of it: only the pixels of `snee` vary less, by 9.
+#[test]
+fn pixels_have_an_efficiency_of_their_own() {
+    let mut s = scored(0.1, 0.1);
+    set_spread(&mut s, "mis", pairs(0.3, 0));
+    set_spread(&mut s, "snee", pairs(0.1, 5_000_000));
+    let pass = of_pixels(s.clone(), 3.0);
+    assert_eq!((&pass.outcome, pass.observable.as_str()), (&Outcome::Pass, "pixels"), "{pass:?}");
+    assert!((pass.value / 9.0).ln().abs() < 0.15, "{pass:?}");
+    let fail = of_pixels(s.clone(), 60.0);
+    assert_eq!(fail.outcome, Outcome::Fail, "{fail:?}");
+    assert_eq!(by_counters(s.clone(), 3.0).outcome, Outcome::Fail, "the images' means are even");
+    // One pair of passes with a bright pixel makes half of a variance.
+    let mut loud = s.clone();
+    set_spread(&mut loud, "mis", |i, _| if i == 77 { 64.0 } else { 0.5 });
+    assert_invalid(&of_pixels(loud, 3.0), "not resolved");
+    // The means must agree all the same.
+    set_gates(&mut s, "snee", |i, _, _| 1.2 + 0.1 * uniform(i + 9000));
+    let differ = of_pixels(s, 3.0);
+    assert_eq!(differ.outcome, Outcome::Fail);
+    assert!(differ.note.contains("the means differ"), "{differ:?}");
+}
+
+/// What pairs cost is what their passes do, in batches of one pass and of several.
+#[test]
+fn pairs_have_the_cost_of_their_passes() {
+    let passes = |n: &[u64]| n.iter().map(|&n| Moments { n, ..Moments::default() }).collect::<Vec<_>>();
+    let side = |batches: &[u64], pairs: &[u64], costs: &[f64]| {
+        let settled: Vec<bool> = (0..costs.len()).map(|i| i != 1).collect();
+        Side::of_pairs(&passes(batches), &passes(pairs), costs, &settled)
+    };
+    let four = side(&[4, 4, 3], &[2, 2, 1], &[8.0, 12.0, 9.0]).expect("pairs");
+    assert_eq!((four.costs, four.settled), (vec![4.0, 6.0, 3.0], vec![true, false, true]));
+    let one = side(&[1; 5], &[1; 2], &[1.0, 2.0, 3.0, 4.0, 5.0]).expect("pairs");
+    assert_eq!((one.costs, one.settled), (vec![1.5, 3.5], vec![false, true]));
+    // A last pass alone; two passes that are in no pair.
+    assert!(side(&[4, 1], &[2], &[1.0, 1.0]).is_some());
+    assert!(side(&[4, 4], &[2], &[1.0, 1.0]).is_none());
+    assert!(side(&[4, 4], &[2, 1], &[1.0, 1.0]).is_none());
 }

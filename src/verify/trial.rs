@@ -210,8 +210,8 @@ impl<'a> Arm<'a> {
 /// Judges comparison `index` of a record by itself.
 pub(super) fn trial(stored: &Stored, index: usize, comparison: &Comparison) -> Trial {
     if let Against::Efficiency { baseline, exceeds, cost } = &comparison.against {
-        let against = Against::Quantity { other: baseline.clone(), paired: false };
-        let means = trial(stored, index, &Comparison { against, ..comparison.clone() });
+        let mut means = trial(stored, index, &efficiency::of_means(stored, comparison, baseline));
+        means.verdict.observable = comparison.quantity.observable.name.clone();
         return efficiency::trial(stored, means, &comparison.quantity, baseline, (*exceeds, *cost));
     }
     let claim = Claim::of(&stored.record, comparison.claim);

@@ -128,14 +128,16 @@ fn pairs(
     filter(at, only, axes);
 }
 
-fn estimator(at: At, name: &str, known: &Known) {
+/// An estimator of this name is there.
+pub(super) fn estimator(at: At, name: &str, known: &Known) {
     if !known.estimators.contains(&name) {
         let help = suggest::help(name, &known.estimators, "estimators");
         at.report_help(format!("unknown estimator `{name}`"), help);
     }
 }
 
-fn axis<'a>(at: At, name: &str, axes: &'a [SweepAxis]) -> Option<&'a SweepAxis> {
+/// The axis of this name, which is there.
+pub(super) fn axis<'a>(at: At, name: &str, axes: &'a [SweepAxis]) -> Option<&'a SweepAxis> {
     let axis = axes.iter().find(|axis| axis.name == name);
     if axis.is_none() {
         let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();

@@ -13,6 +13,7 @@ mod claims;
 mod entries;
 mod lights;
 mod object;
+mod pictures;
 mod sensor;
 
 pub use bands::bands;
@@ -20,6 +21,7 @@ pub use claims::{Known, claim};
 pub use entries::{CELL_KEYS, pair, unique_names};
 pub use lights::lights;
 pub use object::object;
+pub use pictures::{has_pixels, picture};
 pub use sensor::sensor;
 
 /// Where the rules put their findings; a finding that is already there is not repeated.

@@ -8,7 +8,7 @@ use crate::results::exr_file::ExrImage;
 use crate::results::npy::Array;
 use crate::results::record::{Bias, Image};
 use crate::results::sample;
-use crate::results::store::{Arrays, costs_path, gates_path, pixels_path};
+use crate::results::store::{Arrays, costs_path, gates_path, pixels_path, spread_path};
 use crate::stats::moments::{ImageMoments, Moments};
 use crate::stats::tree::{Counter, Merge, batch_level};
 
@@ -60,6 +60,7 @@ fn stored(seed: u64, noise: f64) -> Stored {
     let mut arrays = Arrays::new();
     arrays.insert(gates_path(0, "mis"), Array::new(vec![batches.len(), names.len(), 1, 5], data));
     arrays.insert(pixels_path(0, "mis"), Array::new(vec![2, SIDE, SIDE, 1], both));
+    arrays.insert(spread_path(0, "mis"), Array::new(vec![0, 1, 5], vec![]));
     arrays.insert(costs_path(0, "mis"), Array::new(vec![batches.len(), 0], vec![]));
     let mut stored = sample::stored(0.1);
     stored.record.bands.truncate(1);
@@ -73,7 +74,12 @@ fn stored(seed: u64, noise: f64) -> Stored {
         observables: names.into_iter().map(|name| Observable { name, class: "all".into() }).collect(),
         gates: gates_path(0, "mis"),
         costs: costs_path(0, "mis"),
-        image: Some(Image { width: SIDE, height: SIDE, pixels: pixels_path(0, "mis") }),
+        image: Some(Image {
+            width: SIDE,
+            height: SIDE,
+            pixels: pixels_path(0, "mis"),
+            spread: spread_path(0, "mis"),
+        }),
         cost: BTreeMap::new(),
         anomalies: BTreeMap::new(),
     }];

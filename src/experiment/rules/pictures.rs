@@ -1,0 +1,46 @@
+//! Rules of `[[picture]]`.
+
+use super::At;
+use super::claims::{Known, axis, estimator};
+use crate::experiment::picture::{PictureEntry, Split};
+use crate::experiment::schema::Sensor;
+
+/// The rules of one picture.
+pub fn picture(at: At, picture: &PictureEntry, known: &Known) {
+    if let Some(words) = &picture.split {
+        split(at.to("split"), words, known);
+    }
+}
+
+fn split(at: At, words: &Split, known: &Known) {
+    estimator(at.to("left"), &words.left, known);
+    estimator(at.to("right"), &words.right, known);
+    if words.left == words.right {
+        at.to("right").report_help(
+            format!("`{}` is left and right", words.left),
+            "a split picture compares two estimators: name two",
+        );
+    }
+    if let Some(stops) = words.exposure_stops.filter(|stops| !(stops.abs() <= 64.0)) {
+        at.to("exposure_stops").report(format!("must be between -64 and 64, is {stops}"));
+    }
+    let Some(axes) = known.axes else { return };
+    for (key, name) in [("rows", &words.rows), ("columns", &words.columns)] {
+        if let Some(name) = name {
+            axis(at.to(key), name, axes);
+        }
+    }
+    if words.rows.is_some() && words.rows == words.columns {
+        at.to("columns").report("rows and columns are the same axis");
+    }
+}
+
+/// Pictures need pixels: `at` is the list of pictures, `sensor` that of a cell.
+pub fn has_pixels(at: At, sensor: &Sensor) {
+    if at.count() > 0 && matches!(sensor, Sensor::Probe { .. } | Sensor::Flux { .. }) {
+        at.item(0).report_help(
+            "a picture needs pixels, and the sensor has none",
+            "take an `orthographic` or a `perspective` sensor in every cell, or drop the picture",
+        );
+    }
+}

@@ -1,0 +1,55 @@
+//! Rules of pictures.
+
+use super::*;
+use crate::experiment::picture::wanted;
+
+const SWEEP: &str = r#"[[sweep]]
+key = "object.medium.coefficients.g"
+values = [0.0, 0.8]
+"#;
+
+/// The good experiment with pixels, two estimators, a sweep over `g` and one picture, which begins at line 20.
+fn text(picture: &str) -> String {
+    let pixels = "sensor.orthographic = { resolution = [8, 8], center_mm = [0, 0, 0], toward = [0, 0, -1], \
+                  up = [0, 1, 0], width_mm = 2 }";
+    let probe = GOOD.lines().find(|line| line.starts_with("sensor")).expect("a sensor");
+    let good = GOOD.replace(probe, pixels);
+    format!("{good}[[estimator]]\nname = \"snee\"\nsnee = {{}}\n{SWEEP}[[picture]]\n{picture}\n")
+}
+
+fn picture(words: &str) -> String {
+    errors(&text(&format!("split = {{ {words} }}")))
+}
+
+#[test]
+fn pictures_name_estimators_and_axes() {
+    let message = picture("left = \"mos\", right = \"snee\"");
+    holds(&message, "unknown estimator `mos`", "20:18", "did you mean `mis`?");
+    let message = picture("left = \"snee\", right = \"snee\"");
+    holds(&message, "`snee` is left and right", "20:34", "name two");
+    let message = picture("left = \"mis\", right = \"snee\", rows = \"h\"");
+    holds(&message, "unknown axis `h`", "20:49", "`g`");
+    let message = picture("left = \"mis\", right = \"snee\", rows = \"g\", columns = \"g\"");
+    holds(&message, "rows and columns are the same axis", "20:64", "");
+    let message = picture("left = \"mis\", right = \"snee\", exposure_stops = nan");
+    assert!(message.contains("exposure_stops"), "{message}");
+    assert!(errors(&text("")).contains("`split` is needed"), "{}", errors(&text("")));
+}
+
+#[test]
+fn pictures_need_pixels() {
+    let split = "split = { left = \"mis\", right = \"snee\" }";
+    let message =
+        errors(&format!("{GOOD}[[estimator]]\nname = \"snee\"\nsnee = {{}}\n[[picture]]\n{split}\n"));
+    assert!(message.contains("a picture needs pixels, and the sensor has none"), "{message}");
+}
+
+// How a record is shown is no part of what it is.
+#[test]
+fn pictures_are_no_part_of_the_resolved_experiment() {
+    let with = good(&text("split = { left = \"mis\", right = \"snee\", rows = \"g\" }"));
+    let without = good(text("").split("[[picture]]").next().expect("a file"));
+    assert_eq!(with.resolved(), without.resolved());
+    let there = wanted(&with.file.picture);
+    assert_eq!((there.len(), there[0].rows.as_deref(), there[0].left.as_str()), (1, Some("g"), "mis"));
+}
