@@ -3,7 +3,10 @@
 //! An estimator is built for one cell and plays passes: it turns a pass's random streams into scores
 //! and knows no file, thread or statistic. The runner folds scores into moments, zeros included.
 
+mod choice;
+mod crossing;
 mod history;
+pub mod light_trace;
 pub mod path;
 mod scores;
 

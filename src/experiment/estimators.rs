@@ -6,21 +6,33 @@ use serde_json::Value as Json;
 
 use super::registry::{Registry, RegistryEntry};
 use crate::error::{Error, Result};
+use crate::estimators::light_trace::LightTracer;
 use crate::estimators::path::{PathTracer, Roulette};
 
 /// Every estimator and sampler of this crate; a program of one's own may push its entries on top.
 pub fn builtin() -> Registry {
     Registry {
         samplers: super::samplers::builtin(),
-        entries: vec![RegistryEntry {
-            kind: "path",
-            doc: "unidirectional path tracing with MIS between BSDF and light sampling; unbiased",
-            options_schema: || schemars::schema_for!(PathOptions),
-            build: |options, scene| {
-                let options: PathOptions = read(options)?;
-                Ok(Box::new(PathTracer::new(scene, options.roulette.into())))
+        entries: vec![
+            RegistryEntry {
+                kind: "path",
+                doc: "unidirectional path tracing with MIS between BSDF and light sampling; unbiased",
+                options_schema: || schemars::schema_for!(PathOptions),
+                build: |options, scene| {
+                    let options: PathOptions = read(options)?;
+                    Ok(Box::new(PathTracer::new(scene, options.roulette.into())))
+                },
             },
-        }],
+            RegistryEntry {
+                kind: "light_trace",
+                doc: "analog tracing from the lights, into `flux` or `acceptance_sr`; unbiased at true normals",
+                options_schema: || schemars::schema_for!(LightTraceOptions),
+                build: |options, scene| {
+                    let options: LightTraceOptions = read(options)?;
+                    Ok(Box::new(LightTracer::new(scene, options.paths)?))
+                },
+            },
+        ],
     }
 }
 
@@ -31,6 +43,16 @@ pub struct PathOptions {
     /// When a path is ended by chance; both ways are unbiased.
     #[serde(default)]
     pub roulette: RouletteOption,
+}
+
+/// Options of `light_trace`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LightTraceOptions {
+    /// Photons whose sum is one pass; without it as many as the sensor has rays.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 1073741824))]
+    pub paths: Option<usize>,
 }
 
 /// Russian roulette.

@@ -1,0 +1,1 @@
+//! Energy, scaling and closed forms for the light tracer.
