@@ -6,7 +6,8 @@
 //! where a body is not convex, until it leaves for good. Then the sensor receives it
 //! ([`Sensor::receive`](crate::scene::Sensor::receive)). No connection to a light or to the sensor is made,
 //! so it samples every boundary under every light, a smooth one under parallel light included, which no
-//! path from the sensor finds; in exchange it needs a sensor that photons hit.
+//! path from the sensor finds; in exchange it needs a sensor that photons hit. Its walk is written apart
+//! from the path tracer's, so that a slip in one of them shows as a difference.
 //!
 //! Power of a photon. Light of radiance L(w) from directions w towards it, drawn with density p(w) from a
 //! light that was chosen with probability P, carries in one of N photons

@@ -403,4 +403,110 @@ mod tests {
             }
         }
     }
+
+    fn accepting(height: f64) -> Sensor {
+        // The screen is seen from below, turned, and stands in the body.
+        let view = DVec3::new(0.36, -0.48, 0.8);
+        let right = view.cross(DVec3::Z).normalize();
+        let screen = Screen {
+            width: 6,
+            height: 4,
+            origin: DVec3::new(0.1, 0.2, -0.1),
+            right: 0.2 * right,
+            down: 0.2 * view.cross(right),
+            view,
+        };
+        let bounds = BoundingSphere { center: DVec3::new(0.0, 0.5, 0.0), radius: 1.5 };
+        Sensor::Accepting(Acceptance::new(screen, height, bounds))
+    }
+
+    fn receiving() -> Vec<Sensor> {
+        let face = |name, n| FluxFace { name, point: DVec3::ZERO, reach: 1.0, frame: Frame::about(n) };
+        let faces = vec![face("top", DVec3::Z), face("bottom", -DVec3::Z)];
+        let bounds = BoundingSphere { center: DVec3::X, radius: 2.0 };
+        let frame = Frame::about(DVec3::new(0.6, 0.0, -0.8));
+        vec![
+            Sensor::FaceFlux { faces, bins: 3, paths: 2 },
+            Sensor::BodyFlux { bounds, frame, bins: 5, paths: 2 },
+            accepting(1e-4),
+            accepting(0.9),
+        ]
+    }
+
+    /// Light that goes back along any of a sensor's rays is received by the ray's slot, wherever on the
+    /// line it left the body.
+    #[test]
+    fn light_along_a_ray_is_received_by_its_slot() {
+        for sensor in receiving() {
+            for index in 0..sensor.rays_per_pass() {
+                for k in 0..200u32 {
+                    let step = [0.819_172_513, 0.671_043_607, 0.549_700_478, 0.450_333_124];
+                    let u = step.map(|step: f64| ((f64::from(k) + 0.5) * step).fract());
+                    let SensorRay { ray, slot, .. } = sensor.ray(index, u);
+                    let out = Ray { origin: ray.at(f64::from(k) * 0.02), dir: -ray.dir };
+                    let received = sensor.receive(&out).map(|(slot, _)| slot);
+                    assert_eq!(received, Some(slot), "{sensor:?} {index} {u:?}");
+                }
+            }
+        }
+    }
+
+    /// Rays of pixels start outside the body's sphere and before it.
+    #[test]
+    fn rays_of_caps_start_before_the_body() {
+        for height in [1e-4, 0.9] {
+            let sensor = accepting(height);
+            let Sensor::Accepting(Acceptance { bounds, .. }) = sensor else { unreachable!() };
+            for index in 0..sensor.rays_per_pass() {
+                for v in [0.0, 0.5, 0.999] {
+                    let SensorRay { ray, weight, .. } = sensor.ray(index, [0.3, 0.7, v, 0.9]);
+                    let to_middle = bounds.center - ray.origin;
+                    assert!(to_middle.dot(ray.dir) > 1.999 * bounds.radius);
+                    assert!(weight == 1.0 && (ray.dir.length() - 1.0).abs() < 1e-15);
+                }
+            }
+        }
+    }
+
+    /// What a sensor receives from light of radiance 1 in all directions, by a sum over a grid of lines
+    /// through the body's sphere: radiance 1 in every pixel, 2 pi dmu * pi R^2 in every bin. Lines are
+    /// even in direction and in place across it, each worth 4 pi * pi R^2 over their number.
+    #[test]
+    fn uniform_light_is_received_as_radiance_one() {
+        for (sensor, value, tolerance) in [
+            (accepting(0.9), 1.0, 0.02),
+            (accepting(0.2), 1.0, 0.05),
+            (receiving().swap_remove(1), 2.0 * PI * 0.4 * PI * 4.0, 0.001),
+        ] {
+            let bounds = match &sensor {
+                Sensor::Accepting(Acceptance { bounds, .. }) => *bounds,
+                Sensor::BodyFlux { bounds, .. } => *bounds,
+                _ => unreachable!(),
+            };
+            let n = 4_000_000u32;
+            let power = 4.0 * PI * PI * bounds.radius * bounds.radius / f64::from(n);
+            let slots = sensor.regions().len().max(sensor.pixels().map_or(0, |(w, h)| w * h));
+            let mut sums = vec![0.0; slots];
+            // Inverse powers of the real root of x^5 = x + 1: Roberts' sequence in four dimensions.
+            let root = 1.167_303_978_261_418_7_f64;
+            for k in 0..n {
+                let u: [f64; 4] =
+                    std::array::from_fn(|i| (f64::from(k) * root.powi(-(i as i32) - 1)).fract());
+                let (sin, cos) = crate::math::sin_cos_turns(u[1]);
+                let z = 1.0 - 2.0 * u[0];
+                let r = (1.0 - z * z).sqrt();
+                let dir = DVec3::new(r * cos, r * sin, z);
+                let across = Frame::about(dir);
+                let [x, y] = square_to_disc([u[2], u[3]]);
+                let origin = bounds.center + bounds.radius * (x * across.s + y * across.t);
+                if let Some((slot, factor)) = sensor.receive(&Ray { origin, dir }) {
+                    sums[slot] += power * factor;
+                }
+            }
+            let slots = sensor.pixels().map_or(5, |(w, h)| w * h);
+            for (slot, sum) in sums[..slots].iter().enumerate() {
+                assert!((sum / value - 1.0).abs() < tolerance, "{slot}: {sum} of {value}");
+            }
+        }
+    }
 }
