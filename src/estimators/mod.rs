@@ -4,7 +4,10 @@
 //! and knows no file, thread or statistic. The runner folds scores into moments, zeros included.
 
 mod bands;
+mod choice;
+mod crossing;
 mod history;
+pub mod light_trace;
 pub mod path;
 mod scores;
 pub mod snee;

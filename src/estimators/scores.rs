@@ -9,7 +9,7 @@ use crate::scene::{Scene, Sensor};
 /// Deterministic counts of work done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cost {
-    /// Paths started at the sensor.
+    /// Paths started, at the sensor or (photons) at a light.
     Paths,
     /// Closest-hit queries.
     Rays,

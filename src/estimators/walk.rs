@@ -10,6 +10,8 @@
 use std::sync::Arc;
 
 use super::bands::{Bands, Place};
+use super::choice::{choose_light, light_shares};
+use super::crossing::{other, radiance_scale};
 use super::{Anomaly, Cost, History, Scores, TransportClass};
 use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
@@ -43,14 +45,7 @@ pub(super) struct Field {
 impl Field {
     /// For a scene.
     pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Field {
-        let choice = (0..scene.bands())
-            .map(|band| {
-                let strengths: Vec<f64> = scene.lights.iter().map(|l| l.strength(band)).collect();
-                let total: f64 = strengths.iter().sum();
-                let share = |s: &f64| if total > 0.0 { s / total } else { 0.0 };
-                strengths.iter().map(share).collect()
-            })
-            .collect();
+        let choice = light_shares(&scene);
         Field { bounds: scene.shape.bounds(), roulette, choice, scene }
     }
 }
@@ -504,7 +499,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
     /// Samples a light from a rough surface vertex.
     fn connect_from_surface(&mut self, hit: &Hit, frame: &Frame, wo: DVec3) {
         let u = self.light_stream.draw3();
-        let Some((index, choice)) = self.choose_light(u[0]) else { return };
+        let Some((index, choice)) = choose_light(self.choice, u[0]) else { return };
         let sample = self.scene.lights[index].sample(self.band, [u[1], u[2]]);
         let wi = frame.to_local(sample.wi);
         let outside = sample.wi.dot(hit.normal) > 0.0;
@@ -530,7 +525,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
     /// Samples a light from a medium vertex, straight through a matched boundary.
     fn connect_from_medium(&mut self) {
         let u = self.light_stream.draw3();
-        let Some((index, choice)) = self.choose_light(u[0]) else { return };
+        let Some((index, choice)) = choose_light(self.choice, u[0]) else { return };
         let sample = self.scene.lights[index].sample(self.band, [u[1], u[2]]);
         if sample.radiance == 0.0 {
             return;
@@ -598,19 +593,6 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         self.score(self.history.class(), light, score);
     }
 
-    /// A light by its strength, and the probability of that choice.
-    fn choose_light(&self, u: f64) -> Option<(usize, f64)> {
-        let mut rest = u;
-        for (index, &choice) in self.choice.iter().enumerate() {
-            if rest < choice {
-                return Some((index, choice));
-            }
-            rest -= choice;
-        }
-        // Rounding of the sum: the last light that shines.
-        self.choice.iter().rposition(|&choice| choice > 0.0).map(|index| (index, self.choice[index]))
-    }
-
     #[inline]
     fn matched(&self) -> bool {
         self.boundary == Boundary::Matched
@@ -626,26 +608,4 @@ fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> Option<f64>
     }
     let probability = weight / threshold;
     (u() < probability).then_some(probability)
-}
-
-#[inline]
-pub(super) fn other(side: Side) -> Side {
-    match side {
-        Side::Outside => Side::Inside,
-        Side::Inside => Side::Outside,
-    }
-}
-
-/// Undoes radiance's factor (n_o / n_i)^2 of a refraction from `side` (of wo) to `next` (of wi).
-#[inline]
-pub(super) fn radiance_scale(side: Side, next: Side, boundary: &Boundary) -> f64 {
-    let eta = match boundary {
-        Boundary::Smooth { eta } | Boundary::Rough { eta, .. } => *eta,
-        Boundary::Matched => 1.0,
-    };
-    match (side, next) {
-        (Side::Outside, Side::Inside) => eta * eta,
-        (Side::Inside, Side::Outside) => 1.0 / (eta * eta),
-        _ => 1.0,
-    }
 }

@@ -16,7 +16,7 @@ use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::results::exr_file::{ExrImage, read_exr};
 use crate::results::json::hash_hex;
 use crate::results::record::Band;
-use crate::scene::{Emission, FluxFace, LatLong, Light, Scene, Screen, Sensor};
+use crate::scene::{Acceptance, Emission, FluxFace, LatLong, Light, Scene, Screen, Sensor};
 
 /// Builds the scenes of an experiment; equal shapes and maps are built once and shared.
 pub struct Builder<'a> {
@@ -56,7 +56,7 @@ impl<'a> Builder<'a> {
         let medium = medium.iter().map(|m| Medium::new(m.sigma_a, m.sigma_s, m.g)).collect();
         let lights = cell.light.iter().enumerate();
         let lights = lights.map(|(i, entry)| self.light(i, entry)).collect::<Result<Vec<Light>>>()?;
-        let sensor = sensor(&cell.sensor, &shape);
+        let sensor = sensor(&cell.sensor, &shape)?;
         if let Some(point) = sensor_position(&sensor)
             && shape.covers(point)
         {
@@ -246,7 +246,7 @@ fn build_shape(words: &schema::Shape, experiment: &Experiment) -> Result<Shape> 
     mesh.map(Shape::Mesh)
 }
 
-fn sensor(words: &schema::Sensor, shape: &Shape) -> Sensor {
+fn sensor(words: &schema::Sensor, shape: &Shape) -> Result<Sensor> {
     let screen = |resolution: &[usize; 2], origin: [f64; 3], view: DVec3, up: [f64; 3], pixel: f64| {
         let right = view.cross(DVec3::from(up)).normalize();
         let down = view.cross(right);
@@ -260,11 +260,22 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Sensor {
             view,
         }
     };
-    match words {
-        schema::Sensor::Orthographic { resolution, center_mm, toward, up, width_mm } => {
+    Ok(match words {
+        schema::Sensor::Orthographic { resolution, center_mm, toward, up, width_mm, acceptance_sr } => {
             let pixel = width_mm / resolution[0] as f64;
-            let view = toward.unit();
-            Sensor::Orthographic(before(shape, screen(resolution, *center_mm, view, *up, pixel)))
+            let screen = screen(resolution, *center_mm, toward.unit(), *up, pixel);
+            match (acceptance_sr, shape.bounds()) {
+                (None, _) => Sensor::Orthographic(before(shape, screen)),
+                (Some(solid_angle), Some(bounds)) => {
+                    Sensor::Accepting(Acceptance::new(screen, solid_angle / (2.0 * PI), bounds))
+                }
+                (Some(_), None) => {
+                    return Err(Error::input_help(
+                        "`acceptance_sr` needs a body of finite size",
+                        "leave it out, or measure the `flux` of a half_space or slab",
+                    ));
+                }
+            }
         }
         schema::Sensor::Perspective { resolution, position_mm, look_at_mm, up, fov_deg } => {
             let view = (DVec3::from(*look_at_mm) - DVec3::from(*position_mm)).normalize();
@@ -289,7 +300,7 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Sensor {
             },
             None => Sensor::FaceFlux { faces: faces(shape), bins: *bins, paths: *paths_per_pass },
         },
-    }
+    })
 }
 
 /// The same parallel rays from before the body: where they start does not change what they see, as long
@@ -332,6 +343,9 @@ fn sensor_position(sensor: &Sensor) -> Option<DVec3> {
         Sensor::Perspective(screen) => Some(screen.origin),
         Sensor::Probe { ray, .. } => Some(ray.origin),
         Sensor::Vertex { .. } => None,
-        Sensor::Orthographic(_) | Sensor::FaceFlux { .. } | Sensor::BodyFlux { .. } => None,
+        Sensor::Orthographic(_)
+        | Sensor::Accepting(_)
+        | Sensor::FaceFlux { .. }
+        | Sensor::BodyFlux { .. } => None,
     }
 }

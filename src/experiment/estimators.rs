@@ -7,13 +7,14 @@ use serde_json::Value as Json;
 use super::registry::{Registry, RegistryEntry};
 use super::snee::SneeWords;
 use crate::error::{Error, Result};
+use crate::estimators::light_trace::LightTracer;
 use crate::estimators::path::{PathTracer, Roulette};
 use crate::estimators::snee::{Snee, TwoBounce};
 use crate::scene::{Scene, Sensor};
 
 /// Every estimator and sampler of this crate; a program of one's own may push its entries on top.
 pub fn builtin() -> Registry {
-    Registry { samplers: super::samplers::builtin(), entries: vec![PATH, SNEE, TWO_BOUNCE] }
+    Registry { samplers: super::samplers::builtin(), entries: vec![PATH, SNEE, TWO_BOUNCE, LIGHT_TRACE] }
 }
 
 const PATH: RegistryEntry = RegistryEntry {
@@ -48,6 +49,16 @@ const TWO_BOUNCE: RegistryEntry = RegistryEntry {
     },
 };
 
+const LIGHT_TRACE: RegistryEntry = RegistryEntry {
+    kind: "light_trace",
+    doc: "analog tracing from the lights, into `flux` or `acceptance_sr`; unbiased at true normals",
+    options_schema: || schemars::schema_for!(LightTraceOptions),
+    build: |options, scene| {
+        let options: LightTraceOptions = read(options)?;
+        Ok(Box::new(LightTracer::new(scene, options.paths)?))
+    },
+};
+
 /// Whole paths start outside the body.
 fn looks_from_outside(kind: &str, scene: &Scene) -> Result<()> {
     match scene.sensor {
@@ -66,6 +77,16 @@ pub struct PathOptions {
     /// When a path is ended by chance; both ways are unbiased.
     #[serde(default)]
     pub roulette: RouletteOption,
+}
+
+/// Options of `light_trace`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LightTraceOptions {
+    /// Photons whose sum is one pass; without it as many as the sensor has rays.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 1073741824))]
+    pub paths: Option<usize>,
 }
 
 /// Russian roulette.

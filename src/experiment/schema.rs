@@ -384,7 +384,8 @@ pub enum Sensor {
         /// Columns and rows.
         #[schemars(inner(range(min = 1, max = 16384)))]
         resolution: [usize; 2],
-        /// A point in the middle of the image, mm; its place along the view does not matter.
+        /// A point in the middle of the image, mm; its place along the view matters only with
+        /// `acceptance_sr`, which makes the image sharp there.
         center_mm: [f64; 3],
         /// Direction of the rays.
         toward: Direction,
@@ -393,6 +394,12 @@ pub enum Sensor {
         /// Width of the image plane, mm; the height follows from square pixels.
         #[schemars(extend("exclusiveMinimum" = 0))]
         width_mm: f64,
+        /// Solid angle of the cap of directions about the view from which a pixel accepts light, sr: its
+        /// value is the mean radiance over pixel and cap, weighed by the cosine to the view. One
+        /// direction without it. For bodies of finite size.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 6.283185307179586))]
+        acceptance_sr: Option<f64>,
     },
     /// A pinhole: radiance per pixel, box filter.
     Perspective {

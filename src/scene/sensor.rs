@@ -12,6 +12,8 @@ use crate::sampling::warp::{square_to_cosine_hemisphere, square_to_disc};
 pub enum Sensor {
     /// Parallel rays through the pixels of a screen.
     Orthographic(Screen),
+    /// Rays through the pixels of a screen from a cap of directions about the view.
+    Accepting(Acceptance),
     /// Rays from a point through the pixels of a screen.
     Perspective(Pinhole),
     /// One ray, played `paths` times per pass.
@@ -70,6 +72,61 @@ pub struct Screen {
 /// A perspective sensor: the screen's pixel vectors are taken at unit distance from the pinhole.
 pub type Pinhole = Screen;
 
+/// A screen whose pixels accept light from a cap of directions: a pixel is the mean radiance over its
+/// square and the cap, each direction weighed by its cosine to the view, as flux through the square is.
+#[derive(Clone, Copy, Debug)]
+pub struct Acceptance {
+    screen: Screen,
+    /// About the view.
+    frame: Frame,
+    /// Squared sine of the cap's half angle.
+    sin2: f64,
+    /// Sphere around the body: rays start before it.
+    bounds: BoundingSphere,
+}
+
+impl Acceptance {
+    /// `height` is 1 - cos of the cap's half angle, solid angle over 2 pi, in (0, 1). The screen stays
+    /// where it is, even inside the body: it is the plane on which the image is sharp.
+    pub fn new(screen: Screen, height: f64, bounds: BoundingSphere) -> Acceptance {
+        let sin2 = height * (2.0 - height);
+        Acceptance { screen, frame: Frame::about(screen.view), sin2, bounds }
+    }
+
+    /// Ray of pixel `index`: a point uniform in the pixel, a direction with density proportional to its
+    /// cosine in the cap. The ray starts two radii before the body's middle: outside the body and before
+    /// all of it, wherever the screen is.
+    #[inline]
+    fn ray(&self, index: usize, u: [f64; 4]) -> Ray {
+        let point = self.screen.origin + self.screen.offset(index, u);
+        // The cosine hemisphere's u0 is sin^2.
+        let dir = self.frame.to_world(square_to_cosine_hemisphere([u[2] * self.sin2, u[3]]));
+        let along = (self.bounds.center - point).dot(dir) - 2.0 * self.bounds.radius;
+        Ray { origin: point + along * dir, dir }
+    }
+
+    /// The pixel whose square the line of `out` crosses, if the cap holds its reversed direction.
+    #[inline]
+    fn pixel(&self, out: &Ray) -> Option<usize> {
+        let Screen { width, height, origin, right, down, view } = self.screen;
+        let cos = -out.dir.dot(view);
+        let across = out.dir + cos * view;
+        if cos <= 0.0 || across.length_squared() >= self.sin2 {
+            return None;
+        }
+        let from_middle = out.at((out.origin - origin).dot(view) / cos) - origin;
+        let column = from_middle.dot(right) / right.length_squared() + 0.5 * width as f64;
+        let row = from_middle.dot(down) / down.length_squared() + 0.5 * height as f64;
+        let inside = column >= 0.0 && column < width as f64 && row >= 0.0 && row < height as f64;
+        inside.then(|| row as usize * width + column as usize)
+    }
+
+    /// Area of a pixel times the cap's solid angle weighed by cosine, pi sin^2; mm^2 sr.
+    fn extent(&self) -> f64 {
+        self.screen.right.length() * self.screen.down.length() * PI * self.sin2
+    }
+}
+
 /// One face of a half-space or slab.
 #[derive(Clone, Debug)]
 pub struct FluxFace {
@@ -110,9 +167,9 @@ impl Sensor {
     /// Pixels per row and rows, for images.
     pub fn pixels(&self) -> Option<(usize, usize)> {
         match self {
-            Sensor::Orthographic(screen) | Sensor::Perspective(screen) => {
-                Some((screen.width, screen.height))
-            }
+            Sensor::Orthographic(screen)
+            | Sensor::Perspective(screen)
+            | Sensor::Accepting(Acceptance { screen, .. }) => Some((screen.width, screen.height)),
             _ => None,
         }
     }
@@ -120,7 +177,9 @@ impl Sensor {
     /// Number of rays of a pass.
     pub fn rays_per_pass(&self) -> usize {
         match self {
-            Sensor::Orthographic(screen) | Sensor::Perspective(screen) => screen.width * screen.height,
+            Sensor::Orthographic(screen)
+            | Sensor::Perspective(screen)
+            | Sensor::Accepting(Acceptance { screen, .. }) => screen.width * screen.height,
             Sensor::Probe { paths, .. } | Sensor::Vertex { paths, .. } => *paths,
             Sensor::FaceFlux { faces, bins, paths } => faces.len() * bins * paths,
             Sensor::BodyFlux { bins, paths, .. } => bins * paths,
@@ -139,6 +198,9 @@ impl Sensor {
             Sensor::Orthographic(screen) => {
                 let origin = screen.origin + screen.offset(index, u);
                 SensorRay { ray: Ray { origin, dir: screen.view }, weight: 1.0, slot: index }
+            }
+            Sensor::Accepting(acceptance) => {
+                SensorRay { ray: acceptance.ray(index, u), weight: 1.0, slot: index }
             }
             Sensor::Perspective(screen) => {
                 let dir = (screen.view + screen.offset(index, u)).normalize();
@@ -174,11 +236,63 @@ impl Sensor {
         }
     }
 
+    /// What light that leaves the body for good along `out` scores: its slot, and the factor from the
+    /// power that it carries to the slot's unit. The adjoint of [`Self::ray`]: what the rays of a slot
+    /// find as radiance, all light that leaves finds as power.
+    ///
+    /// Power that leaves is int int L cos dA dw over the lines of the slot, whatever the surface that
+    /// they are counted on (radiance is constant along a line):
+    ///   body    the lines of a bin are its slot, and its flux is their power: factor 1
+    ///   face    the same with power per area of the face, as every point of it is alike: factor 1
+    ///   pixel   its lines cross its square of area A within the cap, so that their power is
+    ///           int_A dA int_cap L cos dw; a pixel's value is the mean of L in that very measure, whose
+    ///           whole is A int_cap cos dw = A pi sin^2: factor 1 / (A pi sin^2)
+    /// A slot of one line or one direction has no power: a probe, a perspective or an orthographic
+    /// sensor receives nothing (see [`Self::receives`]).
+    #[inline]
+    pub fn receive(&self, out: &Ray) -> Option<(usize, f64)> {
+        // A cosine of rounded vectors may exceed 1 by a last digit.
+        let bin = |cos: f64, width: f64, bins: usize| ((cos / width) as usize).min(bins - 1);
+        match self {
+            Sensor::FaceFlux { faces, bins, .. } => {
+                let (index, mu) = faces
+                    .iter()
+                    .map(|face| face.frame.n.dot(out.dir))
+                    .enumerate()
+                    .find(|(_, mu)| *mu > 0.0)?;
+                Some((index * bins + bin(mu, 1.0 / *bins as f64, *bins), 1.0))
+            }
+            Sensor::BodyFlux { frame, bins, .. } => {
+                let mu = frame.n.dot(out.dir);
+                Some((bin(mu + 1.0, 2.0 / *bins as f64, *bins), 1.0))
+            }
+            Sensor::Accepting(acceptance) => {
+                acceptance.pixel(out).map(|pixel| (pixel, 1.0 / acceptance.extent()))
+            }
+            Sensor::Orthographic(_)
+            | Sensor::Perspective(_)
+            | Sensor::Probe { .. }
+            | Sensor::Vertex { .. } => None,
+        }
+    }
+
+    /// Whether light that leaves the body can reach it: false where a slot is a single direction or all
+    /// of its lines pass through one point.
+    pub fn receives(&self) -> bool {
+        match self {
+            Sensor::FaceFlux { .. } | Sensor::BodyFlux { .. } | Sensor::Accepting(_) => true,
+            Sensor::Orthographic(_)
+            | Sensor::Perspective(_)
+            | Sensor::Probe { .. }
+            | Sensor::Vertex { .. } => false,
+        }
+    }
+
     /// The regions, those that are split by class first.
     pub fn regions(&self) -> Vec<Region> {
         let named = |name: String, split: bool| Region { name, split };
         match self {
-            Sensor::Orthographic(_) | Sensor::Perspective(_) => {
+            Sensor::Orthographic(_) | Sensor::Perspective(_) | Sensor::Accepting(_) => {
                 let tiles = (0..TILES * TILES).map(|k| format!("tile_{}_{}", k / TILES, k % TILES));
                 std::iter::once(named("mean".into(), true))
                     .chain(tiles.map(|name| named(name, false)))
@@ -200,7 +314,9 @@ impl Sensor {
     #[inline]
     pub fn regions_of(&self, slot: usize) -> [(usize, f64); 2] {
         match self {
-            Sensor::Orthographic(screen) | Sensor::Perspective(screen) => {
+            Sensor::Orthographic(screen)
+            | Sensor::Perspective(screen)
+            | Sensor::Accepting(Acceptance { screen, .. }) => {
                 let (tile, pixels) = screen.tile(slot);
                 [(0, 1.0 / (screen.width * screen.height) as f64), (1 + tile, 1.0 / pixels as f64)]
             }
@@ -298,6 +414,112 @@ mod tests {
             for u in [0.0, 0.5, 0.999] {
                 let ray = sensor.ray(i, [u, 0.3, 0.5, 0.5]);
                 assert_eq!(((-ray.ray.dir.y + 1.0 + 1e-12) * 2.0) as usize, ray.slot);
+            }
+        }
+    }
+
+    fn accepting(height: f64) -> Sensor {
+        // The screen is seen from below, turned, and stands in the body.
+        let view = DVec3::new(0.36, -0.48, 0.8);
+        let right = view.cross(DVec3::Z).normalize();
+        let screen = Screen {
+            width: 6,
+            height: 4,
+            origin: DVec3::new(0.1, 0.2, -0.1),
+            right: 0.2 * right,
+            down: 0.2 * view.cross(right),
+            view,
+        };
+        let bounds = BoundingSphere { center: DVec3::new(0.0, 0.5, 0.0), radius: 1.5 };
+        Sensor::Accepting(Acceptance::new(screen, height, bounds))
+    }
+
+    fn receiving() -> Vec<Sensor> {
+        let face = |name, n| FluxFace { name, point: DVec3::ZERO, reach: 1.0, frame: Frame::about(n) };
+        let faces = vec![face("top", DVec3::Z), face("bottom", -DVec3::Z)];
+        let bounds = BoundingSphere { center: DVec3::X, radius: 2.0 };
+        let frame = Frame::about(DVec3::new(0.6, 0.0, -0.8));
+        vec![
+            Sensor::FaceFlux { faces, bins: 3, paths: 2 },
+            Sensor::BodyFlux { bounds, frame, bins: 5, paths: 2 },
+            accepting(1e-4),
+            accepting(0.9),
+        ]
+    }
+
+    /// Light that goes back along any of a sensor's rays is received by the ray's slot, wherever on the
+    /// line it left the body.
+    #[test]
+    fn light_along_a_ray_is_received_by_its_slot() {
+        for sensor in receiving() {
+            for index in 0..sensor.rays_per_pass() {
+                for k in 0..200u32 {
+                    let step = [0.819_172_513, 0.671_043_607, 0.549_700_478, 0.450_333_124];
+                    let u = step.map(|step: f64| ((f64::from(k) + 0.5) * step).fract());
+                    let SensorRay { ray, slot, .. } = sensor.ray(index, u);
+                    let out = Ray { origin: ray.at(f64::from(k) * 0.02), dir: -ray.dir };
+                    let received = sensor.receive(&out).map(|(slot, _)| slot);
+                    assert_eq!(received, Some(slot), "{sensor:?} {index} {u:?}");
+                }
+            }
+        }
+    }
+
+    /// Rays of pixels start outside the body's sphere and before it.
+    #[test]
+    fn rays_of_caps_start_before_the_body() {
+        for height in [1e-4, 0.9] {
+            let sensor = accepting(height);
+            let Sensor::Accepting(Acceptance { bounds, .. }) = sensor else { unreachable!() };
+            for index in 0..sensor.rays_per_pass() {
+                for v in [0.0, 0.5, 0.999] {
+                    let SensorRay { ray, weight, .. } = sensor.ray(index, [0.3, 0.7, v, 0.9]);
+                    let to_middle = bounds.center - ray.origin;
+                    assert!(to_middle.dot(ray.dir) > 1.999 * bounds.radius);
+                    assert!(weight == 1.0 && (ray.dir.length() - 1.0).abs() < 1e-15);
+                }
+            }
+        }
+    }
+
+    /// What a sensor receives from light of radiance 1 in all directions, by a sum over a grid of lines
+    /// through the body's sphere: radiance 1 in every pixel, 2 pi dmu * pi R^2 in every bin. Lines are
+    /// even in direction and in place across it, each worth 4 pi * pi R^2 over their number.
+    #[test]
+    fn uniform_light_is_received_as_radiance_one() {
+        for (sensor, value, tolerance) in [
+            (accepting(0.9), 1.0, 0.02),
+            (accepting(0.2), 1.0, 0.05),
+            (receiving().swap_remove(1), 2.0 * PI * 0.4 * PI * 4.0, 0.001),
+        ] {
+            let bounds = match &sensor {
+                Sensor::Accepting(Acceptance { bounds, .. }) => *bounds,
+                Sensor::BodyFlux { bounds, .. } => *bounds,
+                _ => unreachable!(),
+            };
+            let n = 4_000_000u32;
+            let power = 4.0 * PI * PI * bounds.radius * bounds.radius / f64::from(n);
+            let slots = sensor.regions().len().max(sensor.pixels().map_or(0, |(w, h)| w * h));
+            let mut sums = vec![0.0; slots];
+            // Inverse powers of the real root of x^5 = x + 1: Roberts' sequence in four dimensions.
+            let root = 1.167_303_978_261_418_7_f64;
+            for k in 0..n {
+                let u: [f64; 4] =
+                    std::array::from_fn(|i| (f64::from(k) * root.powi(-(i as i32) - 1)).fract());
+                let (sin, cos) = crate::math::sin_cos_turns(u[1]);
+                let z = 1.0 - 2.0 * u[0];
+                let r = (1.0 - z * z).sqrt();
+                let dir = DVec3::new(r * cos, r * sin, z);
+                let across = Frame::about(dir);
+                let [x, y] = square_to_disc([u[2], u[3]]);
+                let origin = bounds.center + bounds.radius * (x * across.s + y * across.t);
+                if let Some((slot, factor)) = sensor.receive(&Ray { origin, dir }) {
+                    sums[slot] += power * factor;
+                }
+            }
+            let slots = sensor.pixels().map_or(5, |(w, h)| w * h);
+            for (slot, sum) in sums[..slots].iter().enumerate() {
+                assert!((sum / value - 1.0).abs() < tolerance, "{slot}: {sum} of {value}");
             }
         }
     }

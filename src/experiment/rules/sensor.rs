@@ -8,11 +8,19 @@ use crate::math::DVec3;
 /// Sines of the angle between view and `up` below this leave the image's turn undefined.
 const PARALLEL: f64 = 1e-9;
 
-/// Directions are directions, `up` is not along the view, fluxes of planes are about +z.
+/// Directions are directions, `up` is not along the view, fluxes of planes are about +z, and
+/// caps of directions look at finite bodies.
 pub fn sensor(at: At, sensor: &Sensor, shape: Option<&Shape>) {
+    let is_planar = matches!(shape, Some(Shape::HalfSpace {} | Shape::Slab { .. }));
     match sensor {
-        Sensor::Orthographic { toward, up, .. } => {
+        Sensor::Orthographic { toward, up, acceptance_sr, .. } => {
             let at = at.to("orthographic");
+            if acceptance_sr.is_some() && is_planar {
+                at.to("acceptance_sr").report(
+                    "a half_space or slab has no end: pixels accept a cap of directions from bodies of \
+                     finite size only (a planar body's light in all directions is what `flux` measures)",
+                );
+            }
             if direction(at.to("toward"), toward) {
                 upright(at.to("up"), *up, toward.unit());
             }
@@ -34,7 +42,6 @@ pub fn sensor(at: At, sensor: &Sensor, shape: Option<&Shape>) {
         }
         Sensor::Flux { axis, .. } => {
             let at = at.to("flux").to("axis");
-            let is_planar = matches!(shape, Some(Shape::HalfSpace {} | Shape::Slab { .. }));
             if nonzero(at, *axis) && is_planar && !(axis[..2] == [0.0, 0.0] && axis[2] > 0.0) {
                 at.report("the axis must be +z on a half_space and on a slab");
             }

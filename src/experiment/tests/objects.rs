@@ -148,6 +148,18 @@ fn directions_have_a_length_and_up_is_across_the_view() {
 }
 
 #[test]
+fn caps_of_directions_look_at_finite_bodies() {
+    let camera = "sensor.orthographic = { resolution = [2, 2], center_mm = [0, 0, 3], toward = [0, 0, -1], \
+                  up = [0, 1, 0], width_mm = 1, acceptance_sr = 0.1 }";
+    let text = GOOD.replace(SENSOR, camera);
+    good(&text);
+    let message = errors(&text.replace("sphere = { radius_mm = 1.0 }", "half_space = {}"));
+    assert!(message.contains("finite size only") && message.contains("x.toml:7:"), "{message}");
+    let message = errors(&text.replace("acceptance_sr = 0.1", "acceptance_sr = 6.29"));
+    assert!(message.contains("must be less than"), "{message}");
+}
+
+#[test]
 fn fluxes_of_planes_are_about_z() {
     let flux = "sensor.flux = { bins = 4, axis = [0, 1, 1] }";
     let text = GOOD.replace("sphere = { radius_mm = 1.0 }", "slab = { thickness_mm = 1 }");

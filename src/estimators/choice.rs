@@ -1,0 +1,29 @@
+//! One light out of several, with probability proportional to its strength.
+
+use crate::scene::Scene;
+
+/// Probability of choosing each light, per band; all 0 where no light shines.
+pub fn light_shares(scene: &Scene) -> Vec<Vec<f64>> {
+    (0..scene.bands())
+        .map(|band| {
+            let strengths: Vec<f64> = scene.lights.iter().map(|l| l.strength(band)).collect();
+            let total: f64 = strengths.iter().sum();
+            let share = |s: &f64| if total > 0.0 { s / total } else { 0.0 };
+            strengths.iter().map(share).collect()
+        })
+        .collect()
+}
+
+/// The light that `u` selects and the probability of that choice, from one band's shares.
+#[inline]
+pub fn choose_light(shares: &[f64], u: f64) -> Option<(usize, f64)> {
+    let mut rest = u;
+    for (index, &share) in shares.iter().enumerate() {
+        if rest < share {
+            return Some((index, share));
+        }
+        rest -= share;
+    }
+    // Rounding of the sum: the last light that shines.
+    shares.iter().rposition(|&share| share > 0.0).map(|index| (index, shares[index]))
+}

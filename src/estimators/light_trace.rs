@@ -1,0 +1,299 @@
+//! Analog tracing from the lights into sensors of finite extent.
+//!
+//! A photon takes a light, a direction from it and a place, and does what light does: it is reflected or
+//! refracted at the boundary, flies distances of density sigma_t exp(-sigma_t t), is absorbed with
+//! probability 1 - albedo at every scattering event or turned by the phase function, and enters again
+//! where a body is not convex, until it leaves for good. Then the sensor receives it
+//! ([`Sensor::receive`](crate::scene::Sensor::receive)). No connection to a light or to the sensor is made,
+//! so it samples every boundary under every light, a smooth one under parallel light included, which no
+//! path from the sensor finds; in exchange it needs a sensor that photons hit. Its walk is written apart
+//! from the path tracer's, so that a slip in one of them shows as a difference.
+//!
+//! Power of a photon. Light of radiance L(w) from directions w towards it, drawn with density p(w) from a
+//! light that was chosen with probability P, carries in one of N photons
+//!   finite body     L / (p P N) * pi R^2: starting points are uniform on the disc of the bounding sphere's
+//!                   radius R across the direction, through which all light that can meet the body comes
+//!   planar face     L / (p P N) * |cos|: power per area of the face on which the light shines, every
+//!                   point of which is alike
+//! with the irradiance in place of L / p for parallel light. Photons that miss the body score nothing:
+//! light that has not met the body is not scored.
+//!
+//! At the boundary. Power flows from direction a (towards where the photon came from) into b, drawn with
+//! the density pdf(b | a) of [`Boundary::sample`] for wo = a. Its weight is f(b; a) |cos_b| / pdf(b | a),
+//! f(wo; wi) being the value of radiance's BSDF, which obeys f(b; a) / n_b^2 = f(a; b) / n_a^2. The weight
+//! that the boundary reports is f(a; b) |cos_b| / pdf(b | a) = G1(b) (n_a / n_b)^2, so that of the photon is
+//!   f(b; a) / f(a; b) * G1(b) (n_a / n_b)^2 = G1(b):
+//! what facets hide is lost, and radiance's squared index is undone. At a smooth boundary it is 1.
+//!
+//! This holds where the boundary sees the true normal. With an interpolated normal the BSDF times the
+//! cosine to that normal is no longer reciprocal (Veach 1997, 5.3): light and camera transport become two
+//! different models, and this estimator's is called biased, since the camera's is what pictures show.
+
+use std::sync::Arc;
+
+use super::choice::{choose_light, light_shares};
+use super::crossing::{other, radiance_scale};
+use super::{Anomaly, Bias, Cost, Estimator, History, Scores};
+use crate::error::{Error, Result};
+use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Shape, Side};
+use crate::math::{DVec3, Frame};
+use crate::optics::boundary::{Boundary, Event};
+use crate::optics::medium::Medium;
+use crate::sampling::distance::sample_exponential;
+use crate::sampling::stream::{PassKey, Purpose, Stream};
+use crate::sampling::warp::square_to_disc;
+use crate::scene::{Scene, Sensor};
+
+/// The estimator, for one scene.
+#[derive(Debug)]
+pub struct LightTracer {
+    scene: Arc<Scene>,
+    /// Photons per band and pass.
+    photons: usize,
+    bounds: Option<BoundingSphere>,
+    /// Per band: probability of choosing each light.
+    choice: Vec<Vec<f64>>,
+}
+
+impl LightTracer {
+    /// For a scene; `photons` per band and pass, as many as the sensor has rays without it.
+    ///
+    /// # Errors
+    /// A sensor that photons cannot hit, or whose unit does not fit the body; no photons.
+    pub fn new(scene: Arc<Scene>, photons: Option<usize>) -> Result<LightTracer> {
+        let bounds = scene.shape.bounds();
+        let fits = match (&scene.sensor, bounds) {
+            (Sensor::FaceFlux { .. }, bounds) => bounds.is_none(),
+            (sensor, Some(_)) => sensor.receives(),
+            (_, None) => false,
+        };
+        if !fits {
+            return Err(Error::input_help(
+                "light_trace cannot serve this sensor: no photon hits a single point or direction",
+                "it serves `flux`, and `orthographic` with `acceptance_sr` (bodies of finite size)",
+            ));
+        }
+        let photons = photons.unwrap_or(scene.sensor.rays_per_pass());
+        if photons == 0 {
+            return Err(Error::input_help(
+                "light_trace: `paths` is 0",
+                "play at least one photon a pass",
+            ));
+        }
+        Ok(LightTracer { bounds, photons, choice: light_shares(&scene), scene })
+    }
+}
+
+impl Estimator for LightTracer {
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        for &band in bands {
+            for index in 0..self.photons {
+                Photon::play(self, band, index, key, scores);
+            }
+        }
+    }
+
+    fn bias(&self) -> Bias {
+        let interpolated = matches!(&*self.scene.shape, Shape::Mesh(mesh) if mesh.normals().is_some());
+        if interpolated && self.scene.boundary.iter().any(|b| *b != Boundary::Matched) {
+            Bias::Biased(
+                "at interpolated normals light from the lights and light traced from the sensor are two \
+                 models (Veach 1997, 5.3); use flat normals to compare them"
+                    .into(),
+            )
+        } else {
+            Bias::Unbiased
+        }
+    }
+}
+
+/// Part of a body's size by which rounding may put a medium vertex outside its bounding sphere.
+const ROUNDING: f64 = 1e-9;
+
+/// One photon.
+struct Photon<'a> {
+    scene: &'a Scene,
+    bounds: Option<BoundingSphere>,
+    boundary: Boundary,
+    medium: Medium,
+    band: usize,
+    light: usize,
+    ray: Ray,
+    from: Option<FaceId>,
+    power: f64,
+    history: History,
+    stream: Stream,
+    scores: &'a mut Scores,
+}
+
+/// Where photons towards -`toward` start, and the factor from radiance over density to their power: `u`
+/// places them. `None` where this light cannot meet the body (a planar face from behind or along it).
+#[inline]
+fn start(
+    shape: &Shape,
+    bounds: Option<BoundingSphere>,
+    toward: DVec3,
+    u: [f64; 2],
+) -> Option<(Ray, f64)> {
+    let dir = -toward;
+    match (shape, bounds) {
+        (_, Some(BoundingSphere { center, radius })) => {
+            let across = Frame::about(toward);
+            let [x, y] = square_to_disc(u);
+            let origin = center + radius * (2.0 * toward + x * across.s + y * across.t);
+            Some((Ray { origin, dir }, std::f64::consts::PI * radius * radius))
+        }
+        (Shape::Slab { thickness }, None) if toward.z < 0.0 => {
+            let point = DVec3::new(0.0, 0.0, -thickness);
+            Some((Ray { origin: point + *thickness * toward, dir }, -toward.z))
+        }
+        (Shape::Slab { .. } | Shape::HalfSpace, None) if toward.z > 0.0 => {
+            let reach = if let Shape::Slab { thickness } = shape { *thickness } else { 1.0 };
+            Some((Ray { origin: reach * toward, dir }, toward.z))
+        }
+        _ => None,
+    }
+}
+
+impl<'a> Photon<'a> {
+    /// Plays photon `index` of a pass; returns how many numbers its walk drew.
+    fn play(
+        tracer: &'a LightTracer,
+        band: usize,
+        index: usize,
+        key: &PassKey,
+        scores: &'a mut Scores,
+    ) -> u64 {
+        let scene = &*tracer.scene;
+        let mut emission = key.stream(index as u64, Purpose::Light);
+        let [u, v, w] = emission.draw3();
+        let place = emission.draw2();
+        scores.count(Cost::Paths);
+        let Some((light, choice)) = choose_light(&tracer.choice[band], u) else { return 0 };
+        let sample = scene.lights[light].sample(band, [v, w]);
+        let Some((ray, extent)) = start(&scene.shape, tracer.bounds, sample.wi, place) else { return 0 };
+        scores.count(Cost::Rays);
+        let Some(hit) = scene.shape.intersect(&ray, Side::Outside, None, f64::INFINITY) else {
+            return 0; // light that has not met the body is not scored
+        };
+        let emitted = sample.radiance / sample.pdf.unwrap_or(1.0);
+        let photon = Photon {
+            scene,
+            bounds: tracer.bounds,
+            boundary: scene.boundary[band],
+            medium: scene.medium[band],
+            band,
+            light,
+            ray,
+            from: None,
+            power: emitted / choice * extent / tracer.photons as f64,
+            history: History::default(),
+            stream: key.stream(index as u64, Purpose::Walk),
+            scores,
+        };
+        photon.run(hit)
+    }
+
+    /// Runs from a first hit until the photon is absorbed or leaves.
+    fn run(mut self, hit: Hit) -> u64 {
+        let mut side = Side::Outside;
+        let mut hit = hit;
+        loop {
+            let Some(next_side) = self.cross(&hit, side) else { return self.stream.draws() };
+            side = next_side;
+            let next = match side {
+                Side::Inside => self.walk_inside(),
+                Side::Outside => self.fly_outside(),
+            };
+            match next {
+                Some(next) => hit = next,
+                None => return self.stream.draws(),
+            }
+        }
+    }
+
+    /// Flies and scatters in the medium until the photon meets the boundary or is absorbed.
+    fn walk_inside(&mut self) -> Option<Hit> {
+        loop {
+            let t = sample_exponential(self.medium.sigma_t, self.stream.draw());
+            self.scores.count(Cost::Rays);
+            match self.scene.shape.intersect(&self.ray, Side::Inside, self.from, t) {
+                Some(hit) => return Some(hit),
+                None if t == f64::INFINITY => {
+                    // Without extinction a half-space swallows the photon; a finite body lets none go.
+                    if self.bounds.is_some() {
+                        self.scores.note(Anomaly::LostRay);
+                    }
+                    return None;
+                }
+                None => self.scatter(t)?,
+            }
+        }
+    }
+
+    /// A scattering event at distance `t`; `None` where the photon ends.
+    fn scatter(&mut self, t: f64) -> Option<()> {
+        self.ray.origin = self.ray.at(t);
+        self.from = None;
+        if let Some(bounds) = self.bounds
+            && (self.ray.origin - bounds.center).length_squared()
+                > bounds.radius * bounds.radius * (1.0 + ROUNDING)
+        {
+            self.scores.note(Anomaly::LostRay);
+            return None;
+        }
+        self.scores.count(Cost::MediumEvents);
+        if self.stream.draw() >= self.medium.albedo {
+            return None;
+        }
+        self.history.scatter();
+        self.ray.dir = self.medium.phase.sample(self.ray.dir, self.stream.draw2());
+        Some(())
+    }
+
+    /// Flies on outside; where nothing is in the way the sensor receives the photon.
+    fn fly_outside(&mut self) -> Option<Hit> {
+        self.scores.count(Cost::Rays);
+        let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
+        if hit.is_none()
+            && let Some((slot, factor)) = self.scene.sensor.receive(&self.ray)
+        {
+            let value = self.power * factor;
+            self.scores.add(slot, self.band, self.history.class(), self.light, value);
+        }
+        hit
+    }
+
+    /// Meets the boundary from `side`; the side the photon goes on to, `None` where it ends.
+    fn cross(&mut self, hit: &Hit, side: Side) -> Option<Side> {
+        self.from = Some(hit.face);
+        self.ray.origin = hit.point;
+        if self.boundary == Boundary::Matched {
+            return Some(other(side));
+        }
+        self.scores.count(Cost::BoundaryEvents);
+        let frame = Frame::about(hit.shading_normal);
+        let came_from = frame.to_local(-self.ray.dir);
+        if (came_from.z > 0.0) != (side == Side::Outside) {
+            self.scores.note(Anomaly::WrongSide);
+            return None;
+        }
+        let sample = self.boundary.sample(came_from, self.stream.draw3())?;
+        let dir = frame.to_world(sample.wi);
+        let next_side = if sample.event == Event::Refract { other(side) } else { side };
+        if (dir.dot(hit.normal) > 0.0) != (next_side == Side::Outside) {
+            self.scores.note(Anomaly::WrongSide);
+            return None;
+        }
+        if sample.event == Event::Reflect && side == Side::Inside {
+            self.history.reflect_internally();
+        }
+        self.power *= sample.weight * radiance_scale(side, next_side, &self.boundary);
+        self.ray.dir = dir;
+        Some(next_side)
+    }
+}
+
+#[cfg(test)]
+#[path = "light_trace_tests.rs"]
+mod tests;
