@@ -9,12 +9,15 @@ use super::snee::SneeWords;
 use crate::error::{Error, Result};
 use crate::estimators::light_trace::LightTracer;
 use crate::estimators::path::{PathTracer, Roulette};
-use crate::estimators::snee::{Snee, TwoBounce};
+use crate::estimators::snee::{Bidirectional, Snee, TwoBounce};
 use crate::scene::{Scene, Sensor};
 
 /// Every estimator and sampler of this crate; a program of one's own may push its entries on top.
 pub fn builtin() -> Registry {
-    Registry { samplers: super::samplers::builtin(), entries: vec![PATH, SNEE, TWO_BOUNCE, LIGHT_TRACE] }
+    Registry {
+        samplers: super::samplers::builtin(),
+        entries: vec![PATH, SNEE, TWO_BOUNCE, BIDIRECTIONAL, LIGHT_TRACE],
+    }
 }
 
 const PATH: RegistryEntry = RegistryEntry {
@@ -49,6 +52,17 @@ const TWO_BOUNCE: RegistryEntry = RegistryEntry {
     },
 };
 
+const BIDIRECTIONAL: RegistryEntry = RegistryEntry {
+    kind: "bidirectional",
+    doc: "path tracing whose medium vertices connect to one light vertex inside the body; unbiased",
+    options_schema: || schemars::schema_for!(PathOptions),
+    build: |options, scene| {
+        let options: PathOptions = read(options)?;
+        looks_from_outside("bidirectional", &scene)?;
+        Ok(Box::new(Bidirectional::new(scene, options.roulette.into())?))
+    },
+};
+
 const LIGHT_TRACE: RegistryEntry = RegistryEntry {
     kind: "light_trace",
     doc: "analog tracing from the lights, into `flux` or `acceptance_sr`; unbiased at true normals",
@@ -70,7 +84,7 @@ fn looks_from_outside(kind: &str, scene: &Scene) -> Result<()> {
     }
 }
 
-/// Options of `path`.
+/// Options of `path` and `bidirectional`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PathOptions {

@@ -24,6 +24,9 @@ pub struct SneeWords {
     /// How often an edge is subdivided.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub call: Option<CallWords>,
+    /// The same where nothing else finds the path: parallel light through a smooth boundary.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub call_alone: Option<CallWords>,
     /// Where sampled distances end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distances: Option<Distances>,
@@ -165,6 +168,7 @@ impl Preset {
                 roulette: RouletteOption::default().into(),
                 strategies: all,
                 call: Call { most: 1.0, decay: 0.0 },
+                call_alone: Call { most: 1.0, decay: 0.0 },
                 truncated: true,
                 probe: ProbeShares { uniform: 1.0, plane: 0.0, guided: 0.0 },
                 joint: JointKind::Table,
@@ -176,12 +180,13 @@ impl Preset {
             Preset::Guided => SneeOptions {
                 roulette: RouletteOption::default().into(),
                 strategies: Strategies { bottom_to_top: false, ..all },
-                call: Call { most: 0.25, decay: 0.5 },
+                call: Call { most: 0.15, decay: 0.75 },
+                call_alone: Call { most: 1.0, decay: 0.5 },
                 truncated: false,
                 probe: ProbeShares { uniform: 0.2, plane: 0.4, guided: 0.4 },
                 joint: JointKind::Table,
                 last_vertex: Some(LastVertex {
-                    call: Call { most: 1.0, decay: 0.5 },
+                    call: Call { most: 1.0, decay: 0.75 },
                     wide_share: 0.25,
                     wide: 0.2,
                 }),
@@ -212,6 +217,9 @@ impl SneeWords {
         }
         if let Some(call) = self.call {
             options.call = Call { most: call.most, decay: call.decay };
+        }
+        if let Some(call) = self.call_alone.or(self.call) {
+            options.call_alone = Call { most: call.most, decay: call.decay };
         }
         if let Some(distances) = self.distances {
             options.truncated = distances == Distances::Truncated;

@@ -294,7 +294,7 @@ impl Rivals for Connections<'_> {
 /// Part of a leg's length within which two ways of meeting the same point of the boundary may differ.
 const LEG: f64 = 1e-7;
 
-impl<B: Bands> Walk<'_, Connections<'_>, B> {
+impl<R: Rivals, B: Bands> Walk<'_, R, B> {
     /// Whether nothing lies between two points of the body; the second may be on the boundary.
     pub(super) fn sees_point(&mut self, from: DVec3, to: DVec3) -> bool {
         if self.scene.shape.is_convex() {
@@ -306,7 +306,9 @@ impl<B: Bands> Walk<'_, Connections<'_>, B> {
         let ray = Ray { origin: from, dir: leg / length };
         self.scene.shape.intersect(&ray, Side::Inside, None, length * (1.0 - LEG)).is_none()
     }
+}
 
+impl<B: Bands> Walk<'_, Connections<'_>, B> {
     /// Whether x_i sees an exit: a probe in its direction would have met it first.
     fn sees(&mut self, x_i: &Vertex, exit: &Exit) -> bool {
         match self.rivals.seen {

@@ -11,6 +11,7 @@
 //! Unbiased for all that the walk or a rival can sample. Through a smooth boundary parallel light is only found
 //! by subdivision from the light's end: what lacks two medium vertices before the exit is missing there.
 
+mod bidirectional;
 mod connections;
 mod guess;
 mod guide;
@@ -33,6 +34,7 @@ use crate::scene::Scene;
 use connections::Connections;
 use guide::Guide;
 
+pub use bidirectional::Bidirectional;
 pub use connections::Call;
 pub use last_vertex::LastVertex;
 pub use probe::ProbeShares;
@@ -75,6 +77,8 @@ pub struct SneeOptions {
     pub strategies: Strategies,
     /// How often an edge is subdivided.
     pub call: Call,
+    /// The same where nothing else finds the path: parallel light through a smooth boundary.
+    pub call_alone: Call,
     /// Whether distances end at the boundary (one more ray for every density) or run on and may fail.
     pub truncated: bool,
     /// Directions of probes.
@@ -188,19 +192,24 @@ impl Estimator for Snee {
     }
 
     fn notes(&self) -> Vec<String> {
-        let scene = &self.field.scene;
-        let smooth = scene.boundary.iter().any(|b| matches!(b, Boundary::Smooth { .. }));
-        let missing = |light: &&crate::scene::Light| light.is_directional() && smooth;
-        let note = |light: &crate::scene::Light| {
+        missing_notes(&self.field.scene, "subdivision from its end")
+    }
+}
+
+/// What no technique finds through a smooth boundary under parallel light, where only `technique` finds anything.
+fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
+    let smooth = scene.boundary.iter().any(|b| matches!(b, Boundary::Smooth { .. }));
+    let parallel = scene.lights.iter().filter(|light| light.is_directional() && smooth);
+    parallel
+        .map(|light| {
             format!(
-                "through a smooth boundary, directional light `{}` is found by subdivision from its end alone: \
-                 surface, single, single_internal and what has one medium vertex after its last internal \
-                 reflection are missing (not dark)",
+                "through a smooth boundary, directional light `{}` is found by {technique} alone: surface, single, \
+                 single_internal and what has one medium vertex after its last internal reflection are missing \
+                 (not dark)",
                 light.name
             )
-        };
-        scene.lights.iter().filter(missing).map(note).collect()
-    }
+        })
+        .collect()
 }
 
 impl Snee {

@@ -12,7 +12,8 @@
 //! Both force refraction; a sample that fails (total reflection, x_j outside the body, light below the
 //! horizon) counts as 0.
 
-use super::connections::{Connections, End, Middle, Vertex, choose_guide};
+use super::SneeOptions;
+use super::connections::{Call, Connections, End, Middle, Vertex, choose_guide};
 use super::guide::Guide;
 use super::last_vertex;
 use super::probe::Probe;
@@ -76,9 +77,10 @@ pub(super) fn density<B: Bands>(
     if end.guide == 0.0 {
         return 0.0;
     }
-    let needs_guess = options.call.decay > 0.0 || options.probe.needs_guess();
+    let call = options.call_for(&walk.boundary, guide);
+    let needs_guess = call.decay > 0.0 || options.probe.needs_guess();
     let guess = if needs_guess { x_i.guess(walk, guide) } else { None };
-    let q = options.call.probability(setup.sigma, guess.as_ref());
+    let q = call.probability(setup.sigma, guess.as_ref());
     if q == 0.0 {
         return 0.0;
     }
@@ -115,21 +117,30 @@ pub(super) fn density<B: Bands>(
     point * sum * x_i.walks / (phases * medium.sigma_t * through * middle.cos_k)
 }
 
+impl SneeOptions {
+    /// How often an edge is subdivided for a guide.
+    fn call_for(&self, boundary: &Boundary, guide: &Guide) -> Call {
+        let is_alone = matches!(boundary, Boundary::Smooth { .. }) && guide.half_angle == 0.0;
+        if is_alone { self.call_alone } else { self.call }
+    }
+}
+
 /// Draws both directions of subdivision at the walk's latest vertex and scores what they find.
 pub(super) fn call<B: Bands>(walk: &mut Walk<'_, Connections<'_>, B>) {
     let setup = walk.rivals.setup;
     let options = &setup.options;
-    let Some(reach) = options.call.reach(setup.sigma, walk.rivals.stream.draw()) else { return };
-    let mut x_i = walk.rivals.vertices[1];
-    if reach < f64::INFINITY && walk.scene.shape.clearance(x_i.point) >= reach {
-        return;
-    }
     let guide = if setup.guides.len() == 1 {
         &setup.guides[0]
     } else {
         choose_guide(&setup.guides, walk.rivals.stream.draw())
     };
-    let needs_guess = options.call.decay > 0.0 || options.probe.needs_guess();
+    let call = options.call_for(&walk.boundary, guide);
+    let Some(reach) = call.reach(setup.sigma, walk.rivals.stream.draw()) else { return };
+    let mut x_i = walk.rivals.vertices[1];
+    if reach < f64::INFINITY && walk.scene.shape.clearance(x_i.point) >= reach {
+        return;
+    }
+    let needs_guess = call.decay > 0.0 || options.probe.needs_guess();
     let guess = if needs_guess { x_i.guess(walk, guide) } else { None };
     walk.rivals.vertices[1] = x_i;
     if reach < f64::INFINITY && guess.is_none_or(|guess| guess.distance >= reach) {

@@ -1,0 +1,218 @@
+//! Bidirectional path tracing with one light vertex inside the medium (Lafortune & Willems 1993; Veach & Guibas
+//! 1994): what subdivision is a local form of.
+//!
+//! Every walk gets one light path: a direction from a light, a point of the disc across it that covers the body, the
+//! first boundary point x_k met, refraction there, a flight to x_j. Every medium vertex x_i of the walk connects to
+//! that x_j. Per volume of x_j, area of x_k and solid angle of w_L its density is, R being the bounding sphere's radius,
+//!   p_G(w_L) (n.w_L) / (pi R^2) p(w_kj | w_L) sigma_t T(d_jk) / d_jk^2,
+//! over U of [`super::connections`]:
+//!   p_G (n.w_L) / (pi R^2) p_rev d_ij^2 / (phase_i T_ij phase_j cos_k).
+//! Unlike a probe from x_i it needs no view of x_k from x_i; unlike it, x_k knows nothing of x_i.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use super::connections::{End, Middle, choose_guide};
+use super::guide::Guide;
+use crate::error::{Error, Result};
+use crate::estimators::bands::{Bands, OneBand};
+use crate::estimators::walk::{Exit, Field, Rivals, Unrivalled, Walk};
+use crate::estimators::{Cost, Estimator, Roulette, Scores};
+use crate::geometry::{BoundingSphere, Hit, Ray, Side};
+use crate::math::{DVec3, Frame};
+use crate::optics::boundary::Boundary;
+use crate::sampling::distance::{sample_exponential, transmittance};
+use crate::sampling::stream::{PassKey, Purpose, Stream};
+use crate::sampling::warp::square_to_disc;
+use crate::scene::Scene;
+
+/// The estimator, for one scene.
+#[derive(Debug)]
+pub struct Bidirectional {
+    field: Field,
+    bounds: BoundingSphere,
+    /// Per band; none where nothing can be connected.
+    guides: Vec<Vec<Guide>>,
+}
+
+impl Bidirectional {
+    /// For a scene with a finite body.
+    ///
+    /// # Errors
+    /// A half-space or slab: no disc covers it.
+    pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Result<Bidirectional> {
+        let Some(bounds) = scene.shape.bounds() else {
+            return Err(Error::input_help(
+                "bidirectional starts light paths from a disc that covers the body; this body has no end",
+                "use a slab's or half-space's other estimators (`path`, `snee`), or a finite body",
+            ));
+        };
+        let guides = (0..scene.bands())
+            .map(|band| match scene.boundary[band] {
+                Boundary::Matched => Vec::new(),
+                _ if scene.medium[band].sigma_t == 0.0 => Vec::new(),
+                _ => Guide::all(&scene.lights, band, 1.0),
+            })
+            .collect();
+        Ok(Bidirectional { field: Field::new(scene, roulette), bounds, guides })
+    }
+}
+
+impl Estimator for Bidirectional {
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        for &band in bands {
+            for index in 0..self.field.scene.sensor.rays_per_pass() {
+                let guides = &self.guides[band];
+                if guides.is_empty() {
+                    Walk::play(&self.field, band, index, key, scores, Unrivalled, OneBand);
+                    continue;
+                }
+                let mut stream = key.stream(index as u64, Purpose::Connection);
+                let covered = 1.0 / (PI * self.bounds.radius * self.bounds.radius);
+                let light = self.light_path(guides, band, &mut stream, scores);
+                let nowhere = (DVec3::NAN, DVec3::Z);
+                let rivals = OneLightVertex { guides, light, covered, vertices: [nowhere; 2], count: 0 };
+                Walk::play(&self.field, band, index, key, scores, rivals, OneBand);
+            }
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        super::missing_notes(&self.field.scene, "a light vertex")
+    }
+}
+
+/// One light path up to its medium vertex.
+#[derive(Clone, Copy, Debug)]
+struct LightPath<'a> {
+    guide: &'a Guide,
+    exit: Exit,
+    x_j: DVec3,
+    w_l: DVec3,
+    radiance: f64,
+}
+
+impl Bidirectional {
+    fn light_path<'a>(
+        &self,
+        guides: &'a [Guide],
+        band: usize,
+        stream: &mut Stream,
+        scores: &mut Scores,
+    ) -> Option<LightPath<'a>> {
+        let scene = &*self.field.scene;
+        let (boundary, medium) = (&scene.boundary[band], &scene.medium[band]);
+        let guide = choose_guide(guides, stream.draw());
+        let sample = guide.sample(&scene.lights[guide.light], band, stream.draw2());
+        let [x, y] = square_to_disc(stream.draw2());
+        let [u, v, w] = stream.draw3();
+        let across = Frame::about(sample.wi);
+        let origin =
+            self.bounds.center + self.bounds.radius * (2.0 * sample.wi + x * across.s + y * across.t);
+        scores.count(Cost::Rays);
+        let beam = Ray { origin, dir: -sample.wi };
+        let hit = scene.shape.intersect(&beam, Side::Outside, None, f64::INFINITY)?;
+        let frame = Frame::about(hit.shading_normal);
+        let from = frame.to_local(sample.wi);
+        if from.z <= 0.0 {
+            return None;
+        }
+        let inward = match boundary {
+            Boundary::Rough { .. } => boundary.sample_refraction(from, [u, v]),
+            _ => boundary.refract(from),
+        }?;
+        let dir = frame.to_world(inward);
+        if dir.dot(hit.normal) >= 0.0 {
+            return None;
+        }
+        let t = sample_exponential(medium.sigma_t, w);
+        let down = Ray { origin: hit.point, dir };
+        scores.count(Cost::Rays);
+        if scene.shape.intersect(&down, Side::Inside, Some(hit.face), t).is_some() {
+            return None;
+        }
+        let exit = Exit { hit, frame, wo: inward };
+        Some(LightPath { guide, exit, x_j: down.at(t), w_l: sample.wi, radiance: sample.radiance })
+    }
+}
+
+/// What a walk carries.
+struct OneLightVertex<'a> {
+    guides: &'a [Guide],
+    light: Option<LightPath<'a>>,
+    /// Density of the points of the disc, 1/mm^2.
+    covered: f64,
+    /// Point and direction of arrival of the last two medium vertices, the latest last.
+    vertices: [(DVec3, DVec3); 2],
+    count: u32,
+}
+
+/// The technique's density over U.
+fn density<B: Bands>(
+    walk: &Walk<'_, OneLightVertex<'_>, B>,
+    arrival: DVec3,
+    middle: &Middle,
+    (exit, wi): (&Exit, DVec3),
+    end: &End,
+) -> f64 {
+    let numerator = end.guide * end.reverse * wi.dot(exit.hit.normal) * walk.rivals.covered;
+    if numerator <= 0.0 {
+        return 0.0;
+    }
+    let phase = walk.medium.phase;
+    let phases = phase.pdf(arrival.dot(middle.to_j)) * phase.pdf(middle.to_j.dot(middle.to_k));
+    let through = transmittance(walk.medium.sigma_t, middle.d_ij);
+    numerator * (middle.d_ij * middle.d_ij) / (phases * through * middle.cos_k)
+}
+
+impl Rivals for OneLightVertex<'_> {
+    fn call<B: Bands>(walk: &mut Walk<'_, Self, B>) {
+        let state = &mut walk.rivals;
+        let (x_i, arrival) = (walk.ray.origin, walk.ray.dir);
+        state.vertices = [state.vertices[1], (x_i, arrival)];
+        state.count += 1;
+        let Some(light) = state.light else { return };
+        let LightPath { guide, exit, x_j, w_l, radiance } = light;
+        let Some(middle) = Middle::new(x_i, x_j, exit.hit.point, exit.hit.normal) else { return };
+        let end = End::new(walk, guide, &exit, w_l, [1.0, 1.0], Some(radiance));
+        if end.value == 0.0 {
+            return;
+        }
+        let rivals = density(walk, arrival, &middle, (&exit, w_l), &end);
+        let survival = walk.bands.survival(&walk.medium);
+        let value = walk.throughput * survival * end.value / (end.unidirectional + rivals);
+        if value == 0.0 || !walk.sees_point(x_i, x_j) {
+            return;
+        }
+        let mut history = walk.history;
+        history.scatter();
+        let bands = walk.bands.clone();
+        walk.score_with(&bands, history.class(), guide.light, value);
+    }
+
+    fn meet_surface(&mut self) {
+        self.count = 0;
+    }
+
+    fn reflect<B: Bands>(_: &mut Walk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
+
+    fn has_scored_reflection<B: Bands>(_: &Walk<'_, Self, B>, _: usize, _: DVec3) -> bool {
+        false
+    }
+
+    fn unidirectional(&self) -> [f64; 2] {
+        [1.0, 1.0]
+    }
+
+    fn densities<B: Bands>(walk: &mut Walk<'_, Self, B>, exit: &Exit, light: usize, wi: DVec3) -> f64 {
+        if walk.rivals.count < 2 {
+            return 0.0;
+        }
+        let guides = walk.rivals.guides;
+        let Some(guide) = guides.iter().find(|guide| guide.light == light) else { return 0.0 };
+        let [(x_i, arrival), (x_j, _)] = walk.rivals.vertices;
+        let Some(middle) = Middle::new(x_i, x_j, exit.hit.point, exit.hit.normal) else { return 0.0 };
+        let end = End::new(walk, guide, exit, wi, [1.0, 1.0], None);
+        density(walk, arrival, &middle, (exit, wi), &end)
+    }
+}
