@@ -53,9 +53,9 @@ pub struct TwoBounceOptions {
     pub technique: Technique,
     /// How far beyond the first surface that the probe meets x_i lies along the probe's ray, mm.
     pub depth_mm: f64,
-    /// Only connections with a first flight longer than this are scored, mm. Next to x_i the weight of `top_to_bottom`
-    /// grows as 1 / d_ij^2, in a ray's distance from x_i as 1 / D: its variance diverges as a logarithm, and
-    /// of such a mean no t test says anything.
+    /// Only connections whose first flight is longer than this are scored, mm: a part of the integral, the same
+    /// for all. Where a ray from x_k passes x_i at the distance D, the weight of `top_to_bottom` grows as
+    /// 1 / D next to x_i: its variance diverges as a logarithm, and of such a mean no t test says anything.
     pub beyond_mm: f64,
 }
 

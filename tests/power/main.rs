@@ -4,11 +4,12 @@
 //! cargo test --release --test power                        every defect once, and the sham
 //! cargo test --release --test power -- NAME                those whose name contains NAME
 //! cargo test --release --test power -- matrix --seeds 20   the blindness matrix, results/published/
+//!                              matrix --only TEXT --out DIR   the rows whose names contain TEXT
 //! power defect NAME ARGS...                                scatterproof with that defect planted
 //! ```
 //!
 //! The last is what the others start: this program is scatterproof's own command line over a registry
-//! whose estimator `tracer` (or whose samplers) hold the defect; where the claims are green and an
+//! whose estimators of the test (or whose samplers) hold the defect; where the claims are green and an
 //! identity of the surface is broken, it exits with 1 all the same. What judges is the same code, with
 //! the same levels, as for any user. All defects get the same experiments (`*.toml` here), the same budgets,
 //! and streams that their names name.
