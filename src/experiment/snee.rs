@@ -139,7 +139,7 @@ pub struct LastVertexWords {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub wide_share: f64,
-    /// Roughness of the wider lobe; its width at a smooth boundary.
+    /// Least roughness of the wider lobe (at least twice the boundary's own); its width at a smooth boundary.
     #[serde(default = "wide")]
     #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub wide: f64,

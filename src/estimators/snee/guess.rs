@@ -10,6 +10,12 @@ use crate::geometry::{Ray, Side};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 
+/// Steps of the fixed point after the first shot: it converges on smooth convex bodies ...
+const CONVEX_STEPS: u32 = 2;
+
+/// ... and jumps among the facets of a mesh, where each step is a ray through a tree.
+const MESH_STEPS: u32 = 1;
+
 /// Where light from one direction probably enters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guess {
@@ -30,10 +36,14 @@ impl Guess {
             scene.shape.intersect(&Ray { origin: point, dir }, Side::Inside, None, f64::INFINITY)
         };
         let straight = shoot(toward)?;
-        let first = Guess { normal: straight.shading_normal, dir: toward, distance: straight.t };
-        let Some(dir) = entering(boundary, first.normal, toward) else { return Some(first) };
-        let Some(hit) = shoot(dir) else { return Some(first) };
-        Some(Guess { normal: hit.shading_normal, dir, distance: hit.t })
+        let mut guess = Guess { normal: straight.shading_normal, dir: toward, distance: straight.t };
+        let steps = if scene.shape.is_convex() { CONVEX_STEPS } else { MESH_STEPS };
+        for _ in 0..steps {
+            let Some(dir) = entering(boundary, guess.normal, toward) else { break };
+            let Some(hit) = shoot(dir) else { break };
+            guess = Guess { normal: hit.shading_normal, dir, distance: hit.t };
+        }
+        Some(guess)
     }
 
     /// The direction from the point, against the light that is refracted at the guessed normal; that of

@@ -34,7 +34,8 @@ pub struct LastVertex {
     pub call: Call,
     /// Share of the wider lobe.
     pub wide_share: f64,
-    /// Roughness of the wider lobe (rough boundary), or its width (smooth).
+    /// Least roughness of the wider lobe (rough boundary; at least twice the boundary's own), or its width
+    /// (smooth).
     pub wide: f64,
 }
 
@@ -46,6 +47,9 @@ enum Lobe {
     About { narrow: PowerLobe, wide: PowerLobe },
 }
 
+/// The least ratio of the wider lobe's roughness to the boundary's own.
+const WIDER: f64 = 2.0;
+
 /// The narrowest lobe about the refracted axis of a light, tan(theta / 2).
 const NARROWEST: f64 = 1e-4;
 
@@ -53,7 +57,7 @@ impl LastVertex {
     fn lobe(&self, boundary: &Boundary, guide: &Guide, guess: &Guess) -> Option<Lobe> {
         match *boundary {
             Boundary::Rough { eta, facets } => {
-                let alpha = facets.alpha.max(self.wide);
+                let alpha = (WIDER * facets.alpha).max(self.wide).min(1.0);
                 let wide = Boundary::Rough { eta, facets: Microfacets { alpha, ..facets } };
                 Some(Lobe::Refraction { frame: Frame::about(guess.normal), narrow: *boundary, wide })
             }

@@ -232,3 +232,6 @@ impl Snee {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

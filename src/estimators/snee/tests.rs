@@ -1,0 +1,161 @@
+//! What holds to the last bit: the gate, and bands that share a walk.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::estimators::path::PathTracer;
+use crate::estimators::{Cost, Layout};
+use crate::geometry::{Ray, Shape};
+use crate::math::{DVec3, Frame};
+use crate::optics::medium::Medium;
+use crate::optics::microfacet::{MicrofacetKind, Microfacets};
+use crate::optics::phase::HenyeyGreenstein;
+use crate::sampling::stream::StreamKey;
+use crate::scene::{Emission, LatLong, Light, Sensor};
+
+const ROUGH: Boundary =
+    Boundary::Rough { eta: 1.4, facets: Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.2 } };
+const SMOOTH: Boundary = Boundary::Smooth { eta: 1.4 };
+
+fn guided() -> SneeOptions {
+    SneeOptions {
+        roulette: Roulette::Below(0.25),
+        strategies: Strategies { bsdf: true, light: true, top_to_bottom: true, bottom_to_top: true },
+        call: Call { most: 0.5, decay: 0.5 },
+        call_alone: Call { most: 1.0, decay: 0.5 },
+        truncated: false,
+        probe: ProbeShares { uniform: 0.2, plane: 0.4, guided: 0.4 },
+        joint: JointKind::Mixture,
+        last_vertex: Some(LastVertex {
+            call: Call { most: 1.0, decay: 0.5 },
+            wide_share: 0.25,
+            wide: 0.2,
+        }),
+        expected_reflection: true,
+        least_concentration: 10.0,
+        share_bands: false,
+    }
+}
+
+fn cap(solid_angle: f64, bands: usize) -> Light {
+    let frame = Frame::about(DVec3::new(0.6, 0.0, 0.8));
+    let height = solid_angle / (2.0 * std::f64::consts::PI);
+    Light { name: "cap".into(), emission: Emission::Cap { frame, height, radiance: vec![1.0; bands] } }
+}
+
+fn scene(boundary: Boundary, media: &[(f64, f64, f64)], light: Light) -> Arc<Scene> {
+    let ray = Ray { origin: DVec3::new(0.3, -0.4, 3.0), dir: -DVec3::Z };
+    Arc::new(Scene {
+        shape: Arc::new(Shape::Sphere { radius: 1.0 }),
+        boundary: vec![boundary; media.len()],
+        medium: media
+            .iter()
+            .map(|&(sigma_t, albedo, g)| Medium { sigma_t, albedo, phase: HenyeyGreenstein { g } })
+            .collect(),
+        lights: vec![light],
+        sensor: Sensor::Probe { ray, paths: 256 },
+    })
+}
+
+fn played(scene: &Arc<Scene>, estimator: &dyn Estimator, test: &str) -> Scores {
+    let mut scores = Scores::new(Layout::new(scene));
+    let key = StreamKey::named(test);
+    let bands: Vec<usize> = (0..scene.bands()).collect();
+    for pass in 0..20 {
+        estimator.pass(&bands, &key.pass(pass), &mut scores);
+    }
+    scores
+}
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+/// A light that is not concentrated leaves nothing but the walk: the image and the work of `path`, to the last
+/// bit. A concentrated one does not.
+#[test]
+fn behind_the_gate_it_is_path() {
+    for boundary in [ROUGH, SMOOTH, Boundary::Matched] {
+        // 4 pi over the solid angle: 9.9 and 10.1, on either side of the gate.
+        for (concentration, is_open) in [(1.0, false), (9.9, false), (10.1, true)] {
+            let light = cap(4.0 * std::f64::consts::PI / concentration, 1);
+            let scene = scene(boundary, &[(10.0, 0.95, 0.3)], light);
+            let path = PathTracer::new(scene.clone(), Roulette::Below(0.25));
+            let path = played(&scene, &path, "behind_the_gate_it_is_path");
+            let snee = Snee::new(scene.clone(), guided()).expect("a scene for it");
+            let snee = played(&scene, &snee, "behind_the_gate_it_is_path");
+            let is_same = bits(&path.gates) == bits(&snee.gates) && path.cost == snee.cost;
+            assert_eq!(
+                is_same,
+                !is_open || boundary == Boundary::Matched,
+                "{boundary:?} {concentration}"
+            );
+            assert!(path.gates[0] > 0.0);
+        }
+    }
+}
+
+/// A map without a bright part is a sky like any other; with a sun, the walk is joined.
+#[test]
+fn maps_are_split() {
+    for (sun, is_open) in [(1.0, false), (1e4, true)] {
+        let plane = (0..16 * 32).map(|k| if k == 3 * 32 + 7 { sun } else { 1.0 }).collect();
+        let map = Arc::new(LatLong::new(32, 16, vec![plane]));
+        let light = Light { name: "map".into(), emission: Emission::Map(map) };
+        let scene = scene(ROUGH, &[(10.0, 0.95, 0.0)], light);
+        let snee = Snee::new(scene.clone(), guided()).expect("a scene for it");
+        assert_eq!(snee.setups[0].guides.len(), usize::from(is_open));
+    }
+}
+
+/// Bands with the same coefficients get the same bits from a shared walk; others do not.
+#[test]
+fn equal_bands_are_equal_to_the_last_bit() {
+    for boundary in [ROUGH, SMOOTH] {
+        for least_concentration in [1.0, 1e9] {
+            let media = [(10.0, 0.95, 0.3), (10.0, 0.95, 0.3), (7.0, 0.9, 0.3)];
+            let scene = scene(boundary, &media, cap(0.1, 3));
+            let options = SneeOptions { share_bands: true, least_concentration, ..guided() };
+            let snee = Snee::new(scene.clone(), options).expect("a scene for it");
+            let scores = played(&scene, &snee, "equal_bands_are_equal_to_the_last_bit");
+            let band = |b: usize| -> Vec<u64> {
+                scores.gates.iter().skip(b).step_by(3).map(|value| value.to_bits()).collect()
+            };
+            assert!(scores.gates[0] > 0.0);
+            assert_eq!(band(0), band(1));
+            assert_ne!(band(0), band(2));
+            assert_eq!(scores.cost[Cost::Paths as usize], 20 * 256, "one walk for all");
+        }
+    }
+}
+
+/// Bands that differ in more than their media cannot share a walk, and are told why.
+#[test]
+fn what_cannot_be_shared_is_refused() {
+    let options = SneeOptions { share_bands: true, ..guided() };
+    let refused = |scene: Arc<Scene>| match Snee::new(scene, options.clone()) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("accepted"),
+    };
+    let media = [(10.0, 0.95, 0.0); 2];
+    let mut light = cap(0.1, 2);
+    if let Emission::Cap { radiance, .. } = &mut light.emission {
+        radiance[1] = 2.0;
+    }
+    assert!(refused(scene(ROUGH, &media, light)).contains("light `cap` differs"));
+    assert!(refused(scene(Boundary::Matched, &media, cap(0.1, 2))).contains("matched"));
+    assert!(refused(scene(ROUGH, &[(1.0, 0.5, 0.0); 33], cap(0.1, 33))).contains("33 bands"));
+}
+
+/// Without albedo, extinction or a boundary that refracts there is nothing to connect.
+#[test]
+fn bodies_without_scattering_are_the_walks() {
+    for media in [[(0.0, 0.0, 0.0)], [(3.0, 0.0, 0.0)]] {
+        let scene = scene(ROUGH, &media, cap(0.1, 1));
+        let snee = Snee::new(scene.clone(), guided()).expect("a scene for it");
+        let path = PathTracer::new(scene.clone(), Roulette::Below(0.25));
+        let test = "bodies_without_scattering_are_the_walks";
+        let [snee, path] = [played(&scene, &snee, test), played(&scene, &path, test)];
+        assert_eq!(bits(&snee.gates), bits(&path.gates));
+    }
+}
