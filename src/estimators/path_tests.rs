@@ -1,9 +1,12 @@
 //! Identities, closed forms and published numbers for the path tracer.
 
 use super::super::Layout;
+use super::super::walk::roulette;
 use super::*;
-use crate::geometry::{Shape, procedural};
-use crate::optics::boundary::BoundarySample;
+use crate::geometry::{Ray, Shape, procedural};
+use crate::math::{DVec3, Frame};
+use crate::optics::boundary::{BoundarySample, Density};
+use crate::optics::medium::Medium;
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::StreamKey;
@@ -178,6 +181,7 @@ fn weights_of_both_techniques_sum_to_one() {
         };
         assert!((boundary.eval(wo, wi).1 - own).abs() <= 1e-10 * own);
         if own > 0.0 && pdf > 0.0 {
+            let balance = |own: f64, other: f64| own / (own + other);
             let sum = balance(own, choice * pdf) + balance(choice * pdf, own);
             assert!((sum - 1.0).abs() < 1e-10);
             *[&mut from_boundary, &mut from_light][(i % 2) as usize] += 1;
@@ -216,7 +220,7 @@ fn draws_per_event() {
     let (mut absorbed, mut escaped) = (0, 0);
     for index in 0..1000 {
         let mut scores = Scores::new(layout.clone());
-        let draws = Walk::play(&tracer, 0, index, &key, &mut scores);
+        let draws = Walk::play(&tracer.field, 0, index, &key, &mut scores, Unrivalled, OneBand);
         let [_, rays, _, medium_events, boundary_events] = scores.cost;
         let out = u64::from(scores.gates[0] > 0.0); // it flew to the sky, and scored
         let survived = medium_events - (1 - out); // else the last event ended it

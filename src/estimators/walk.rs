@@ -602,7 +602,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
 /// Russian roulette on a weight: above the threshold it goes on as it is, below it survives with
 /// probability weight / threshold. Returns the probability to divide by.
 #[inline]
-fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> Option<f64> {
+pub(super) fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> Option<f64> {
     if weight >= threshold {
         return Some(1.0);
     }

@@ -181,7 +181,7 @@ impl Preset {
                 roulette: RouletteOption::default().into(),
                 strategies: Strategies { bottom_to_top: false, ..all },
                 call: Call { most: 0.15, decay: 0.75 },
-                call_alone: Call { most: 1.0, decay: 0.5 },
+                call_alone: Call { most: 1.0, decay: 0.25 },
                 truncated: false,
                 probe: ProbeShares { uniform: 0.2, plane: 0.4, guided: 0.4 },
                 joint: JointKind::Table,

@@ -24,10 +24,3 @@ pub mod towards;
 
 /// Maps from the unit square, each beside its density.
 pub mod warp;
-
-/// The balance heuristic for two techniques with one sample each (Veach & Guibas 1995): the weight of
-/// a sample drawn with `pdf` that the other technique could have drawn with `other`.
-#[inline]
-pub fn balance(pdf: f64, other: f64) -> f64 {
-    pdf / (pdf + other)
-}
