@@ -75,7 +75,7 @@ fn truncated_json() {
 fn another_version() {
     let (_temp, folder, _) = written();
     tamper(&folder, "\"schema_version\": 3", "\"schema_version\": 7", false);
-    refused(&folder, &["schema version 7", "reads 2"]);
+    refused(&folder, &["schema version 7", "reads 3"]);
 }
 
 #[test]

@@ -24,13 +24,13 @@ fn picture(words: &str) -> String {
 #[test]
 fn pictures_name_estimators_and_axes() {
     let message = picture("left = \"mos\", right = \"snee\"");
-    holds(&message, "unknown estimator `mos`", "20:18", "did you mean `mis`?");
+    holds(&message, "unknown estimator `mos`", "21:18", "did you mean `mis`?");
     let message = picture("left = \"snee\", right = \"snee\"");
-    holds(&message, "`snee` is left and right", "20:34", "name two");
+    holds(&message, "`snee` is left and right", "21:34", "name two");
     let message = picture("left = \"mis\", right = \"snee\", rows = \"h\"");
-    holds(&message, "unknown axis `h`", "20:49", "`g`");
+    holds(&message, "unknown axis `h`", "21:48", "`g`");
     let message = picture("left = \"mis\", right = \"snee\", rows = \"g\", columns = \"g\"");
-    holds(&message, "rows and columns are the same axis", "20:64", "");
+    holds(&message, "rows and columns are the same axis", "21:63", "");
     let message = picture("left = \"mis\", right = \"snee\", exposure_stops = nan");
     assert!(message.contains("exposure_stops"), "{message}");
     assert!(errors(&text("")).contains("`split` is needed"), "{}", errors(&text("")));
