@@ -174,14 +174,22 @@ impl RoughSampler {
         let (wo, r) = (self.upper(self.wo), self.region.relative);
         let m = wo.dot(h);
         match event {
-            Event::Reflect => (self.upper(2.0 * m * h - wo), 4.0 * m),
+            Event::Reflect => (self.upper(2.0 * m * h - wo), self.jacobian(event, m, m)),
             Event::Refract => {
                 let cos_t = ((r * r - 1.0 + m * m).max(0.0)).sqrt() / r;
-                let shift = cos_t - m / r;
-                // At the critical angle nothing is refracted: the share vanishes with cos_t, the density with it.
-                let jacobian = if cos_t == 0.0 { 0.0 } else { shift * shift / cos_t };
-                (self.upper(-shift * h - wo / r), jacobian)
+                (self.upper((m / r - cos_t) * h - wo / r), self.jacobian(event, m, cos_t))
             }
+        }
+    }
+
+    /// d omega_i / d omega_h for the cosines of both directions to h.
+    fn jacobian(&self, event: Event, m: f64, cos: f64) -> f64 {
+        let shift = cos - m / self.region.relative;
+        match event {
+            Event::Reflect => 4.0 * m,
+            // At the critical angle the share that is refracted vanishes with the cosine, the density with it.
+            Event::Refract if cos == 0.0 => 0.0,
+            Event::Refract => shift * shift / cos,
         }
     }
 
@@ -229,7 +237,8 @@ impl RoughSampler {
         let Part { chart, reach, .. } = self.parts[piece];
         let at = chart.coordinates(slopes, self.region.range(reach, slopes[0]));
         let (_, solid_angle) = chart.at(at, |x| self.region.range(reach, x));
-        let (_, jacobian) = self.direction(event, h);
+        // The cosine of wi itself: by Snell from that of wo it loses its digits at the critical angle.
+        let jacobian = self.jacobian(event, wo.dot(h), wi.dot(h).abs());
         Some(Draw::Point { piece, at, density: pdf * jacobian * solid_angle })
     }
 }

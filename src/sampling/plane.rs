@@ -44,7 +44,8 @@ impl PlaneLobe {
         self.frame.to_world(DVec3::new(r * cos_phi, r * sin_phi, up).normalize())
     }
 
-    /// Density of [`Self::sample`] per solid angle; 0 for what does not go towards the plane.
+    /// Density of [`Self::sample`] per solid angle, to a relative 2e-16 / cos, which is what a unit vector holds of
+    /// its cosine; 0 for what does not go towards the plane.
     #[inline]
     pub fn pdf(&self, dir: DVec3) -> f64 {
         let cos = dir.dot(self.frame.n);
