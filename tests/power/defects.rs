@@ -339,7 +339,7 @@ pub const SUBDIVISION: &[Planted] = &[
         "snee-probe-cosine-of-last",
         Defect::ProbeCosineOfLast,
         "the density of x_k from x_i has the cosine of w_jk for that of w_ik",
-        &["alone.smooth sky", "alone.smooth cap"],
+        &["subdivision.smooth sun"],
     ),
     subdivision(
         "snee-probe-cosine-missing",
