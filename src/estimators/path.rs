@@ -20,7 +20,7 @@
 use std::sync::Arc;
 
 use super::bands::OneBand;
-use super::walk::{Field, Unrivalled, Walk};
+use super::walk::{Field, Unrivalled, Walk, unscattered_notes};
 use super::{Estimator, Scores};
 use crate::optics::boundary::Boundary;
 use crate::sampling::stream::PassKey;
@@ -54,16 +54,14 @@ impl Estimator for PathTracer {
         let scene = &self.field.scene;
         let smooth = scene.boundary.iter().any(|b| matches!(b, Boundary::Smooth { .. }));
         let parallel = scene.lights.iter().filter(|light| light.is_directional());
-        parallel
-            .filter(|_| smooth)
-            .map(|light| {
-                format!(
-                    "path cannot sample directional light `{}` through a smooth boundary: its share is \
-                     missing (exactly 0), not dark",
-                    light.name
-                )
-            })
-            .collect()
+        let missing = parallel.filter(|_| smooth).map(|light| {
+            format!(
+                "path cannot sample directional light `{}` through a smooth boundary: its share is missing \
+                 (exactly 0), not dark",
+                light.name
+            )
+        });
+        missing.chain(unscattered_notes(scene)).collect()
     }
 }
 

@@ -609,3 +609,16 @@ pub(super) fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> 
     let probability = weight / threshold;
     (u() < probability).then_some(probability)
 }
+
+/// What every walk lacks of parallel light at a matched boundary.
+pub(super) fn unscattered_notes(scene: &Scene) -> impl Iterator<Item = String> {
+    let is_matched = scene.boundary.contains(&Boundary::Matched);
+    let parallel = scene.lights.iter().filter(move |light| light.is_directional() && is_matched);
+    parallel.map(|light| {
+        format!(
+            "no path from a sensor follows directional light `{}` straight through the matched body: what is not \
+             scattered, class surface, is missing (not dark)",
+            light.name
+        )
+    })
+}

@@ -23,7 +23,7 @@ mod two_bounce;
 use std::sync::Arc;
 
 use super::bands::{MAX_SHARED, OneBand, SharedBands};
-use super::walk::{Field, Unrivalled, Walk};
+use super::walk::{Field, Unrivalled, Walk, unscattered_notes};
 use super::{BandUse, Estimator, Roulette, Scores};
 use crate::error::{Error, Result};
 use crate::optics::boundary::Boundary;
@@ -200,16 +200,15 @@ impl Estimator for Snee {
 fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
     let smooth = scene.boundary.iter().any(|b| matches!(b, Boundary::Smooth { .. }));
     let parallel = scene.lights.iter().filter(|light| light.is_directional() && smooth);
-    parallel
-        .map(|light| {
-            format!(
-                "through a smooth boundary, directional light `{}` is found by {technique} alone: surface, single, \
-                 single_internal and what has one medium vertex after its last internal reflection are missing \
-                 (not dark)",
-                light.name
-            )
-        })
-        .collect()
+    let missing = parallel.map(|light| {
+        format!(
+            "through a smooth boundary, directional light `{}` is found by {technique} alone: surface, single, \
+             single_internal and what has one medium vertex after its last internal reflection are missing (not \
+             dark)",
+            light.name
+        )
+    });
+    missing.chain(unscattered_notes(scene)).collect()
 }
 
 impl Snee {
