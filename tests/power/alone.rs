@@ -45,7 +45,7 @@ impl Technique {
     }
 }
 
-/// Options of `two_bounce`.
+/// Options of `last_two`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TwoBounceOptions {

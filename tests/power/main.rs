@@ -62,7 +62,7 @@ fn registry() -> Registry {
             },
         },
         RegistryEntry {
-            kind: "two_bounce",
+            kind: "last_two",
             doc: "two bounces from one medium vertex by one technique, and the planted defect",
             options_schema: || schemars::schema_for!(TwoBounceOptions),
             build: |options, scene| {

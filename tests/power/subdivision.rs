@@ -25,7 +25,7 @@ use super::surface::{Meeting, meet, meet_value};
 #[serde(deny_unknown_fields)]
 pub struct FluxOptions {
     /// Of the paths that leave by two scatterings, seen from the sensor, only those are scored whose flight
-    /// between them is longer than this, mm: see `two_bounce`.
+    /// between them is longer than this, mm: see `last_two`.
     pub beyond_mm: f64,
 }
 
