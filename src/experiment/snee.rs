@@ -17,8 +17,9 @@ pub struct SneeWords {
     /// When a path is ended by chance.
     #[serde(default)]
     pub roulette: RouletteOption,
-    /// What makes the paths whose last two medium vertices follow each other; all other paths are always the
-    /// walk's own (and the light-guided last vertex's).
+    /// What makes the paths whose last two medium vertices follow each other.
+    ///
+    /// All other paths are always the walk's own (and the light-guided last vertex's).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strategies: Option<Vec<Strategy>>,
     /// How often an edge is subdivided.
@@ -227,10 +228,13 @@ impl SneeWords {
         if let Some(probe) = self.probe {
             let uniform = 1.0 - probe.plane - probe.guided;
             if uniform <= 0.0 {
-                return Err(Error::input(format!(
-                    "snee: `probe` leaves a share of {uniform} to uniform directions, which must be positive: \
-                     parts of the boundary would never be probed"
-                )));
+                return Err(Error::input_help(
+                    format!(
+                        "snee: the shares of `probe` are {} and {}, which leaves none to uniform directions",
+                        probe.plane, probe.guided
+                    ),
+                    "let them sum to less than 1, or parts of the boundary are never probed",
+                ));
             }
             options.probe = ProbeShares { uniform, plane: probe.plane, guided: probe.guided };
         }
@@ -261,5 +265,37 @@ impl SneeWords {
         }
         options.share_bands = self.bands == BandsWords::Shared;
         Ok(options)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(text: &str) -> SneeWords {
+        toml::from_str(text).expect("words")
+    }
+
+    #[test]
+    fn options_differ_from_the_preset_where_they_are_named() {
+        let paper = words("preset = \"paper\"").options().expect("a preset");
+        assert_eq!(paper, Preset::Paper.options());
+        let fewer = words("preset = \"paper\"\ncall = { most = 0.3 }\nlast_vertex = { most = 0.5 }");
+        let fewer = fewer.options().expect("options");
+        assert_eq!((fewer.call.most, fewer.call_alone.most), (0.3, 0.3));
+        assert_eq!(fewer.last_vertex.map(|last| last.call.most), Some(0.5));
+        assert!(fewer.truncated && fewer.strategies.bottom_to_top);
+        let guided = words("last_vertex = { most = 0 }").options().expect("options");
+        assert_eq!(SneeOptions { last_vertex: None, ..Preset::Guided.options() }, guided);
+    }
+
+    #[test]
+    fn what_samples_nothing_is_refused() {
+        let message = |text| words(text).options().expect_err("nothing").to_string();
+        let probe = message("probe = { plane = 0.7, guided = 0.3 }");
+        assert!(probe.contains("0.7 and 0.3") && probe.contains("uniform"), "{probe}");
+        let none = message("preset = \"paper\"\nstrategies = []");
+        assert!(none.contains("nothing takes part"), "{none}");
+        assert!(words("strategies = []").options().is_ok(), "the last vertex is left");
     }
 }
