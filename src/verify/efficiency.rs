@@ -258,12 +258,11 @@ fn weigh(
     if !efficiency.resolved {
         return Err(format!(
             "not resolved: ln of the ratio moved by {:.2} when the passes doubled, interval +-{:.2}; one pass may \
-             hold {:.1} % of a variance; kurtosis {:.3} and {:.3}",
+             hold {:.1} % of a variance{}",
             efficiency.moved,
             efficiency.work.half_width,
             100.0 * efficiency.a.largest_pass.1.max(efficiency.b.largest_pass.1),
-            kurtosis.0,
-            kurtosis.1
+            told(kurtosis, 3)
         ));
     }
     let ratio = efficiency.work;
@@ -313,6 +312,11 @@ fn control_objection(stored: &Stored, baseline: &Quantity) -> Option<String> {
     })
 }
 
+/// Two kurtoses at the end of a sentence; nothing where there are none, as of pixels.
+fn told((a, b): (f64, f64), decimals: usize) -> String {
+    if a.is_nan() { String::new() } else { format!("; kurtosis {a:.decimals$} and {b:.decimals$}") }
+}
+
 impl Shown {
     /// What it says, where the p-value adjusted over the family is `adjusted_p` and a test fails below
     /// `level`; `own_level` is the level of this test alone. A control that expects failure wants it of E.
@@ -351,10 +355,9 @@ impl Shown {
     pub(super) fn note(&self, found: &Outcome, own_level: f64) -> String {
         let (low, high) = self.ratio.interval();
         let numbers = format!(
-            "{:.3} times the efficiency, 99.9 % interval {low:.3} to {high:.3}; kurtosis {:.1} and {:.1}",
+            "{:.3} times the efficiency, 99.9 % interval {low:.3} to {high:.3}{}",
             self.ratio.ratio(),
-            self.kurtosis.0,
-            self.kurtosis.1
+            told(self.kurtosis, 1)
         );
         match found {
             Outcome::Invalid(reason) => reason.clone(),
