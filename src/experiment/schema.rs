@@ -398,7 +398,7 @@ pub enum Sensor {
         /// value is the mean radiance over pixel and cap, weighed by the cosine to the view. One
         /// direction without it. For bodies of finite size.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 6.283185307179586))]
+        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = std::f64::consts::TAU))]
         acceptance_sr: Option<f64>,
     },
     /// A pinhole: radiance per pixel, box filter.

@@ -15,7 +15,7 @@
 //!
 //! How close: the mean of target / pdf over the target (both normalised) is 1 where they are the same, and
 //! its excess over 1 is the relative variance of a sample's weight. By the angle alpha (test
-//! `closer_than_the_mixture`; [`PhaseTowards`] is the mixture that needs no table):
+//! `closer_than_the_mixture`; `PhaseTowards` is the mixture that needs no table):
 //!
 //! | g   | table at 20, 90, 160 degrees | mixture             |
 //! |-----|------------------------------|---------------------|

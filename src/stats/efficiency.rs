@@ -22,7 +22,7 @@
 //!
 //! *Variances as values.* Where a pass is an image, V is the variance of a pixel, averaged over the pixels. Of
 //! every two consecutive passes x and y, d = (x - y)^2 / 2, averaged over the pixels, is an unbiased estimate
-//! of it, and the pairs are independent: V is the mean of d ([`Values::Variances`]), whatever correlation
+//! of it, and the pairs are independent: V is the mean of d (`Values::Variances`), whatever correlation
 //! there is between the pixels of one pass. By itself a pair of passes is a poor estimate, with
 //! var(d) / V^2 = (kurtosis + 1) / 2 for one pixel; the mean of n / 2 of them has (kurtosis + 1) / n, where the
 //! variance of all n values has (kurtosis - 1) / n: nothing is lost where tails are heavy, and where they are

@@ -127,14 +127,14 @@ impl TwoEnds<'_> {
         }
         let Some((x_j, exit)) = self.flight() else { return };
         if self.technique.plays(LIGHT, &self.model) {
-            self.to_a_light(x_j, &exit);
+            self.join_a_light(x_j, &exit);
         }
         if self.technique.plays(BSDF, &self.model) {
             let w_kj = (x_j - exit.point).normalize();
             if let Some(to_light) = self.model.draw_exit(&exit, w_kj, self.walk.draw3())
                 && self.model.is_lit(&exit, to_light, self.scores)
             {
-                self.to_every_light(x_j, &exit, to_light, false);
+                self.join_every_light(x_j, &exit, to_light, false);
             }
         }
     }
@@ -166,7 +166,7 @@ impl TwoEnds<'_> {
     }
 
     /// A light is sampled from x_k.
-    pub fn to_a_light(&mut self, x_j: DVec3, exit: &Hit) {
+    pub fn join_a_light(&mut self, x_j: DVec3, exit: &Hit) {
         let (light, to_light, radiance, p_light) = self.light();
         let ends = Ends { start: self.start, x_j, exit: *exit, to_light, light };
         if let Some((value, densities)) =
@@ -179,7 +179,7 @@ impl TwoEnds<'_> {
     }
 
     /// The finite lights that shine from a drawn direction. Parallel light is in none.
-    pub fn to_every_light(&mut self, x_j: DVec3, exit: &Hit, to_light: DVec3, is_first_hit: bool) {
+    pub fn join_every_light(&mut self, x_j: DVec3, exit: &Hit, to_light: DVec3, is_first_hit: bool) {
         for (light, source) in self.model.scene.lights.iter().enumerate() {
             let (radiance, pdf) = source.eval(self.model.band, to_light);
             if radiance == 0.0 {
@@ -230,7 +230,7 @@ impl TwoEnds<'_> {
             if let Some((x_j, to_light)) = drawn
                 && self.model.is_lit(&exit, to_light, self.scores)
             {
-                self.to_every_light(x_j, &exit, to_light, true);
+                self.join_every_light(x_j, &exit, to_light, true);
             }
         }
     }

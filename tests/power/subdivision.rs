@@ -128,7 +128,7 @@ impl Path<'_> {
             if let Some(x_j) = self.vertices[1]
                 && model.can_draw(super::connection::LIGHT)
             {
-                self.ends.to_a_light(x_j.point, hit);
+                self.ends.join_a_light(x_j.point, hit);
             }
         } else if super::connection::interface(model.boundary).1.is_some() {
             let (light, to_light, radiance, p_light) = self.ends.light();
@@ -193,7 +193,7 @@ impl Path<'_> {
         if let Some([Some(start), Some(x_j)]) = left {
             // The walk's throughput has the interface's weight on top of what came before.
             self.ends.start = start;
-            self.ends.to_every_light(x_j.point, exit, self.ray.dir, false);
+            self.ends.join_every_light(x_j.point, exit, self.ray.dir, false);
             return;
         }
         let model = self.ends.model;

@@ -21,7 +21,7 @@ fn split(at: At, words: &Split, known: &Known) {
             "a split picture compares two estimators: name two",
         );
     }
-    if let Some(stops) = words.exposure_stops.filter(|stops| !(stops.abs() <= 64.0)) {
+    if let Some(stops) = words.exposure_stops.filter(|stops| stops.is_nan() || stops.abs() > 64.0) {
         at.to("exposure_stops").report(format!("must be between -64 and 64, is {stops}"));
     }
     let Some(axes) = known.axes else { return };
