@@ -17,13 +17,22 @@ pub fn light_shares(scene: &Scene) -> Vec<Vec<f64>> {
 /// The light that `u` selects and the probability of that choice, from one band's shares.
 #[inline]
 pub fn choose_light(shares: &[f64], u: f64) -> Option<(usize, f64)> {
+    choose_share(shares.iter().copied(), u)
+}
+
+/// The index that `u` selects out of shares that sum to 1, and its share.
+#[inline]
+pub fn choose_share(shares: impl Iterator<Item = f64>, u: f64) -> Option<(usize, f64)> {
     let mut rest = u;
-    for (index, &share) in shares.iter().enumerate() {
+    let mut last = None;
+    for (index, share) in shares.enumerate() {
         if rest < share {
             return Some((index, share));
         }
         rest -= share;
+        if share > 0.0 {
+            last = Some((index, share));
+        }
     }
-    // Rounding of the sum: the last light that shines.
-    shares.iter().rposition(|&share| share > 0.0).map(|index| (index, shares[index]))
+    last // rounding of the sum
 }

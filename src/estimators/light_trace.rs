@@ -41,7 +41,6 @@ use crate::optics::boundary::{Boundary, Event};
 use crate::optics::medium::Medium;
 use crate::sampling::distance::sample_exponential;
 use crate::sampling::stream::{PassKey, Purpose, Stream};
-use crate::sampling::warp::square_to_disc;
 use crate::scene::{Scene, Sensor};
 
 /// The estimator, for one scene.
@@ -137,11 +136,8 @@ fn start(
 ) -> Option<(Ray, f64)> {
     let dir = -toward;
     match (shape, bounds) {
-        (_, Some(BoundingSphere { center, radius })) => {
-            let across = Frame::about(toward);
-            let [x, y] = square_to_disc(u);
-            let origin = center + radius * (2.0 * toward + x * across.s + y * across.t);
-            Some((Ray { origin, dir }, std::f64::consts::PI * radius * radius))
+        (_, Some(bounds)) => {
+            Some((bounds.beam(toward, u), std::f64::consts::PI * bounds.radius * bounds.radius))
         }
         (Shape::Slab { thickness }, None) if toward.z < 0.0 => {
             let point = DVec3::new(0.0, 0.0, -thickness);

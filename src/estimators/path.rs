@@ -20,7 +20,7 @@
 use std::sync::Arc;
 
 use super::bands::OneBand;
-use super::walk::{Field, Unrivalled, Walk, unscattered_notes};
+use super::walk::{Field, Path, Unrivalled, Walk, unscattered_notes};
 use super::{Estimator, Scores};
 use crate::optics::boundary::Boundary;
 use crate::sampling::stream::PassKey;
@@ -45,7 +45,8 @@ impl Estimator for PathTracer {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         for &band in bands {
             for index in 0..self.field.scene.sensor.rays_per_pass() {
-                Walk::play(&self.field, band, index, key, scores, Unrivalled, OneBand);
+                let path = Path { field: &self.field, band, index, key };
+                Walk::play(path, scores, Unrivalled, OneBand);
             }
         }
     }

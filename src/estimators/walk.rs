@@ -50,6 +50,15 @@ impl Field {
     }
 }
 
+/// Path `index` of a pass, in one band.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Path<'a> {
+    pub field: &'a Field,
+    pub band: usize,
+    pub index: usize,
+    pub key: &'a PassKey,
+}
+
 /// Techniques beside unidirectional sampling.
 pub(super) trait Rivals: Sized {
     /// At a medium vertex that roulette has spared, before its direction is drawn; the walk's ray holds the
@@ -154,17 +163,9 @@ pub(super) struct Walk<'a, R, B> {
 }
 
 impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
-    /// Plays path `index` of a pass; returns how many numbers its walk drew.
-    pub fn play(
-        field: &'a Field,
-        band: usize,
-        index: usize,
-        key: &PassKey,
-        scores: &'a mut Scores,
-        rivals: R,
-        bands: B,
-    ) -> u64 {
-        let walk = Walk::start(field, band, index, key, scores, rivals, bands);
+    /// Plays a path; returns how many numbers its walk drew.
+    pub fn play(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
+        let walk = Walk::start(path, scores, rivals, bands);
         walk.scores.count(Cost::Rays);
         match walk.scene.shape.intersect(&walk.ray, Side::Outside, None, f64::INFINITY) {
             Some(hit) => walk.run(hit),
@@ -174,16 +175,8 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
 
     /// Plays the last two segments in the medium alone: the sensor's ray is the arrival at x_i, the next flight
     /// must end in the medium, the one after it at the boundary, and what leaves there must meet a light.
-    pub fn play_two_bounces(
-        field: &'a Field,
-        band: usize,
-        index: usize,
-        key: &PassKey,
-        scores: &'a mut Scores,
-        rivals: R,
-        bands: B,
-    ) -> Option<()> {
-        let mut walk = Walk::start(field, band, index, key, scores, rivals, bands);
+    pub fn play_two_bounces(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> Option<()> {
+        let mut walk = Walk::start(path, scores, rivals, bands);
         walk.history.scatter();
         R::call(&mut walk);
         walk.turn();
@@ -202,15 +195,8 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         Some(())
     }
 
-    fn start(
-        field: &'a Field,
-        band: usize,
-        index: usize,
-        key: &PassKey,
-        scores: &'a mut Scores,
-        rivals: R,
-        bands: B,
-    ) -> Walk<'a, R, B> {
+    fn start(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> Walk<'a, R, B> {
+        let Path { field, band, index, key } = path;
         let scene = &*field.scene;
         let mut sensor_stream = key.stream(index as u64, Purpose::Sensor);
         let [a, b] = sensor_stream.draw2();

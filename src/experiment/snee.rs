@@ -101,7 +101,10 @@ pub enum Distances {
     Unbounded,
 }
 
-/// Shares of the lobes of probes; what is left to 1 is uniform in direction, and must be positive.
+/// The least share of uniform directions among probes.
+const LEAST_UNIFORM: f64 = 1e-3;
+
+/// Shares of the lobes of probes; what is left to 1 is uniform in direction, at least 0.001.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeWords {
@@ -203,7 +206,7 @@ impl SneeWords {
     /// The preset with what differs from it.
     ///
     /// # Errors
-    /// No technique, or shares of probes that leave nothing to uniform directions.
+    /// No technique, one that loses lights, or shares of probes that leave nothing to uniform directions.
     pub fn options(&self) -> Result<SneeOptions> {
         let mut options = self.preset.options();
         options.roulette = self.roulette.into();
@@ -227,13 +230,14 @@ impl SneeWords {
         }
         if let Some(probe) = self.probe {
             let uniform = 1.0 - probe.plane - probe.guided;
-            if uniform <= 0.0 {
+            if uniform < LEAST_UNIFORM {
                 return Err(Error::input_help(
                     format!(
-                        "snee: the shares of `probe` are {} and {}, which leaves none to uniform directions",
+                        "snee: the shares of `probe` are {} and {}, which leaves less than {LEAST_UNIFORM} to uniform \
+                         directions",
                         probe.plane, probe.guided
                     ),
-                    "let them sum to less than 1, or parts of the boundary are never probed",
+                    "let them sum to less, or parts of the boundary are never probed, or with huge weights",
                 ));
             }
             options.probe = ProbeShares { uniform, plane: probe.plane, guided: probe.guided };
@@ -259,6 +263,12 @@ impl SneeWords {
         }
         if let Some(least) = self.least_concentration {
             options.least_concentration = least;
+        }
+        if !(bsdf && light) && options.least_concentration > 1.0 {
+            return Err(Error::input_help(
+                "snee: `strategies` leaves out bsdf or light, which are all that finds a light behind the gate",
+                "set `least_concentration = 1`, or name both",
+            ));
         }
         if let Some(expected) = self.expected_reflection {
             options.expected_reflection = expected;
@@ -296,6 +306,9 @@ mod tests {
         assert!(probe.contains("0.7 and 0.3") && probe.contains("uniform"), "{probe}");
         let none = message("preset = \"paper\"\nstrategies = []");
         assert!(none.contains("nothing takes part"), "{none}");
-        assert!(words("strategies = []").options().is_ok(), "the last vertex is left");
+        let gated = message("strategies = [\"top_to_bottom\"]");
+        assert!(gated.contains("behind the gate"), "{gated}");
+        let last_alone = words("strategies = []\nleast_concentration = 1").options();
+        assert!(last_alone.is_ok(), "the last vertex is left");
     }
 }

@@ -23,7 +23,8 @@ pub use normals::Normals;
 pub use obj::load_obj;
 pub use surface::{SurfacePoint, SurfaceSampler, Triangle};
 
-use crate::math::DVec3;
+use crate::math::{DVec3, Frame};
+use crate::sampling::warp::square_to_disc;
 
 /// A ray: `origin + t dir`, `dir` a unit vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +78,17 @@ pub struct BoundingSphere {
     pub center: DVec3,
     /// Its radius, mm.
     pub radius: f64,
+}
+
+impl BoundingSphere {
+    /// A ray along -`out` that starts a diameter off on the disc across it, uniform per area (pi R^2): all light that
+    /// goes this way and meets the body comes through that disc.
+    pub fn beam(&self, out: DVec3, u: [f64; 2]) -> Ray {
+        let across = Frame::about(out);
+        let [x, y] = square_to_disc(u);
+        let origin = self.center + self.radius * (2.0 * out + x * across.s + y * across.t);
+        Ray { origin, dir: -out }
+    }
 }
 
 /// The body. Its faces, as [`Hit::face`] numbers them:

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use crate::geometry::{BoundingSphere, Ray};
 use crate::math::{DVec3, Frame};
-use crate::sampling::warp::{square_to_cosine_hemisphere, square_to_disc};
+use crate::sampling::warp::square_to_cosine_hemisphere;
 
 /// What is measured.
 #[derive(Clone, Debug)]
@@ -226,12 +226,10 @@ impl Sensor {
                 let (sin_phi, cos_phi) = crate::math::sin_cos_turns(u[1]);
                 let r = (1.0 - mu * mu).max(0.0).sqrt();
                 let out = frame.to_world(DVec3::new(r * cos_phi, r * sin_phi, mu));
-                let across = Frame::about(out);
-                let [x, y] = square_to_disc([u[2], u[3]]);
+                let ray = bounds.beam(out, [u[2], u[3]]);
                 let radius = bounds.radius;
-                let origin = bounds.center + radius * (2.0 * out + x * across.s + y * across.t);
                 let weight = 2.0 * PI * width * PI * radius * radius / *paths as f64;
-                SensorRay { ray: Ray { origin, dir: -out }, weight, slot }
+                SensorRay { ray, weight, slot }
             }
         }
     }
@@ -354,6 +352,7 @@ impl Screen {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::warp::square_to_disc;
 
     fn screen(width: usize, height: usize) -> Screen {
         Screen {

@@ -12,18 +12,18 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::connections::{End, Middle, choose_guide};
+use super::connections::{End, Middle};
 use super::guide::Guide;
 use crate::error::{Error, Result};
 use crate::estimators::bands::{Bands, OneBand};
-use crate::estimators::walk::{Exit, Field, Rivals, Unrivalled, Walk};
+use crate::estimators::choice::choose_share;
+use crate::estimators::walk::{Exit, Field, Path, Rivals, Unrivalled, Walk};
 use crate::estimators::{Cost, Estimator, Roulette, Scores};
 use crate::geometry::{BoundingSphere, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 use crate::sampling::distance::{sample_exponential, transmittance};
 use crate::sampling::stream::{PassKey, Purpose, Stream};
-use crate::sampling::warp::square_to_disc;
 use crate::scene::Scene;
 
 /// The estimator, for one scene.
@@ -63,8 +63,9 @@ impl Estimator for Bidirectional {
         for &band in bands {
             for index in 0..self.field.scene.sensor.rays_per_pass() {
                 let guides = &self.guides[band];
+                let path = Path { field: &self.field, band, index, key };
                 if guides.is_empty() {
-                    Walk::play(&self.field, band, index, key, scores, Unrivalled, OneBand);
+                    Walk::play(path, scores, Unrivalled, OneBand);
                     continue;
                 }
                 let mut stream = key.stream(index as u64, Purpose::Connection);
@@ -72,7 +73,7 @@ impl Estimator for Bidirectional {
                 let light = self.light_path(guides, band, &mut stream, scores);
                 let nowhere = (DVec3::NAN, DVec3::Z);
                 let rivals = OneLightVertex { guides, light, covered, vertices: [nowhere; 2], count: 0 };
-                Walk::play(&self.field, band, index, key, scores, rivals, OneBand);
+                Walk::play(path, scores, rivals, OneBand);
             }
         }
     }
@@ -102,15 +103,12 @@ impl Bidirectional {
     ) -> Option<LightPath<'a>> {
         let scene = &*self.field.scene;
         let (boundary, medium) = (&scene.boundary[band], &scene.medium[band]);
-        let guide = choose_guide(guides, stream.draw());
+        let (index, _) = choose_share(guides.iter().map(|guide| guide.choice), stream.draw())?;
+        let guide = &guides[index];
         let sample = guide.sample(&scene.lights[guide.light], band, stream.draw2());
-        let [x, y] = square_to_disc(stream.draw2());
+        let beam = self.bounds.beam(sample.wi, stream.draw2());
         let [u, v, w] = stream.draw3();
-        let across = Frame::about(sample.wi);
-        let origin =
-            self.bounds.center + self.bounds.radius * (2.0 * sample.wi + x * across.s + y * across.t);
         scores.count(Cost::Rays);
-        let beam = Ray { origin, dir: -sample.wi };
         let hit = scene.shape.intersect(&beam, Side::Outside, None, f64::INFINITY)?;
         let frame = Frame::about(hit.shading_normal);
         let from = frame.to_local(sample.wi);

@@ -25,6 +25,7 @@ use super::guide::Guide;
 use super::{BandSetup, last_vertex, subdivision};
 use crate::estimators::Cost;
 use crate::estimators::bands::Bands;
+use crate::estimators::choice::choose_share;
 use crate::estimators::walk::{Exit, Rivals, Walk};
 use crate::geometry::{Hit, Ray, Side};
 use crate::math::{DVec3, exp, ln};
@@ -112,6 +113,18 @@ impl<'a> Connections<'a> {
     pub fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
         let nowhere = Vertex::new(DVec3::NAN, DVec3::Z, 1.0);
         Connections { setup, stream, vertices: [nowhere; 2], count: 0, is_edge_alone: false, seen: None }
+    }
+
+    /// A guide by its probability; without a draw where there is one alone.
+    pub fn choose_guide(&mut self) -> Option<&'a Guide> {
+        let guides = &self.setup.guides;
+        match &guides[..] {
+            [only] => Some(only),
+            _ => {
+                let shares = guides.iter().map(|guide| guide.choice);
+                choose_share(shares, self.stream.draw()).map(|(index, _)| &guides[index])
+            }
+        }
     }
 
     /// Which of BSDF and light sampling take part at the end of a path with this many medium vertices since
@@ -320,17 +333,4 @@ impl<B: Bands> Walk<'_, Connections<'_>, B> {
             }
         }
     }
-}
-
-/// A guide by its probability.
-pub(super) fn choose_guide(guides: &[Guide], u: f64) -> &Guide {
-    let mut rest = u;
-    let (last, others) = guides.split_last().expect("a setup without guides plays no connections");
-    for guide in others {
-        if rest < guide.choice {
-            return guide;
-        }
-        rest -= guide.choice;
-    }
-    last
 }

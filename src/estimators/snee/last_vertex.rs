@@ -12,7 +12,7 @@
 //! Dirac factor as BSDF sampling. It also covers what subdivision cannot: single scattering, and paths whose last
 //! vertex follows an internal reflection.
 
-use super::connections::{Call, Connections, End, Middle, Vertex, choose_guide};
+use super::connections::{Call, Connections, End, Middle, Vertex};
 use super::guess::Guess;
 use super::guide::Guide;
 use super::subdivision;
@@ -143,11 +143,7 @@ pub(super) fn call<B: Bands>(walk: &mut Walk<'_, Connections<'_>, B>, technique:
     if walk.scene.shape.clearance(x_j.point) >= reach {
         return;
     }
-    let guide = if setup.guides.len() == 1 {
-        &setup.guides[0]
-    } else {
-        choose_guide(&setup.guides, walk.rivals.stream.draw())
-    };
+    let Some(guide) = walk.rivals.choose_guide() else { return };
     let guess = x_j.guess(walk, guide);
     walk.rivals.vertices[1] = x_j;
     let Some(guess) = guess.filter(|guess| guess.distance < reach) else { return };

@@ -23,7 +23,7 @@ mod two_bounce;
 use std::sync::Arc;
 
 use super::bands::{MAX_SHARED, OneBand, SharedBands};
-use super::walk::{Field, Unrivalled, Walk, unscattered_notes};
+use super::walk::{Field, Path, Unrivalled, Walk, unscattered_notes};
 use super::{BandUse, Estimator, Roulette, Scores};
 use crate::error::{Error, Result};
 use crate::optics::boundary::Boundary;
@@ -176,12 +176,14 @@ impl Estimator for Snee {
             for index in 0..rays {
                 let u = key.stream(index as u64, Purpose::Hero).draw();
                 let hero = ((u * media.len() as f64) as usize).min(media.len() - 1);
-                self.play(0, hero, index, key, scores, SharedBands::new(media, hero));
+                let path = Path { field: &self.field, band: hero, index, key };
+                self.play(0, path, scores, SharedBands::new(media, hero));
             }
         } else {
             for &band in bands {
                 for index in 0..rays {
-                    self.play(band, band, index, key, scores, OneBand);
+                    let path = Path { field: &self.field, band, index, key };
+                    self.play(band, path, scores, OneBand);
                 }
             }
         }
@@ -192,7 +194,16 @@ impl Estimator for Snee {
     }
 
     fn notes(&self) -> Vec<String> {
-        missing_notes(&self.field.scene, "subdivision from its end")
+        let Strategies { bsdf, light, .. } = self.options.strategies;
+        let mut notes = missing_notes(&self.field.scene, "subdivision from its end");
+        if !(bsdf && light) {
+            notes.push(
+                "`strategies` leaves out a part of unidirectional sampling: of paths whose last two medium vertices \
+                 follow each other, what only that part finds is missing (not dark)"
+                    .into(),
+            );
+        }
+        notes
     }
 }
 
@@ -212,22 +223,13 @@ fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
 }
 
 impl Snee {
-    fn play<B: super::bands::Bands>(
-        &self,
-        setup: usize,
-        band: usize,
-        index: usize,
-        key: &PassKey,
-        scores: &mut Scores,
-        bands: B,
-    ) {
+    fn play<B: super::bands::Bands>(&self, setup: usize, path: Path, scores: &mut Scores, bands: B) {
         let setup = &self.setups[setup];
         if setup.guides.is_empty() {
-            Walk::play(&self.field, band, index, key, scores, Unrivalled, bands);
+            Walk::play(path, scores, Unrivalled, bands);
         } else {
-            let stream = key.stream(index as u64, Purpose::Connection);
-            let connections = Connections::new(setup, stream);
-            Walk::play(&self.field, band, index, key, scores, connections, bands);
+            let stream = path.key.stream(path.index as u64, Purpose::Connection);
+            Walk::play(path, scores, Connections::new(setup, stream), bands);
         }
     }
 }

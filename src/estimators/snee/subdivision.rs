@@ -13,7 +13,7 @@
 //! horizon) counts as 0.
 
 use super::SneeOptions;
-use super::connections::{Call, Connections, End, Middle, Vertex, choose_guide};
+use super::connections::{Call, Connections, End, Middle, Vertex};
 use super::guide::Guide;
 use super::last_vertex;
 use super::probe::Probe;
@@ -129,11 +129,7 @@ impl SneeOptions {
 pub(super) fn call<B: Bands>(walk: &mut Walk<'_, Connections<'_>, B>) {
     let setup = walk.rivals.setup;
     let options = &setup.options;
-    let guide = if setup.guides.len() == 1 {
-        &setup.guides[0]
-    } else {
-        choose_guide(&setup.guides, walk.rivals.stream.draw())
-    };
+    let Some(guide) = walk.rivals.choose_guide() else { return };
     let call = options.call_for(&walk.boundary, guide);
     let Some(reach) = call.reach(setup.sigma, walk.rivals.stream.draw()) else { return };
     let mut x_i = walk.rivals.vertices[1];

@@ -12,7 +12,7 @@ use super::connections::Connections;
 use super::{Snee, SneeOptions};
 use crate::error::{Error, Result};
 use crate::estimators::bands::OneBand;
-use crate::estimators::walk::{Unrivalled, Walk};
+use crate::estimators::walk::{Path, Unrivalled, Walk};
 use crate::estimators::{Estimator, Scores};
 use crate::sampling::stream::{PassKey, Purpose};
 use crate::scene::{Scene, Sensor};
@@ -47,14 +47,14 @@ impl Estimator for TwoBounce {
         for &band in bands {
             let setup = &snee.setups[band];
             for index in 0..snee.field.scene.sensor.rays_per_pass() {
-                let field = &snee.field;
+                let path = Path { field: &snee.field, band, index, key };
                 if setup.guides.is_empty() {
-                    Walk::play_two_bounces(field, band, index, key, scores, Unrivalled, OneBand);
+                    Walk::play_two_bounces(path, scores, Unrivalled, OneBand);
                 } else {
                     let stream = key.stream(index as u64, Purpose::Connection);
                     let mut connections = Connections::new(setup, stream);
                     connections.is_edge_alone = true;
-                    Walk::play_two_bounces(field, band, index, key, scores, connections, OneBand);
+                    Walk::play_two_bounces(path, scores, connections, OneBand);
                 }
             }
         }
