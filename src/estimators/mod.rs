@@ -6,6 +6,7 @@
 mod bands;
 mod choice;
 mod crossing;
+mod emergence;
 mod history;
 pub mod light_trace;
 pub mod path;

@@ -1,5 +1,8 @@
 //! Fresnel, microfacets, boundaries, phase functions, media, spectra and materials: scalar, one band.
 
+/// Light that diffuses from one point of a surface to another.
+pub mod bssrdf;
+
 /// The refractive surface as a whole.
 pub mod boundary;
 

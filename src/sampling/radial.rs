@@ -107,7 +107,8 @@ impl Dipole {
         z * (x * (2.0 + x)).sqrt()
     }
 
-    fn pdf_area(&self, r: f64) -> f64 {
+    /// Its density per mm^2 at radius `r`.
+    pub fn pdf_area(&self, r: f64) -> f64 {
         let share = self.share_real();
         share * self.source(self.z_real, r) + (1.0 - share) * self.source(self.z_virtual, r)
     }

@@ -1,0 +1,243 @@
+//! Camera paths over a body whose inside is a BSSRDF: reflection or refraction at every hit of the surface by roulette
+//! with the Fresnel reflectance, and at a refraction (point-cloud note, phase two)
+//!   L_o = L_e + L_t + L_r
+//! with L_e = 0 (no medium here emits), L_t the light that goes straight through, and L_r gathered from the surface by
+//! whoever walks.
+//!
+//! The branch of refraction is taken with probability T21, so that what is gathered there must leave T21 out.
+//! L_t follows the refracted ray to the other side with transmittance exp(-sigma_t* t), leaves with the transmittance of
+//! the boundary as a weight (what is reflected there is the model's business) and goes on outside as the same path.
+//!
+//! Bands that refract alike share a path; with dispersion each index has its own.
+
+use std::sync::Arc;
+
+use super::{Anomaly, Cost, Scores, TransportClass};
+use crate::error::{Error, Result};
+use crate::geometry::{FaceId, Hit, Ray, Side};
+use crate::math::{DVec3, Frame};
+use crate::optics::boundary::Boundary;
+use crate::optics::bssrdf::{Bssrdf, Exit, Model};
+use crate::optics::fresnel::fresnel;
+use crate::sampling::distance::transmittance;
+use crate::sampling::stream::{PassKey, Purpose, Stream};
+use crate::scene::Scene;
+
+/// A scene whose medium is replaced by a model.
+#[derive(Debug)]
+pub(super) struct Skin {
+    pub scene: Arc<Scene>,
+    /// Per band.
+    pub models: Vec<Bssrdf>,
+    /// Per band: index inside over outside.
+    pub eta: Vec<f64>,
+    /// Bands that refract alike.
+    pub groups: Vec<Vec<usize>>,
+    /// Whether light that goes straight through is followed.
+    pub straight: bool,
+}
+
+/// A camera path that has been refracted into the body.
+pub(super) struct Emergence<'a> {
+    pub exit: Exit,
+    pub face: FaceId,
+    /// Unit direction of the path inside.
+    pub dir: DVec3,
+    /// Index inside over outside.
+    pub eta: f64,
+    pub bands: &'a [usize],
+    /// Per band of `bands`.
+    pub throughput: &'a [f64],
+    pub slot: usize,
+}
+
+/// Collects light that leaves the body.
+pub(super) trait Gather {
+    /// Scores what arrives at the exit from the rest of the surface: the integral of K T12 L |cos|, times the path's
+    /// throughput.
+    fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores);
+}
+
+/// Weight of a straight path below which roulette decides.
+const ROULETTE: f64 = 0.05;
+
+impl Skin {
+    /// For a scene with smooth or matched boundaries.
+    ///
+    /// # Errors
+    /// A rough boundary; a medium that the model does not fit.
+    pub fn new(scene: Arc<Scene>, model: &Model, straight: bool) -> Result<Skin> {
+        let eta = scene.boundary.iter().map(|boundary| match boundary {
+            Boundary::Matched => Ok(1.0),
+            Boundary::Smooth { eta } => Ok(*eta),
+            Boundary::Rough { .. } => Err(Error::input_help(
+                "a BSSRDF here lies under a smooth boundary, this one is rough",
+                "use `object.boundary.smooth`",
+            )),
+        });
+        let eta = eta.collect::<Result<Vec<f64>>>()?;
+        let models = scene.medium.iter().zip(&eta).map(|(medium, &eta)| model.of(medium, eta));
+        let models =
+            models.collect::<std::result::Result<Vec<Bssrdf>, String>>().map_err(Error::input)?;
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for band in 0..eta.len() {
+            match groups.iter_mut().find(|group| eta[group[0]] == eta[band]) {
+                Some(group) => group.push(band),
+                None => groups.push(vec![band]),
+            }
+        }
+        Ok(Skin { scene, models, eta, groups, straight })
+    }
+
+    /// What camera paths cannot find.
+    pub fn notes(&self) -> Vec<String> {
+        let parallel = self.scene.lights.iter().filter(|light| light.is_directional());
+        parallel
+            .filter(|_| self.eta.iter().any(|&eta| eta != 1.0))
+            .map(|light| {
+                format!(
+                    "surface reflections of directional light `{}` by the smooth boundary, and what goes straight \
+                     through, are missing (exactly 0), not dark",
+                    light.name
+                )
+            })
+            .collect()
+    }
+
+    /// Plays path `index` of a pass for one group of bands.
+    pub fn play(
+        &self,
+        bands: &[usize],
+        index: usize,
+        key: &PassKey,
+        scores: &mut Scores,
+        gather: &mut impl Gather,
+    ) {
+        let mut sensor_stream = key.stream(index as u64, Purpose::Sensor);
+        let [a, b] = sensor_stream.draw2();
+        let [c, d] = sensor_stream.draw2();
+        let start = self.scene.sensor.ray(index, [a, b, c, d]);
+        let lane = (index as u64) << 8 | bands[0] as u64; // a path of its own for each group
+        let mut path = CameraPath {
+            skin: self,
+            bands,
+            eta: self.eta[bands[0]],
+            weight: start.weight,
+            throughput: vec![start.weight; bands.len()],
+            slot: start.slot,
+            ray: start.ray,
+            from: None,
+            has_met: false,
+            stream: key.stream(lane, Purpose::Walk),
+        };
+        scores.count(Cost::Paths);
+        while path.step(scores, gather).is_some() {}
+    }
+}
+
+struct CameraPath<'a> {
+    skin: &'a Skin,
+    bands: &'a [usize],
+    eta: f64,
+    /// Of the sensor's ray.
+    weight: f64,
+    throughput: Vec<f64>,
+    slot: usize,
+    ray: Ray,
+    from: Option<FaceId>,
+    has_met: bool,
+    stream: Stream,
+}
+
+impl CameraPath<'_> {
+    /// From one hit of the surface to the next; `None` where the path ends.
+    fn step(&mut self, scores: &mut Scores, gather: &mut impl Gather) -> Option<()> {
+        scores.count(Cost::Rays);
+        let shape = &self.skin.scene.shape;
+        let Some(hit) = shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY) else {
+            self.escape(scores);
+            return None;
+        };
+        self.has_met = true;
+        scores.count(Cost::BoundaryEvents);
+        let frame = Frame::about(hit.shading_normal);
+        let wo = frame.to_local(-self.ray.dir);
+        if wo.z <= 0.0 {
+            scores.note(Anomaly::WrongSide);
+            return None;
+        }
+        let surface = fresnel(wo.z, self.eta);
+        self.ray.origin = hit.point;
+        self.from = Some(hit.face);
+        if self.stream.draw() < surface.reflectance {
+            self.ray.dir = frame.to_world(DVec3::new(-wo.x, -wo.y, wo.z));
+            return self.stays(&hit, Side::Outside, scores);
+        }
+        self.ray.dir = frame.to_world(DVec3::new(-wo.x / self.eta, -wo.y / self.eta, -surface.cos_t));
+        self.stays(&hit, Side::Inside, scores)?;
+        let emergence = Emergence {
+            exit: Exit { point: hit.point, normal: hit.shading_normal },
+            face: hit.face,
+            dir: self.ray.dir,
+            eta: self.eta,
+            bands: self.bands,
+            throughput: &self.throughput,
+            slot: self.slot,
+        };
+        gather.gather(&emergence, scores);
+        if self.skin.straight { self.go_through(scores) } else { None }
+    }
+
+    /// Goes straight to the other side and out.
+    fn go_through(&mut self, scores: &mut Scores) -> Option<()> {
+        scores.count(Cost::Rays);
+        let shape = &self.skin.scene.shape;
+        let hit = shape.intersect(&self.ray, Side::Inside, self.from, f64::INFINITY)?;
+        scores.count(Cost::BoundaryEvents);
+        let frame = Frame::about(hit.shading_normal);
+        let wo = frame.to_local(-self.ray.dir);
+        if wo.z >= 0.0 {
+            scores.note(Anomaly::WrongSide);
+            return None;
+        }
+        let surface = fresnel(-wo.z, 1.0 / self.eta);
+        for (throughput, &band) in self.throughput.iter_mut().zip(self.bands) {
+            let sigma_t = self.skin.models[band].straight_sigma_t;
+            *throughput *= (1.0 - surface.reflectance) * transmittance(sigma_t, hit.t);
+        }
+        let most = self.throughput.iter().fold(0.0, |most: f64, &t| most.max(t));
+        let probability = (most / (ROULETTE * self.weight)).min(1.0);
+        if self.stream.draw() >= probability {
+            return None; // total reflection too
+        }
+        self.throughput.iter_mut().for_each(|throughput| *throughput /= probability);
+        self.ray.origin = hit.point;
+        self.ray.dir = frame.to_world(DVec3::new(-wo.x * self.eta, -wo.y * self.eta, surface.cos_t));
+        self.from = Some(hit.face);
+        self.stays(&hit, Side::Outside, scores)
+    }
+
+    /// Whether the new direction is on the side where it should be.
+    fn stays(&self, hit: &Hit, side: Side, scores: &mut Scores) -> Option<()> {
+        if (self.ray.dir.dot(hit.normal) > 0.0) == (side == Side::Outside) {
+            return Some(());
+        }
+        scores.note(Anomaly::WrongSide);
+        None
+    }
+
+    /// Scores the lights in the direction of a path that has met the body and leaves the scene.
+    fn escape(&mut self, scores: &mut Scores) {
+        if !self.has_met {
+            return;
+        }
+        for (light, source) in self.skin.scene.lights.iter().enumerate() {
+            for (&band, throughput) in self.bands.iter().zip(&self.throughput) {
+                let (radiance, _) = source.eval(band, self.ray.dir);
+                if radiance > 0.0 {
+                    scores.add(self.slot, band, TransportClass::Surface, light, throughput * radiance);
+                }
+            }
+        }
+    }
+}
