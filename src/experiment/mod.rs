@@ -7,6 +7,9 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 
+/// The words for BSSRDF models.
+pub mod bssrdf;
+
 /// From words to scenes.
 pub mod build;
 
