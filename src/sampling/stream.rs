@@ -109,6 +109,13 @@ impl Stream {
         (self.generator.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
+    /// The next 64 random bits.
+    #[inline]
+    pub fn draw_bits(&mut self) -> u64 {
+        self.draws += 1;
+        self.generator.next_u64()
+    }
+
     /// The next two.
     #[inline]
     pub fn draw2(&mut self) -> [f64; 2] {
