@@ -10,6 +10,7 @@ mod emergence;
 mod history;
 pub mod light_trace;
 pub mod path;
+pub mod point_cloud;
 mod scores;
 pub mod snee;
 mod walk;
@@ -34,6 +35,11 @@ pub trait Estimator: Send + Sync {
     /// What the mean of the scores is.
     fn bias(&self) -> Bias {
         Bias::Unbiased
+    }
+
+    /// Memory that a pass takes for itself, bytes.
+    fn working_bytes(&self) -> usize {
+        0
     }
 
     /// What a reader of its results must know, as a transport that it cannot sample.

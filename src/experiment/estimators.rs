@@ -4,11 +4,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
+use super::point_cloud::PointCloudWords;
 use super::registry::{Registry, RegistryEntry};
 use super::snee::SneeWords;
 use crate::error::{Error, Result};
 use crate::estimators::light_trace::LightTracer;
 use crate::estimators::path::{PathTracer, Roulette};
+use crate::estimators::point_cloud::PointCloud;
 use crate::estimators::snee::{Bidirectional, Snee, TwoBounce};
 use crate::scene::{Scene, Sensor};
 
@@ -16,7 +18,7 @@ use crate::scene::{Scene, Sensor};
 pub fn builtin() -> Registry {
     Registry {
         samplers: super::samplers::builtin(),
-        entries: vec![PATH, SNEE, TWO_BOUNCE, BIDIRECTIONAL, LIGHT_TRACE],
+        entries: vec![PATH, SNEE, TWO_BOUNCE, BIDIRECTIONAL, LIGHT_TRACE, POINT_CLOUD],
     }
 }
 
@@ -70,6 +72,17 @@ const LIGHT_TRACE: RegistryEntry = RegistryEntry {
     build: |options, scene| {
         let options: LightTraceOptions = read(options)?;
         Ok(Box::new(LightTracer::new(scene, options.paths)?))
+    },
+};
+
+const POINT_CLOUD: RegistryEntry = RegistryEntry {
+    kind: "point_cloud",
+    doc: "a BSSRDF summed over points of the surface, accepted by distance; unbiased for the model",
+    options_schema: || schemars::schema_for!(PointCloudWords),
+    build: |options, scene| {
+        let words: PointCloudWords = read(options)?;
+        looks_from_outside("point_cloud", &scene)?;
+        Ok(Box::new(PointCloud::new(scene, (&words).into())?))
     },
 };
 

@@ -21,6 +21,8 @@ pub enum Purpose {
     Connection = 4,
     /// The band that steers a walk shared by all.
     Hero = 5,
+    /// Points of a surface with the light that enters there.
+    Cloud = 6,
 }
 
 /// The key of one (experiment, cell, bands, estimator, stage).

@@ -133,6 +133,13 @@ impl Bssrdf {
         }
     }
 
+    /// Whether the kernel depends on the directions at the entry, beside distance.
+    pub fn needs_directions(&self) -> bool {
+        match &self.kernel {
+            Kernel::Radial { .. } => false,
+        }
+    }
+
     /// Ways to draw the distance between entry and exit on a plane, with their shares (which sum to 1), that together
     /// follow the kernel.
     pub fn techniques(&self) -> Vec<(f64, Radial)> {

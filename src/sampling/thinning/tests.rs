@@ -171,7 +171,9 @@ fn acceptances_are_independent_with_their_probability() {
                 (0..tree.len()).map(|i| rule.probability((tree.point(i) - at).length())).collect();
             let pair = |i: usize| p[i] * p[(i + 1) % p.len()];
             // The variance of a squared z is 2 + excess kurtosis 1/(n p): at most 2.2.
-            for (sum, cells) in [chi2(&counts.single, |i| p[i], queries), chi2(&counts.pair, pair, queries)] {
+            for (sum, cells) in
+                [chi2(&counts.single, |i| p[i], queries), chi2(&counts.pair, pair, queries)]
+            {
                 assert!((sum - cells).abs() < 5.0 * (2.2 * cells).sqrt(), "{key}: {sum} of {cells}");
             }
             let n = queries as f64;
@@ -181,7 +183,10 @@ fn acceptances_are_independent_with_their_probability() {
             assert!((found - mean).abs() < 5.0 * (variance / n).sqrt(), "{key}: {found} of {mean}");
             let spread = counts.number.iter().map(|x| square(x - mean)).sum::<f64>() / n;
             // A sum of many Bernoullis is close to normal: the variance of its square is 2 variance^2.
-            assert!((spread / variance - 1.0).abs() < 5.0 * (2.5 / n).sqrt(), "{key}: {spread} of {variance}");
+            assert!(
+                (spread / variance - 1.0).abs() < 5.0 * (2.5 / n).sqrt(),
+                "{key}: {spread} of {variance}"
+            );
         }
     }
 }
@@ -200,7 +205,9 @@ fn visits_follow_acceptances() {
             [work.nodes, work.candidates, work.accepted].map(|count| count as f64 / at.len() as f64);
         let a = 2.0 * 20.0 * sigma;
         let expected = 1e6 * 2.0 * (1.0 - (1.0 + a) * exp(-a)) / (a * a);
-        println!("{name}: {nodes} nodes, {candidates} candidates, {accepted} accepted, {expected} expected");
+        println!(
+            "{name}: {nodes} nodes, {candidates} candidates, {accepted} accepted, {expected} expected"
+        );
         assert!((accepted / expected - 1.0).abs() < 0.05);
         assert!(nodes + candidates <= 4.0 * accepted + 300.0, "{name}: {work:?}");
     }
