@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 use self::cloud::Cloud;
 use super::emergence::{Emergence, Gather, Skin};
-use super::{Anomaly, BandUse, Cost, Estimator, Scores, TransportClass};
+use super::{Anomaly, BandUse, Cost, Estimator, HeavyTail, Scores, TransportClass};
 use crate::error::{Error, Result};
 use crate::geometry::{BodySampler, FaceChoice};
 use crate::optics::bssrdf::{Entry, Model};
@@ -46,6 +46,9 @@ pub enum Acceptance {
     /// accepts over a disc as wide as the body.
     Kernel,
 }
+
+/// ln of the growth of the variance beyond which a mean is not judged.
+const HEAVY: f64 = 3.0;
 
 /// How accepted points are found; both have the same law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -173,6 +176,35 @@ impl Estimator for PointCloud {
 
     fn band_use(&self) -> BandUse {
         BandUse::Shared
+    }
+
+    fn model(&self) -> Option<String> {
+        Some(self.options.model.to_string())
+    }
+
+    /// Under p = e^(-m d) an accepted term of a band with effective transport s weighs like e^((m - s) d), with a Pareto
+    /// tail of index m / (m - s) on an unbounded surface: without variance where m > 2 s. A finite body cuts the tail off
+    /// at its diameter D; the variance has then grown by about e^((m - 2 s) D).
+    fn heavy_tails(&self) -> Vec<HeavyTail> {
+        if self.options.acceptance != Acceptance::Mean {
+            return Vec::new(); // weights of all other rules are bounded by what the kernel loses, or by their floor
+        }
+        let diameter =
+            self.skin.scene.shape.bounds().map_or(f64::INFINITY, |bounds| 2.0 * bounds.radius);
+        let sigmas = || self.skin.models.iter().map(|model| model.sigma_tr);
+        let mean = sigmas().sum::<f64>() / sigmas().count() as f64;
+        let heavy = sigmas().enumerate().filter(|(_, s)| (mean - 2.0 * s) * diameter > HEAVY);
+        heavy
+            .map(|(band, s)| HeavyTail {
+                band,
+                class: TransportClass::Multiple,
+                reason: format!(
+                    "accepted by the mean of sigma_tr, {mean:.3}/mm, a band of {s:.3}/mm has tail index {:.2} on a body \
+                     {diameter:.3} mm wide",
+                    mean / (mean - s)
+                ),
+            })
+            .collect()
     }
 
     fn notes(&self) -> Vec<String> {
