@@ -13,6 +13,9 @@ pub mod bssrdf;
 /// From words to scenes.
 pub mod build;
 
+/// Options of the samplers of clouds and bodies.
+pub mod cloud_samplers;
+
 /// A TOML text as a tree with places.
 pub mod document;
 

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
+use super::cloud_samplers::{Body, Thinning};
 use super::estimators::read;
 use super::registry::SamplerEntry;
 use crate::error::{Error, Result};
@@ -54,6 +55,10 @@ pub fn builtin() -> Vec<SamplerEntry> {
             Corners => |o| Ok(TriangleSampler::new(o.corners_mm))),
         entry!("mesh_surface", "points on a mesh, its triangles by area or by index",
             Surface => |o| Ok(MeshSampler::new(&o.shape.mesh()?, o.triangles == Triangles::ByArea))),
+        entry!("body_surface", "points on a sphere or a box",
+            Body => |o| Ok(o.sampler())),
+        entry!("thinning", "points of a cloud accepted by distance, by hierarchy or by asking all",
+            Thinning => |o| Ok(o.sampler())),
         entry!("exponential_distance", "free flights",
             Flight => |o| Ok(ExponentialSampler::new(o.sigma_t_per_mm))),
         entry!("truncated_exponential_distance", "free flights that end inside a segment",

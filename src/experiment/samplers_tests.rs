@@ -57,7 +57,8 @@ fn samples_agree_with_their_density() {
             let before = stream.draws();
             let draw = sampler.draw(&mut stream);
             let taken = stream.draws() - before;
-            assert_eq!(*draws.get_or_insert(taken), taken, "{name}: numbers taken");
+            let as_many = *draws.get_or_insert(taken) == taken;
+            assert!(as_many || !sampler.takes_as_many(), "{name}: numbers taken");
             match draw {
                 Draw::Null => assert_ne!(sampler.null(), Null::Never, "{name}"),
                 Draw::Delta { index, exact } => {

@@ -7,6 +7,7 @@
 //! the chart and not taken from the sampler). What a sampler draws and what its density says come from
 //! different functions of the code under test, so that each is held against the other.
 
+pub mod body;
 pub mod boundary;
 pub mod discrete;
 pub mod distance;
@@ -17,6 +18,7 @@ pub mod lobe;
 pub mod phase;
 pub mod radial;
 pub mod surface;
+pub mod thinning;
 pub mod towards;
 
 use std::f64::consts::TAU;
@@ -43,6 +45,11 @@ pub trait Sampler: Send + Sync {
     /// How often it returns nothing.
     fn null(&self) -> Null {
         Null::Never
+    }
+
+    /// Whether every draw takes as many random numbers as any other.
+    fn takes_as_many(&self) -> bool {
+        true
     }
 
     /// Directed contrasts: cheap means in which the likely defects show (mean cosine, ...).

@@ -1,0 +1,183 @@
+//! Thinning of a cloud of points by distance: whether each point is accepted with its probability, two neighbours
+//! independently, and so many in all as independence has it.
+//!
+//! The cloud is fixed, on a sphere of diameter D. One draw is one query. Views:
+//!   distance   a point j is chosen, and the query stands at distance d from it, uniform in [0, D], in a uniform direction;
+//!              the outcome is the chart coordinate d/D where j is accepted (density p(d) per unit), else nothing.
+//!              The density that the sampler reports is 1 over the weight that it gave.
+//!   pair       the query stands still; of a random pair of neighbours in the tree neither, one or both are accepted.
+//!   number     the query stands still; how many points are accepted, whose law is Poisson-binomial.
+
+use super::{Axis, Discrete, Draw, Null, Piece, Sampler};
+use crate::math::{DVec3, integrate, sin_cos_turns};
+use crate::sampling::stream::Stream;
+use crate::sampling::thinning::{Accepted, PointTree, Rule, Work, scan};
+use crate::sampling::warp::square_to_cap;
+
+/// What of a query is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// One point, by its distance.
+    Distance,
+    /// Two neighbours.
+    Pair,
+    /// All points.
+    Number,
+}
+
+/// Queries of one cloud by one rule.
+pub struct ThinningSampler {
+    tree: PointTree,
+    rule: Rule,
+    by_tree: bool,
+    view: View,
+    diameter: f64,
+    /// Where a query stands that does not move.
+    at: DVec3,
+    /// Numbers of points that are outcomes of their own; what is less or more counts as the first or last.
+    numbers: (usize, usize),
+    masses: Vec<f64>,
+}
+
+/// Mass of numbers below which they are not told apart.
+const RARE: f64 = 1e-5;
+
+impl ThinningSampler {
+    /// `count` points on a sphere of radius `radius` mm.
+    pub fn new(rule: Rule, by_tree: bool, view: View, count: usize, radius: f64) -> ThinningSampler {
+        let points: Vec<DVec3> = (0..count).map(|k| radius * golden(k, count)).collect();
+        let tree = PointTree::new(&points);
+        let at = radius * DVec3::new(0.36, -0.48, 0.8);
+        let p: Vec<f64> =
+            (0..count).map(|place| rule.probability((tree.point(place) - at).length())).collect();
+        let (numbers, masses) = match view {
+            View::Distance => ((0, 0), Vec::new()),
+            View::Pair => ((0, 0), pairs(&p)),
+            View::Number => number(&p),
+        };
+        ThinningSampler { tree, rule, by_tree, view, diameter: 2.0 * radius, at, numbers, masses }
+    }
+
+    fn query(&self, at: DVec3, stream: &mut Stream, accept: impl FnMut(Accepted)) {
+        let mut work = Work::default();
+        if self.by_tree {
+            self.tree.thin(at, &self.rule, stream, &mut work, accept);
+        } else {
+            scan(self.tree.axes(), 0..self.tree.len(), at, &self.rule, stream, &mut work, accept);
+        }
+    }
+}
+
+/// Point k of n, nearly even on the unit sphere: equal steps of height, golden angles.
+fn golden(k: usize, n: usize) -> DVec3 {
+    let z = 1.0 - (2 * k + 1) as f64 / n as f64;
+    let (sin, cos) = sin_cos_turns((k as f64 * 0.618_033_988_749_894_9).fract());
+    let across = (1.0 - z * z).sqrt();
+    DVec3::new(across * cos, across * sin, z)
+}
+
+/// Masses of neither, the first, the second, both, of a uniform pair of neighbours around the ring.
+fn pairs(p: &[f64]) -> Vec<f64> {
+    let mut masses = vec![0.0; 4];
+    for (i, &a) in p.iter().enumerate() {
+        let b = p[(i + 1) % p.len()];
+        for (mass, share) in
+            masses.iter_mut().zip([(1.0 - a) * (1.0 - b), a * (1.0 - b), (1.0 - a) * b, a * b])
+        {
+            *mass += share / p.len() as f64;
+        }
+    }
+    masses
+}
+
+/// Poisson-binomial masses by adding one point after the other, with rare numbers put together at both ends.
+fn number(p: &[f64]) -> ((usize, usize), Vec<f64>) {
+    let mut masses = vec![1.0];
+    for &p in p {
+        masses.push(0.0);
+        for k in (0..masses.len()).rev() {
+            let below = if k > 0 { masses[k - 1] } else { 0.0 };
+            masses[k] = masses[k] * (1.0 - p) + below * p;
+        }
+    }
+    let first = masses.iter().position(|&mass| mass > RARE).unwrap_or(0);
+    let last = masses.iter().rposition(|&mass| mass > RARE).unwrap_or(0);
+    let mut kept = masses[first..=last].to_vec();
+    kept[0] += masses[..first].iter().sum::<f64>();
+    kept[last - first] += masses[last + 1..].iter().sum::<f64>();
+    ((first, last), kept)
+}
+
+impl Sampler for ThinningSampler {
+    fn draw(&self, stream: &mut Stream) -> Draw {
+        let count = self.tree.len();
+        match self.view {
+            View::Distance => {
+                let [u, x] = stream.draw2();
+                let place = (u * count as f64) as usize;
+                let away = square_to_cap(2.0, stream.draw2());
+                let at = self.tree.point(place) + x * self.diameter * away;
+                let mut outcome = Draw::Null;
+                self.query(at, stream, |accepted| {
+                    if accepted.index == place {
+                        let at = [accepted.distance / self.diameter, 0.5];
+                        outcome = Draw::Point { piece: 0, at, density: 1.0 / accepted.weight };
+                    }
+                });
+                outcome
+            }
+            View::Pair => {
+                let first = (stream.draw() * count as f64) as usize;
+                let (mut index, mut exact) = (0, true);
+                self.query(self.at, stream, |accepted| {
+                    index += usize::from(accepted.index == first);
+                    index += 2 * usize::from(accepted.index == (first + 1) % count);
+                    let distance = (self.tree.point(accepted.index) - self.at).length();
+                    exact &= (accepted.weight * self.rule.probability(distance) - 1.0).abs() < 1e-12;
+                });
+                Draw::Delta { index, exact }
+            }
+            View::Number => {
+                let mut number = 0;
+                self.query(self.at, stream, |_| number += 1);
+                let (first, last) = self.numbers;
+                Draw::Delta { index: number.clamp(first, last) - first, exact: true }
+            }
+        }
+    }
+
+    fn pieces(&self) -> Vec<Piece> {
+        match self.view {
+            View::Distance => vec![Piece::line("distance", Axis::over(0.0, 1.0))],
+            View::Pair | View::Number => Vec::new(),
+        }
+    }
+
+    fn density(&self, _piece: usize, [x, _]: [f64; 2]) -> f64 {
+        self.rule.probability(x * self.diameter)
+    }
+
+    fn deltas(&self) -> Vec<Discrete> {
+        let name = |k: usize| match self.view {
+            View::Pair => ["neither", "the first", "the second", "both"][k].to_string(),
+            _ => format!("{} points", self.numbers.0 + k),
+        };
+        self.masses.iter().enumerate().map(|(k, &mass)| Discrete { name: name(k), mass }).collect()
+    }
+
+    /// A query takes as many numbers as it has candidates.
+    fn takes_as_many(&self) -> bool {
+        false
+    }
+
+    fn null(&self) -> Null {
+        match self.view {
+            View::Distance => {
+                let accepted =
+                    integrate(|x| self.rule.probability(x * self.diameter), 0.0, 1.0, 1e-10).value;
+                Null::Stated(1.0 - accepted)
+            }
+            View::Pair | View::Number => Null::Never,
+        }
+    }
+}
