@@ -13,6 +13,9 @@ pub mod bssrdf;
 /// From words to scenes.
 pub mod build;
 
+/// Words for claims.
+mod claim_words;
+
 /// Options of the samplers of clouds and bodies.
 pub mod cloud_samplers;
 

@@ -33,6 +33,7 @@ struct Pairs<'a> {
     across: Option<&'a String>,
     observable: &'a Option<String>,
     class: &'a Option<String>,
+    band: &'a Option<String>,
     only: &'a BTreeMap<String, String>,
     detect: Option<f64>,
 }
@@ -44,6 +45,7 @@ impl<'a> From<&'a Agree> for Pairs<'a> {
             across: words.across.as_ref(),
             observable: &words.observable,
             class: &words.class,
+            band: &words.band,
             only: &words.only,
             detect: Some(words.detect),
         }
@@ -57,6 +59,7 @@ impl<'a> From<&'a Differs> for Pairs<'a> {
             across: words.across.as_ref(),
             observable: &words.observable,
             class: &words.class,
+            band: &words.band,
             only: &words.only,
             detect: None,
         }
@@ -84,6 +87,12 @@ impl Scope<'_> {
         }
     }
 
+    /// The band of this name, or every one.
+    fn bands_of(&self, name: &Option<String>) -> impl Iterator<Item = usize> {
+        let is_meant = |band: &usize| name.as_ref().is_none_or(|name| self.bands[*band].name == *name);
+        (0..self.bands.len()).filter(is_meant)
+    }
+
     fn equals(&self, claim: usize, words: &Equals) -> Result<Vec<Comparison>> {
         let names: Vec<&str> = match &words.estimator {
             Some(name) => vec![name],
@@ -102,7 +111,7 @@ impl Scope<'_> {
             };
             let observable = self.observable(claim, cell, &words.observable, &words.class)?;
             for name in &names {
-                for band in 0..self.bands.len() {
+                for band in self.bands_of(&words.band) {
                     comparisons.push(Comparison {
                         claim,
                         quantity: quantity(cell, name, &observable, band),
@@ -171,7 +180,7 @@ impl Scope<'_> {
         let mut comparisons = Vec::new();
         let mut push = |a: (usize, &str), b: (usize, &str), paired: bool| -> Result<()> {
             for observable in self.observables(claim, a.0, words.observable, words.class)? {
-                for band in 0..self.bands.len() {
+                for band in self.bands_of(words.band) {
                     let other = quantity(b.0, b.1, &observable, band);
                     comparisons.push(Comparison {
                         claim,

@@ -11,6 +11,8 @@ use crate::experiment::sweep::SweepAxis;
 pub struct Known<'a> {
     /// Names of estimators.
     pub estimators: Vec<&'a str>,
+    /// Names of bands; none where they could not be read.
+    pub bands: Option<Vec<String>>,
     /// The sweep; none where it could not be read.
     pub axes: Option<&'a [SweepAxis]>,
     /// How much work; none where it could not be read.
@@ -19,6 +21,12 @@ pub struct Known<'a> {
 
 /// The rules of one claim.
 pub fn claim(at: At, claim: &ClaimEntry, known: &Known) {
+    let equals = claim.equals.as_ref().and_then(|words| Some(("equals", words.band.as_ref()?)));
+    let agree = claim.agree.as_ref().and_then(|words| Some(("agree", words.band.as_ref()?)));
+    let differs = claim.differs.as_ref().and_then(|words| Some(("differs", words.band.as_ref()?)));
+    for (kind, name) in [equals, agree, differs].into_iter().flatten() {
+        band(at.to(kind).to("band"), name, known);
+    }
     if let Some(equals) = &claim.equals {
         expected(at.to("equals"), equals, known);
     }
@@ -133,6 +141,15 @@ pub(super) fn estimator(at: At, name: &str, known: &Known) {
     if !known.estimators.contains(&name) {
         let help = suggest::help(name, &known.estimators, "estimators");
         at.report_help(format!("unknown estimator `{name}`"), help);
+    }
+}
+
+/// A band of this name is there.
+fn band(at: At, name: &str, known: &Known) {
+    let Some(bands) = &known.bands else { return };
+    if !bands.iter().any(|band| band == name) {
+        let names: Vec<&str> = bands.iter().map(String::as_str).collect();
+        at.report_help(format!("unknown band `{name}`"), suggest::help(name, &names, "bands"));
     }
 }
 
