@@ -187,3 +187,61 @@ impl From<FittedWords> for FittedDipole {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model(text: &str) -> Result<Model, serde_json::Error> {
+        serde_json::from_str::<ModelWords>(text).map(|words| Model::from(&words))
+    }
+
+    /// Every word means what it says, and what is left out is exact, plain, the searchlight, six terms.
+    #[test]
+    fn words_of_every_model() {
+        let exact = MomentKind::Exact;
+        let polynomial = MomentKind::Polynomial;
+        for (text, expected) in [
+            (r#"{"classical": {}}"#, Model::Classical { moments: exact, outgoing: Outgoing::Plain }),
+            (
+                r#"{"classical": {"moments": "polynomial", "outgoing": "normalised"}}"#,
+                Model::Classical { moments: polynomial, outgoing: Outgoing::Normalised },
+            ),
+            (r#"{"better": {}}"#, Model::Better { moments: exact }),
+            (r#"{"better": {"moments": "polynomial"}}"#, Model::Better { moments: polynomial }),
+            (r#"{"directional": {}}"#, Model::Directional { moments: exact }),
+            (r#"{"normalized": {}}"#, Model::Normalized { scaling: Scaling::Searchlight, albedo: None }),
+            (
+                r#"{"normalized": {"scaling": "diffuse", "albedo": [0.5]}}"#,
+                Model::Normalized { scaling: Scaling::Diffuse, albedo: Some(vec![0.5]) },
+            ),
+            (
+                r#"{"normalized": {"scaling": "dmfp"}}"#,
+                Model::Normalized { scaling: Scaling::DiffuseMeanFreePath, albedo: None },
+            ),
+            (
+                r#"{"skin": {"reflectance": [0.4, 0.2, 0.1]}}"#,
+                Model::Skin { reflectance: [0.4, 0.2, 0.1] },
+            ),
+            (
+                r#"{"gaussians": {"dipole": "better"}}"#,
+                Model::Gaussians { dipole: FittedDipole::Better, moments: exact, terms: 6 },
+            ),
+            (
+                r#"{"gaussians": {"dipole": "classical", "moments": "polynomial", "terms": 4}}"#,
+                Model::Gaussians { dipole: FittedDipole::Classical, moments: polynomial, terms: 4 },
+            ),
+        ] {
+            assert_eq!(model(text).unwrap(), expected, "{text}");
+        }
+        for text in [
+            r#"{"better": {"outgoing": "plain"}}"#,
+            r#"{"skin": {}}"#,
+            r#"{"skin": {"reflectance": [0.4]}}"#,
+            r#"{"gaussians": {}}"#,
+            r#"{"quantized": {}}"#,
+        ] {
+            assert!(model(text).is_err(), "{text}");
+        }
+    }
+}

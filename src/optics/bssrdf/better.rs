@@ -43,8 +43,7 @@ impl Better {
         let z_real = 1.0 / sigma_t;
         let z_virtual = z_real + 4.0 * moments.mismatch_of_flux() * diffusion;
         let strength = albedo * albedo / (4.0 * PI);
-        let [flux, fluence] =
-            [strength * moments.c_e(), strength * moments.c_phi() / diffusion];
+        let [flux, fluence] = [strength * moments.c_e(), strength * moments.c_phi() / diffusion];
         let apart = z_virtual - z_real;
         // (1 - e^(-s apart)) / s.
         let between = if s > 0.0 { -exp_m1(-s * apart) / s } else { apart };

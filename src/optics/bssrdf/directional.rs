@@ -37,7 +37,6 @@ use super::moments::Moments;
 use super::reduced::Reduced;
 use super::{Entry, Exit};
 use crate::math::{DVec3, Frame, exp};
-use crate::optics::medium::Medium;
 
 /// d_e over D / sqrt(alpha'): the extrapolation distance, journal version.
 const EXTRAPOLATION: f64 = 2.131;
@@ -82,9 +81,8 @@ pub struct Parts {
 }
 
 impl Directional {
-    /// For a medium that scatters.
-    pub fn new(medium: &Medium, moments: &Moments) -> Directional {
-        let reduced = Reduced::of(medium);
+    /// For a medium that scatters: its reduced coefficients and its own, unreduced sigma_t, 1/mm.
+    pub fn new(reduced: &Reduced, sigma_t: f64, moments: &Moments) -> Directional {
         let diffusion = 1.0 / (3.0 * reduced.sigma_t);
         let extrapolation = EXTRAPOLATION * diffusion / reduced.albedo.sqrt();
         let scale = 1.0 / (moments.passed() * 4.0 * PI * PI);
@@ -93,10 +91,10 @@ impl Directional {
             sigma_tr: reduced.sigma_tr(),
             extrapolation,
             mirror: 2.0 * moments.mismatch_of_flux() * extrapolation,
-            correction: 1.0 / (9.0 * medium.sigma_t * medium.sigma_t),
+            correction: 1.0 / (9.0 * sigma_t * sigma_t),
             fluence: scale * moments.c_phi(),
             flux: scale * moments.c_e(),
-            classical: Classical::new(&reduced, moments),
+            classical: Classical::new(reduced, moments),
         }
     }
 
@@ -168,7 +166,11 @@ fn tangent_plane(x: DVec3, square: f64, entry: &Entry, exit: &Exit) -> DVec3 {
     let orthogonal = |v: DVec3| v - v.dot(x) / square * x;
     let normal = orthogonal(entry.normal);
     let length = normal.length();
-    if length > PARALLEL { normal / length } else { tangent_plane_below(x, orthogonal(-entry.dir), exit) }
+    if length > PARALLEL {
+        normal / length
+    } else {
+        tangent_plane_below(x, orthogonal(-entry.dir), exit)
+    }
 }
 
 /// n_i* where x is parallel to n_i; `against` is what of -w12 is orthogonal to x.

@@ -128,14 +128,16 @@ impl Target {
         // Unknowns in units that make the diagonal 1.
         let lengths: Vec<f64> = columns.iter().map(|c| (dot(c, c) + row).sqrt()).collect();
         let n = columns.len();
-        let gram = |i: usize, j: usize| (dot(&columns[i], &columns[j]) + row) / (lengths[i] * lengths[j]);
+        let gram =
+            |i: usize, j: usize| (dot(&columns[i], &columns[j]) + row) / (lengths[i] * lengths[j]);
         let gram: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| gram(i, j)).collect()).collect();
         let right = |i: usize| (dot(&columns[i], &target) + row * self.total) / lengths[i];
         let right: Vec<f64> = (0..n).map(right).collect();
         let mut weights = non_negative_least_squares(&gram, &right);
         weights.iter_mut().zip(&lengths).for_each(|(weight, length)| *weight /= length);
         let sum: f64 = weights.iter().sum();
-        let term = |(weight, &variance): (f64, &f64)| Term { weight: weight * self.total / sum, variance };
+        let term =
+            |(weight, &variance): (f64, &f64)| Term { weight: weight * self.total / sum, variance };
         weights.into_iter().zip(variances).map(term).filter(|term| term.weight > 0.0).collect()
     }
 

@@ -184,7 +184,8 @@ impl Model {
             leaves_out_single: false,
             fit_error: None,
         };
-        let normalised = |profile, moments: &Moments| Kernel::radial(profile, Outgoing::Normalised, moments);
+        let normalised =
+            |profile, moments: &Moments| Kernel::radial(profile, Outgoing::Normalised, moments);
         match *self {
             Model::Classical { moments, outgoing } => {
                 let moments = moments.of_classical(eta);
@@ -200,9 +201,10 @@ impl Model {
                 Ok(Bssrdf { sigma_tr, leaves_out_single: true, ..bssrdf(kernel) })
             }
             Model::Directional { moments } => {
-                let directional = Directional::new(medium, &moments.of_flux(eta));
+                let directional = Directional::new(&reduced, medium.sigma_t, &moments.of_flux(eta));
                 let sigma_s = medium.sigma_t * medium.albedo;
-                let straight_sigma_t = reduced.sigma_a + sigma_s * (1.0 - medium.phase.g * medium.phase.g);
+                let straight_sigma_t =
+                    reduced.sigma_a + sigma_s * (1.0 - medium.phase.g * medium.phase.g);
                 Ok(Bssrdf { straight_sigma_t, ..bssrdf(Kernel::Directional(directional)) })
             }
             Model::Normalized { scaling, ref albedo } => {
@@ -215,9 +217,11 @@ impl Model {
                     Scaling::Searchlight | Scaling::Diffuse => 1.0 / reduced.sigma_t,
                     Scaling::DiffuseMeanFreePath if reduced.sigma_a > 0.0 => 1.0 / reduced.sigma_tr(),
                     Scaling::DiffuseMeanFreePath => {
-                        return Err("the medium does not absorb, so that it has no diffuse mean free path; use \
+                        return Err(
+                            "the medium does not absorb, so that it has no diffuse mean free path; use \
                                     the scaling `searchlight` or `diffuse`"
-                            .into());
+                                .into(),
+                        );
                     }
                 };
                 let profile = Profile::Normalized(Normalized::new(scaling, albedo, length));
@@ -264,7 +268,9 @@ fn one_of(name: &str, numbers: &[f64], band: usize, bands: usize) -> Result<f64,
         _ if numbers.len() == bands && band < bands => numbers[band],
         _ => {
             let n = numbers.len();
-            return Err(format!("`{name}` has {n} numbers; give one, or one for each of the {bands} bands"));
+            return Err(format!(
+                "`{name}` has {n} numbers; give one, or one for each of the {bands} bands"
+            ));
         }
     };
     if number > 0.0 && number <= 1.0 {
@@ -321,7 +327,9 @@ impl Bssrdf {
     pub fn techniques(&self) -> Vec<(f64, Radial)> {
         match &self.kernel {
             Kernel::Radial { profile, .. } => profile.techniques(),
-            Kernel::Directional(directional) => vec![(1.0, Radial::Dipole(directional.classical().shape()))],
+            Kernel::Directional(directional) => {
+                vec![(1.0, Radial::Dipole(directional.classical().shape()))]
+            }
         }
     }
 
@@ -368,7 +376,10 @@ impl Profile {
             Profile::Gaussians(gaussians) => {
                 let total = gaussians.total();
                 let radial = |term: &Term| {
-                    (term.weight / total, Radial::Gaussian { variance: term.variance, r_max: f64::INFINITY })
+                    (
+                        term.weight / total,
+                        Radial::Gaussian { variance: term.variance, r_max: f64::INFINITY },
+                    )
                 };
                 gaussians.terms().iter().map(radial).collect()
             }
