@@ -18,8 +18,8 @@ use std::f64::consts::PI;
 
 use super::moments::Moments;
 use super::reduced::Reduced;
-use crate::math::{exp, exp_m1};
-use crate::sampling::radial::Dipole;
+use crate::math::{cbrt, exp, exp_m1};
+use crate::sampling::radial::{Dipole, Radial};
 
 /// The better dipole's profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,6 +69,33 @@ impl Better {
         let from_virtual = z_virtual * (1.0 + s * d_v) * (1.0 - lost) / (square_v * d_v);
         let fluence = (delta / d_r + lost) / d_v;
         exp(-s * d_r) * (self.flux * (from_real + from_virtual) + self.fluence * fluence)
+    }
+
+    /// Ways to draw distances, with their shares: R almost exactly.
+    ///
+    /// Since -d/dz (e^(-s d)/d) = z (1 + s d) e^(-s d)/d^3 =: q(z), the fluences' difference is int_z_r^z_v q dz, and R is
+    ///   flux (q(z_r) + q(z_v)) + fluence int_z_r^z_v q(z) dz:
+    /// sources of the classical kind at the two ends and all depths between. Two sources of one strength are a
+    /// [`Dipole`]; the integral becomes three of them, by Gauss's rule of two nodes (which weighs them alike) on three
+    /// parts of the range that widen by one factor. A source at z has the integral 2 pi e^(-s z) over the plane.
+    pub fn techniques(&self) -> Vec<(f64, Radial)> {
+        let Dipole { sigma_tr, z_real, z_virtual } = self.shape;
+        let factor = cbrt(z_virtual / z_real);
+        let mut parts = vec![(self.flux, self.shape)];
+        let mut low = z_real;
+        for _ in 0..3 {
+            let (middle, half) = (0.5 * low * (factor + 1.0), 0.5 * low * (factor - 1.0));
+            let node = half / 3f64.sqrt();
+            let pair = Dipole { sigma_tr, z_real: middle - node, z_virtual: middle + node };
+            parts.push((self.fluence * half, pair));
+            low *= factor;
+        }
+        let mass = |(weight, pair): &(f64, Dipole)| {
+            weight
+                * (exp(-sigma_tr * (pair.z_real - z_real)) + exp(-sigma_tr * (pair.z_virtual - z_real)))
+        };
+        let all: f64 = parts.iter().map(mass).sum();
+        parts.iter().map(|part| (mass(part) / all, Radial::Dipole(part.1))).collect()
     }
 
     /// R over the plane.

@@ -322,8 +322,8 @@ impl Bssrdf {
     }
 
     /// Ways to draw the distance between entry and exit on a plane, with their shares (which sum to 1), that together
-    /// follow the kernel: exactly those of the classical dipole, of normalized diffusion and of Gaussians; for the other
-    /// two dipoles the classical shape with their own sources.
+    /// follow the kernel: exactly those of the classical dipole, of normalized diffusion and of Gaussians, nearly those of
+    /// the better dipole; those of the directional dipole are of the classical shape.
     pub fn techniques(&self) -> Vec<(f64, Radial)> {
         match &self.kernel {
             Kernel::Radial { profile, .. } => profile.techniques(),
@@ -369,7 +369,7 @@ impl Profile {
     fn techniques(&self) -> Vec<(f64, Radial)> {
         match self {
             Profile::Classical(classical) => vec![(1.0, Radial::Dipole(classical.shape()))],
-            Profile::Better(better) => vec![(1.0, Radial::Dipole(better.shape()))],
+            Profile::Better(better) => better.techniques(),
             Profile::Normalized(normalized) => {
                 vec![(1.0, Radial::NormalizedDiffusion { d: normalized.d() })]
             }

@@ -6,6 +6,7 @@ use super::super::{Bssrdf, Entry, Exit, FittedDipole, Model, MomentKind, Outgoin
 use crate::math::{DVec3, integrate};
 use crate::optics::fresnel::fresnel;
 use crate::optics::medium::Medium;
+use crate::sampling::radial::Radial;
 
 const EXACT: MomentKind = MomentKind::Exact;
 const PLAIN: Model = Model::Classical { moments: EXACT, outgoing: Outgoing::Plain };
@@ -53,7 +54,7 @@ fn ends(scale: f64) -> (Entry, Exit) {
     (entry, Exit { point: scale * DVec3::new(1.1, -0.4, 0.5), normal })
 }
 
-/// K(r; k sigma) = k^2 K(k r; sigma).
+/// K(r; k sigma) = k^2 K(k r; sigma). A fit solves equations that amplify rounding errors, most where it is small.
 #[test]
 fn lengths_scale() {
     let k = 3.7;
@@ -61,17 +62,18 @@ fn lengths_scale() {
         let dense = Medium { sigma_t: k * medium.sigma_t, ..medium };
         for model in all().iter().filter(|model| **model != SKIN) {
             let [thin, thick] = [medium, dense].map(|medium| of(model, &medium, 1.3));
+            let tolerance = if *model == FITTED { 1e-7 } else { 1e-11 };
             for r in [0.01, 0.3, 2.0] {
                 let ratio = at(&thick, r) / (k * k * at(&thin, k * r));
-                assert!((ratio - 1.0).abs() < 1e-10, "{model:?} {medium:?} {r}: {ratio}");
+                assert!((ratio - 1.0).abs() < tolerance, "{model:?} {medium:?} {r}: {ratio}");
                 let ratio = thick.falloff(r) / (k * k * thin.falloff(k * r));
-                assert!((ratio - 1.0).abs() < 1e-10, "{model:?} {medium:?} {r}: {ratio}");
+                assert!((ratio - 1.0).abs() < tolerance, "{model:?} {medium:?} {r}: {ratio}");
             }
             let [(entry, exit), (far_entry, far_exit)] = [ends(1.0), ends(k)];
             let (got, expected) =
                 (thick.kernel(&entry, &exit), k * k * thin.kernel(&far_entry, &far_exit));
             assert!(
-                (got - expected).abs() <= 1e-10 * expected,
+                (got - expected).abs() <= tolerance * expected,
                 "{model:?} {medium:?}: {got} {expected}"
             );
             assert!((thick.sigma_tr / (k * thin.sigma_tr) - 1.0).abs() < 1e-14);
@@ -99,7 +101,8 @@ fn boundaries_become_matched() {
     assert_eq!(at(&of(&polynomial, &media()[0], 1.0), 1.0), at(&of(&BETTER, &media()[0], 1.0), 1.0));
 }
 
-/// d ln(R r^2)/dr -> -s for the dipoles; the next term of their far field is 1/(s r)^2 of it.
+/// d ln(R r^2)/dr -> -s for the dipoles. The next terms are 1/(s r)^2 of it, from (1 + s r)/r^3, and at most
+/// (z/r)^2 (1/2 + 3/(s r)), from d = r + z^2/(2r) - ...
 #[test]
 fn far_fields_fall_with_sigma_tr() {
     for medium in media() {
@@ -109,7 +112,10 @@ fn far_fields_fall_with_sigma_tr() {
             let (r, h) = (300.0 / s, 0.01 / s);
             let log = |r: f64| (model.falloff(r) * r * r).ln();
             let slope = (log(r + h) - log(r - h)) / (2.0 * h);
-            assert!((slope / s + 1.0).abs() < 1e-4, "{model:?}: {slope} {s}");
+            let Radial::Dipole(sources) = model.techniques()[0].1 else { panic!("not a dipole's") };
+            let z = sources.z_virtual;
+            let bound = 1.1 / (s * s * r * r) + 0.6 * z * z / (r * r);
+            assert!((slope / s + 1.0).abs() < bound, "{model:?}: {slope} {s}");
         }
     }
     // The better dipole's s is its own: with Grosjean's D.
@@ -155,28 +161,30 @@ fn the_way_out() {
     }
 }
 
-/// Kernel over density, on a plane: constant where the techniques follow the kernel exactly, within the bounds that
-/// were measured for the better dipole elsewhere.
+/// Kernel over density, on a plane: constant where the techniques follow the kernel exactly, within a hundredth for the
+/// better dipole's.
 #[test]
 fn techniques_follow_the_kernel() {
-    for medium in media() {
+    for (medium, eta) in
+        media().into_iter().flat_map(|medium| [0.8, 1.0, 1.3, 1.5].map(|eta| (medium, eta)))
+    {
         for model in all().iter().filter(|model| **model != DIRECTIONAL) {
-            let bssrdf = of(model, &medium, 1.3);
+            let bssrdf = of(model, &medium, eta);
             let techniques = bssrdf.techniques();
             assert!((techniques.iter().map(|t| t.0).sum::<f64>() - 1.0).abs() < 1e-14);
             let reach = 10.0 / bssrdf.sigma_tr.min(1.0);
-            let radii = (1..200).map(|i| reach * f64::from(i) * f64::from(i) / 4e4);
             let pdf = |r: f64| {
                 techniques.iter().map(|(share, radial)| share * radial.pdf_area(r)).sum::<f64>()
             };
-            let ratios: Vec<f64> =
-                radii.map(|r| bssrdf.falloff(r) / pdf(r)).filter(|x| x.is_finite()).collect();
+            let radii = (1..200).map(|i| reach * f64::from(i) * f64::from(i) / 4e4);
+            // Numbers near the least of f64 have no digits left.
+            let radii: Vec<f64> = radii.filter(|&r| pdf(r) > 1e-290).collect();
+            assert!(radii.len() > 20, "{model:?} {medium:?}");
+            let ratios: Vec<f64> = radii.iter().map(|&r| bssrdf.falloff(r) / pdf(r)).collect();
             let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
             let most = ratios.iter().copied().fold(0.0, f64::max);
-            let mean = integrate(|r| 2.0 * PI * r * bssrdf.falloff(r), 0.0, reach, 1e-12).value;
-            println!("{model:?} {:?} {} {}", medium, least / mean, most / mean);
-            let bound = if *model == BETTER { 2.0 } else { 1.0 + 1e-9 };
-            assert!(most / least < bound, "{model:?} {medium:?}: {least} {most}");
+            let bound = if *model == BETTER { 1.01 } else { 1.0 + 1e-9 };
+            assert!(most / least < bound, "{model:?} {medium:?} {eta}: {least} {most}");
         }
     }
 }
