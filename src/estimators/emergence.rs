@@ -88,7 +88,9 @@ impl Skin {
             )),
         });
         let eta = eta.collect::<Result<Vec<f64>>>()?;
-        let models = scene.medium.iter().zip(&eta).map(|(medium, &eta)| model.of(medium, eta));
+        let bands = eta.len();
+        let models = scene.medium.iter().zip(&eta).enumerate();
+        let models = models.map(|(band, (medium, &eta))| model.of(band, bands, medium, eta));
         let models =
             models.collect::<std::result::Result<Vec<Bssrdf>, String>>().map_err(Error::input)?;
         let mut groups: Vec<Vec<usize>> = Vec::new();

@@ -9,13 +9,38 @@
 //!
 //! | model | reciprocal | can be negative | energy | leaves out |
 //! |---|---|---|---|---|
-//! | classical dipole | yes | no | loses 1 - (1 - 2 C1(1/eta)) on the way out unless normalised | single scattering is counted as diffusion |
+//! | classical dipole | yes | no | loses 2 C1(1/eta) of the exitance on the way out unless normalised; at most the power that enters | nothing by its source's measure (its albedo counts all light), yet single scattering is added to it: see below |
+//! | better dipole | yes | no | normalised; up to a tenth above the truth with single scattering added | single scattering |
+//! | directional dipole | no | yes, and is clamped at 0 | not bounded: up to 1.1 of what enters at a high albedo, 0.1 at none | nothing; light that goes straight through has its own extinction |
+//! | normalized diffusion | yes | no | normalised; exactly the albedo that it is given | nothing |
+//! | Gaussians: skin | yes | no | normalised; exactly the reflectance that it is given | nothing |
+//! | Gaussians: a fit | yes | no | normalised; exactly its dipole's | what its dipole leaves out |
+//!
+//! "Reciprocal" is of K with its ends exchanged, where the coefficients are the same everywhere. The normalised models
+//! have K = R / (pi (1 - 2 C1(1/eta))), so that their hemispherical exitance under T21 is R.
+//! The classical dipole's total is the whole diffuse reflectance within 0.03 of exact transport, so that single
+//! scattering on top of it is counted twice in part; its source adds it nonetheless, and `leaves_out_single` says so.
 
+mod better;
 mod classical;
+mod directional;
+mod fit;
+mod gaussians;
 mod moments;
+mod normalized;
+mod reduced;
+pub mod single;
+#[cfg(test)]
+mod tests;
 
+pub use better::Better;
 pub use classical::Classical;
+pub use directional::{Directional, Parts};
+pub use fit::{Fit, FitError, MOST_TERMS, fit};
+pub use gaussians::{Gaussians, SKIN, Term};
 pub use moments::{MomentKind, Moments};
+pub use normalized::{Normalized, Scaling};
+pub use reduced::Reduced;
 
 use crate::math::DVec3;
 use crate::optics::medium::Medium;
@@ -61,24 +86,70 @@ pub enum Model {
         /// The way out.
         outgoing: Outgoing,
     },
+    /// d'Eon 2012.
+    Better {
+        /// Whose Fresnel moments.
+        moments: MomentKind,
+    },
+    /// Frisvad, Hachisuka & Kjeldsen 2014.
+    Directional {
+        /// Whose Fresnel moments.
+        moments: MomentKind,
+    },
+    /// Christensen & Burley 2015.
+    Normalized {
+        /// Which fit.
+        scaling: Scaling,
+        /// Diffuse reflectance of light that has entered: one number for all bands or one per band, in (0, 1]; that of
+        /// the classical dipole (exact moments) without it.
+        albedo: Option<Vec<f64>>,
+    },
+    /// Skin, d'Eon & Luebke 2007, for the bands red, green and blue; of the medium it uses nothing.
+    Skin {
+        /// Diffuse reflectance per band, in (0, 1].
+        reflectance: [f64; 3],
+    },
+    /// A dipole's profile as a sum of Gaussians.
+    Gaussians {
+        /// Which dipole's.
+        dipole: FittedDipole,
+        /// Whose Fresnel moments.
+        moments: MomentKind,
+        /// How many, 1 to [`MOST_TERMS`].
+        terms: usize,
+    },
+}
+
+/// Profiles that are fitted by Gaussians.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FittedDipole {
+    /// The classical one's.
+    Classical,
+    /// The better one's.
+    Better,
 }
 
 /// A model with the numbers of one band.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bssrdf {
     kernel: Kernel,
-    /// Effective transport coefficient, 1/mm: how fast the far field falls.
+    /// Effective transport coefficient, 1/mm: how fast the far field falls. Normalized diffusion and Gaussians have none
+    /// of their own: theirs is the classical dipole's, sqrt(3 sigma_a sigma_t') of the medium.
     pub sigma_tr: f64,
     /// Extinction of what goes straight through, 1/mm.
     pub straight_sigma_t: f64,
     /// Whether single scattering is left to an estimator of its own.
     pub leaves_out_single: bool,
+    /// How far a fit by Gaussians is off.
+    pub fit_error: Option<FitError>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 enum Kernel {
     /// `scale` times R(|xo - xi|).
     Radial { profile: Profile, scale: f64 },
+    /// Of more than the distance.
+    Directional(Directional),
 }
 
 /// R(r), the exitance at distance r from a beam of power 1 that has entered a half-space; 1/mm^2.
@@ -86,28 +157,143 @@ enum Kernel {
 pub enum Profile {
     /// Classical dipole.
     Classical(Classical),
+    /// Better dipole.
+    Better(Better),
+    /// Normalized diffusion.
+    Normalized(Normalized),
+    /// A sum of Gaussians.
+    Gaussians(Gaussians),
 }
 
 impl Model {
-    /// The model for a band's medium and index (inside over outside; 1 where the boundary is matched).
+    /// The model for band `band` of `bands`, with that band's medium and index (inside over outside; 1 where the
+    /// boundary is matched).
     ///
     /// # Errors
-    /// What the medium lacks (scattering, absorption), in words.
-    pub fn of(&self, medium: &Medium, eta: f64) -> Result<Bssrdf, String> {
-        if medium.albedo <= 0.0 {
-            return Err("the medium does not scatter".into());
+    /// What the medium lacks (scattering, absorption) or what does not fit the bands, in words.
+    pub fn of(&self, band: usize, bands: usize, medium: &Medium, eta: f64) -> Result<Bssrdf, String> {
+        let reduced = Reduced::of(medium);
+        let scatters = medium.albedo > 0.0 && reduced.albedo > 0.0;
+        if !scatters && !matches!(self, Model::Skin { .. }) {
+            return Err("the medium does not scatter, and a BSSRDF is of scattered light".into());
         }
-        match self {
+        let bssrdf = |kernel: Kernel| Bssrdf {
+            kernel,
+            sigma_tr: reduced.sigma_tr(),
+            straight_sigma_t: medium.sigma_t,
+            leaves_out_single: false,
+            fit_error: None,
+        };
+        let normalised =
+            |profile, moments: &Moments| Kernel::radial(profile, Outgoing::Normalised, moments);
+        match *self {
             Model::Classical { moments, outgoing } => {
-                let moments = Moments::new(*moments, eta);
-                let classical = Classical::new(medium, &moments);
-                Ok(Bssrdf {
-                    sigma_tr: classical.sigma_tr(),
-                    straight_sigma_t: medium.sigma_t,
-                    leaves_out_single: true,
-                    kernel: Kernel::radial(Profile::Classical(classical), *outgoing, &moments),
-                })
+                let moments = moments.of_classical(eta);
+                let profile = Profile::Classical(Classical::new(&reduced, &moments));
+                let kernel = Kernel::radial(profile, outgoing, &moments);
+                Ok(Bssrdf { leaves_out_single: true, ..bssrdf(kernel) })
             }
+            Model::Better { moments } => {
+                let moments = moments.of_flux(eta);
+                let better = Better::new(&reduced, &moments);
+                let sigma_tr = better.sigma_tr();
+                let kernel = normalised(Profile::Better(better), &moments);
+                Ok(Bssrdf { sigma_tr, leaves_out_single: true, ..bssrdf(kernel) })
+            }
+            Model::Directional { moments } => {
+                let directional = Directional::new(&reduced, medium.sigma_t, &moments.of_flux(eta));
+                let sigma_s = medium.sigma_t * medium.albedo;
+                let straight_sigma_t =
+                    reduced.sigma_a + sigma_s * (1.0 - medium.phase.g * medium.phase.g);
+                Ok(Bssrdf { straight_sigma_t, ..bssrdf(Kernel::Directional(directional)) })
+            }
+            Model::Normalized { scaling, ref albedo } => {
+                let moments = Moments::exact(eta);
+                let albedo = match albedo {
+                    Some(given) => one_of("albedo", given, band, bands)?,
+                    None => Classical::new(&reduced, &moments).total(),
+                };
+                let length = match scaling {
+                    Scaling::Searchlight | Scaling::Diffuse => 1.0 / reduced.sigma_t,
+                    Scaling::DiffuseMeanFreePath if reduced.sigma_a > 0.0 => 1.0 / reduced.sigma_tr(),
+                    Scaling::DiffuseMeanFreePath => {
+                        return Err(
+                            "the medium does not absorb, so that it has no diffuse mean free path; use \
+                                    the scaling `searchlight` or `diffuse`"
+                                .into(),
+                        );
+                    }
+                };
+                let profile = Profile::Normalized(Normalized::new(scaling, albedo, length));
+                Ok(bssrdf(normalised(profile, &moments)))
+            }
+            Model::Skin { reflectance } => {
+                if bands != 3 {
+                    return Err(format!(
+                        "the published Gaussians of skin are of three bands (red, green, blue), here are {bands}"
+                    ));
+                }
+                let reflectance = one_of("reflectance", &reflectance, band, bands)?;
+                let profile = Profile::Gaussians(Gaussians::skin(band, reflectance));
+                Ok(bssrdf(normalised(profile, &Moments::exact(eta))))
+            }
+            Model::Gaussians { dipole, moments, terms } => {
+                if !(1..=MOST_TERMS).contains(&terms) {
+                    return Err(format!("a fit has 1 to {MOST_TERMS} Gaussians, not {terms}"));
+                }
+                let length = 1.0 / reduced.sigma_t;
+                let (fitted, moments) = match dipole {
+                    FittedDipole::Classical => {
+                        let moments = moments.of_classical(eta);
+                        let classical = Classical::new(&reduced, &moments);
+                        (fit(|r| classical.exitance(r), classical.total(), length, terms), moments)
+                    }
+                    FittedDipole::Better => {
+                        let moments = moments.of_flux(eta);
+                        let better = Better::new(&reduced, &moments);
+                        (fit(|r| better.exitance(r), better.total(), length, terms), moments)
+                    }
+                };
+                let kernel = normalised(Profile::Gaussians(fitted.gaussians), &moments);
+                Ok(Bssrdf { leaves_out_single: true, fit_error: Some(fitted.error), ..bssrdf(kernel) })
+            }
+        }
+    }
+}
+
+/// The number of a band among one for all or one for each, which lies in (0, 1].
+fn one_of(name: &str, numbers: &[f64], band: usize, bands: usize) -> Result<f64, String> {
+    let number = match *numbers {
+        [all] => all,
+        _ if numbers.len() == bands && band < bands => numbers[band],
+        _ => {
+            let n = numbers.len();
+            return Err(format!(
+                "`{name}` has {n} numbers; give one, or one for each of the {bands} bands"
+            ));
+        }
+    };
+    if number > 0.0 && number <= 1.0 {
+        Ok(number)
+    } else {
+        Err(format!("`{name}` is {number}; it lies above 0 and is at most 1"))
+    }
+}
+
+impl MomentKind {
+    /// For the classical dipole.
+    fn of_classical(self, eta: f64) -> Moments {
+        match self {
+            MomentKind::Exact => Moments::exact(eta),
+            MomentKind::Polynomial => Moments::egan_hilgeman(eta),
+        }
+    }
+
+    /// For the better and the directional dipole.
+    fn of_flux(self, eta: f64) -> Moments {
+        match self {
+            MomentKind::Exact => Moments::exact(eta),
+            MomentKind::Polynomial => Moments::deon_irving(eta),
         }
     }
 }
@@ -127,20 +313,22 @@ impl Kernel {
     fn radial(profile: Profile, outgoing: Outgoing, moments: &Moments) -> Kernel {
         let passed = match outgoing {
             Outgoing::Plain => 1.0,
-            Outgoing::Normalised => 1.0 - moments.c1_external,
+            Outgoing::Normalised => moments.passed(),
         };
         Kernel::Radial { profile, scale: 1.0 / (std::f64::consts::PI * passed) }
     }
 }
 
 impl Bssrdf {
-    /// K: the BSSRDF without the Fresnel transmittances at its two ends, 1/(mm^2 sr).
+    /// K: the BSSRDF without the Fresnel transmittances at its two ends, 1/(mm^2 sr). Normalized diffusion's is infinite
+    /// where the ends coincide.
     #[inline]
     pub fn kernel(&self, entry: &Entry, exit: &Exit) -> f64 {
         match &self.kernel {
             Kernel::Radial { profile, scale } => {
                 scale * profile.exitance((exit.point - entry.point).length())
             }
+            Kernel::Directional(directional) => directional.kernel(entry, exit),
         }
     }
 
@@ -152,18 +340,24 @@ impl Bssrdf {
     }
 
     /// Ways to draw the distance between entry and exit on a plane, with their shares (which sum to 1), that together
-    /// follow the kernel.
+    /// follow the kernel: exactly those of the classical dipole, of normalized diffusion and of Gaussians, nearly those of
+    /// the better dipole; those of the directional dipole are of the classical shape.
     pub fn techniques(&self) -> Vec<(f64, Radial)> {
         match &self.kernel {
             Kernel::Radial { profile, .. } => profile.techniques(),
+            Kernel::Directional(directional) => {
+                vec![(1.0, Radial::Dipole(directional.classical().shape()))]
+            }
         }
     }
 
     /// A non-increasing function of distance that the kernel follows, relative to its own largest value or not: what an
-    /// acceptance in proportion to the kernel uses; 1/mm^2.
+    /// acceptance in proportion to the kernel uses; 1/mm^2. The directional dipole's is the classical one of its medium;
+    /// normalized diffusion's is infinite at 0.
     pub fn falloff(&self, r: f64) -> f64 {
         match &self.kernel {
             Kernel::Radial { profile, .. } => profile.exitance(r),
+            Kernel::Directional(directional) => directional.classical().exitance(r),
         }
     }
 }
@@ -174,6 +368,9 @@ impl Profile {
     pub fn exitance(&self, r: f64) -> f64 {
         match self {
             Profile::Classical(classical) => classical.exitance(r),
+            Profile::Better(better) => better.exitance(r),
+            Profile::Normalized(normalized) => normalized.exitance(r),
+            Profile::Gaussians(gaussians) => gaussians.exitance(r),
         }
     }
 
@@ -181,12 +378,29 @@ impl Profile {
     pub fn total(&self) -> f64 {
         match self {
             Profile::Classical(classical) => classical.total(),
+            Profile::Better(better) => better.total(),
+            Profile::Normalized(normalized) => normalized.total(),
+            Profile::Gaussians(gaussians) => gaussians.total(),
         }
     }
 
     fn techniques(&self) -> Vec<(f64, Radial)> {
         match self {
             Profile::Classical(classical) => vec![(1.0, Radial::Dipole(classical.shape()))],
+            Profile::Better(better) => better.techniques(),
+            Profile::Normalized(normalized) => {
+                vec![(1.0, Radial::NormalizedDiffusion { d: normalized.d() })]
+            }
+            Profile::Gaussians(gaussians) => {
+                let total = gaussians.total();
+                let radial = |term: &Term| {
+                    (
+                        term.weight / total,
+                        Radial::Gaussian { variance: term.variance, r_max: f64::INFINITY },
+                    )
+                };
+                gaussians.terms().iter().map(radial).collect()
+            }
         }
     }
 }
