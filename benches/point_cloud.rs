@@ -57,7 +57,7 @@ fn row(name: &str, radius: f64, count: usize) {
     let model = Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
     let of = |band: usize| {
         let medium = Medium::new(material.sigma_a[band], material.reduced_sigma_s[band], 0.0);
-        model.of(&medium, material.eta).expect("a model")
+        model.of(band, 3, &medium, material.eta).expect("a model")
     };
     let models: Vec<Bssrdf> = (0..3).map(of).collect();
     let sigma = models.iter().map(|model| model.sigma_tr).sum::<f64>() / 3.0;

@@ -73,7 +73,7 @@ fn measure(name: &str, scene: &Arc<Scene>, options: PointCloudOptions, passes: u
 ///   T21 L (1 - 2 C1(1/eta)) int_0^2R R(d) 2 pi d dd.
 fn expected(scene: &Scene, band: usize) -> f64 {
     let options = options(Acceptance::All, Search::Scan);
-    let model = options.model.of(&scene.medium[band], ETA).expect("a model");
+    let model = options.model.of(band, 3, &scene.medium[band], ETA).expect("a model");
     let entering = 1.0 - integrate(|mu| 2.0 * mu * fresnel(mu, ETA).reflectance, 0.0, 1.0, 1e-12).value;
     let profile = integrate(|d| 2.0 * PI * d * model.falloff(d), 0.0, 2.0 * RADIUS, 1e-12).value;
     (1.0 - fresnel(1.0, ETA).reflectance) * (band + 1) as f64 * entering * profile

@@ -303,7 +303,26 @@ impl std::fmt::Display for Model {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Model::Classical { moments, outgoing } => {
-                write!(f, "the classical dipole ({moments:?} moments, {outgoing:?} outgoing)")
+                let outgoing = match outgoing {
+                    Outgoing::Plain => "as published on the way out",
+                    Outgoing::Normalised => "normalised on the way out",
+                };
+                write!(f, "the classical dipole ({moments}, {outgoing})")
+            }
+            Model::Better { moments } => write!(f, "the better dipole ({moments})"),
+            Model::Directional { moments } => write!(f, "the directional dipole ({moments})"),
+            Model::Normalized { scaling, albedo } => {
+                let albedo =
+                    if albedo.is_some() { "a stated albedo" } else { "the classical dipole's albedo" };
+                write!(f, "normalized diffusion ({scaling}, {albedo})")
+            }
+            Model::Skin { .. } => write!(f, "six Gaussians of skin"),
+            Model::Gaussians { dipole, moments, terms } => {
+                let dipole = match dipole {
+                    FittedDipole::Classical => "classical",
+                    FittedDipole::Better => "better",
+                };
+                write!(f, "{terms} Gaussians fitted to the {dipole} dipole ({moments})")
             }
         }
     }
@@ -336,6 +355,7 @@ impl Bssrdf {
     pub fn needs_directions(&self) -> bool {
         match &self.kernel {
             Kernel::Radial { .. } => false,
+            Kernel::Directional(_) => true,
         }
     }
 

@@ -19,6 +19,15 @@ pub enum MomentKind {
     Polynomial,
 }
 
+impl std::fmt::Display for MomentKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            MomentKind::Exact => "exact moments",
+            MomentKind::Polynomial => "polynomial moments",
+        })
+    }
+}
+
 /// 2 C1 and 3 C2 for light inside that meets the boundary; 2 C1 also from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moments {

@@ -25,6 +25,16 @@ pub enum Scaling {
     DiffuseMeanFreePath,
 }
 
+impl std::fmt::Display for Scaling {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Scaling::Searchlight => "searchlight",
+            Scaling::Diffuse => "diffuse light",
+            Scaling::DiffuseMeanFreePath => "diffuse mean free path",
+        })
+    }
+}
+
 impl Scaling {
     /// s for the surface's albedo.
     pub fn shape(self, albedo: f64) -> f64 {
