@@ -51,7 +51,7 @@ impl<'a> Builder<'a> {
     pub fn scene(&mut self, cell: &CellSpec) -> Result<Scene> {
         let shape = self.shape(&cell.object.shape)?;
         let boundary = self.boundary(&cell.object.boundary)?;
-        let medium = cell.object.medium.per_band(self.bands.len());
+        let medium = cell.object.medium.per_band(&self.experiment.file.bands.list());
         let medium = medium.ok_or_else(|| Error::input("the medium has no coefficients"))?;
         let medium = medium.iter().map(|m| Medium::new(m.sigma_a, m.sigma_s, m.g)).collect();
         let lights = cell.light.iter().enumerate();

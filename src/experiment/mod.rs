@@ -70,6 +70,9 @@ pub mod schema;
 /// The JSON Schema of a file.
 pub mod schema_json;
 
+/// Words for skin.
+mod skin;
+
 /// Words for `snee`, and its presets.
 pub mod snee;
 

@@ -5,6 +5,7 @@ use crate::math::{DVec3, cos, sin};
 use crate::optics::colour::{self, BandColours};
 use crate::optics::dispersion::{self, Dispersion};
 use crate::optics::materials;
+use crate::optics::skin::Skin;
 
 /// One wavelength band.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,10 +140,19 @@ pub fn eta_materials() -> Vec<&'static str> {
 }
 
 impl Medium {
-    /// The coefficients in each of `count` bands; none where a name is unknown or no pair is whole.
-    pub fn per_band(&self, count: usize) -> Option<Vec<BandMedium>> {
+    /// The coefficients in each band; none where a name is unknown, no pair is whole, or wavelengths are needed and
+    /// missing.
+    pub fn per_band(&self, bands: &[Band]) -> Option<Vec<BandMedium>> {
         match self {
-            Medium::Coefficients(coefficients) => coefficients.per_band(count),
+            Medium::Coefficients(coefficients) => coefficients.per_band(bands.len()),
+            Medium::Skin(words) => {
+                let g = words.g.unwrap_or(0.0);
+                let band = |band: &Band| {
+                    let (sigma_a, reduced) = Skin::from(words).band(band.range_nm?);
+                    Some(BandMedium { sigma_a, sigma_s: reduced / (1.0 - g), g })
+                };
+                bands.iter().map(band).collect()
+            }
             Medium::Preset { name, scale, g } => {
                 let material = materials::find(name)?;
                 let g = g.unwrap_or(0.0);
@@ -207,12 +217,13 @@ mod tests {
             reduced_sigma_s_per_mm: grey(1.5),
             ..none.clone()
         };
+        let two = Bands::Rgb {}.list()[..2].to_vec();
         for coefficients in [total, parts, reduced] {
-            assert_eq!(Medium::Coefficients(coefficients).per_band(2), Some(expected.clone()));
+            assert_eq!(Medium::Coefficients(coefficients).per_band(&two), Some(expected.clone()));
         }
         assert_eq!(none.per_band(2), None);
         let preset = Medium::Preset { name: "skin1".into(), scale: 2.0, g: Some(0.5) };
-        let red = preset.per_band(3).unwrap()[0];
+        let red = preset.per_band(&Bands::Rgb {}.list()).unwrap()[0];
         assert_eq!(red, BandMedium { sigma_a: 0.064, sigma_s: 2.96, g: 0.5 });
     }
 

@@ -11,6 +11,7 @@ use serde_json::Value;
 pub use super::claim_words::{Agree, ClaimEntry, Differs, Equals, Expect, Reproduces};
 pub use super::duel::{CONTROL, CostMeasure, Duel, Faster, NotSlower};
 use super::picture::PictureEntry;
+pub use super::skin::SkinFractions;
 
 /// One experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -350,6 +351,8 @@ pub enum Medium {
         #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 1))]
         g: Option<f64>,
     },
+    /// Skin by its constituents (Donner & Jensen 2006), spectral bands within 380 to 780 nm.
+    Skin(SkinFractions),
 }
 
 /// Coefficients: exactly one of the pairs (`sigma_t_per_mm`, `albedo`), (`sigma_a_per_mm`,

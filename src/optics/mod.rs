@@ -29,3 +29,6 @@ pub mod colour;
 
 /// Measured materials.
 pub mod materials;
+
+/// The spectrum of skin.
+pub mod skin;

@@ -3,7 +3,7 @@
 use super::{At, one_per_band, spectrum, value_rule};
 use crate::experiment::resolve::{Band, BandMedium, eta_materials};
 use crate::experiment::schema::{
-    Bands, Boundary, Coefficients, Eta, EtaFormula, Medium, Shape, Spectrum,
+    Bands, Boundary, Coefficients, Eta, EtaFormula, Medium, Shape, SkinFractions, Spectrum,
 };
 use crate::experiment::suggest;
 use crate::optics::materials;
@@ -96,6 +96,7 @@ fn eta(at: At, index: &Eta, bands: &[Band]) {
 fn medium(at: At, medium: &Medium, bands: &Bands) {
     match medium {
         Medium::Coefficients(given) => coefficients(at.to("coefficients"), given, bands.list().len()),
+        Medium::Skin(words) => skin(at.to("skin"), words, &bands.list()),
         Medium::Preset { name, .. } => {
             let at = at.to("preset");
             if materials::find(name).is_none() {
@@ -107,6 +108,20 @@ fn medium(at: At, medium: &Medium, bands: &Bands) {
                 at.report_help("built-in materials are measured in rgb bands only", help);
             }
         }
+    }
+}
+
+fn skin(at: At, words: &SkinFractions, bands: &[Band]) {
+    if words.melanin + words.blood > 1.0 {
+        at.to("blood").report("`melanin` and `blood` are volume fractions: their sum is at most 1");
+    }
+    let [from, to] = crate::optics::skin::RANGE_NM;
+    let is_known = |band: &Band| band.range_nm.is_some_and(|[a, b]| a >= from && b <= to);
+    if let Some(band) = bands.iter().find(|band| !is_known(band)) {
+        at.key().report_help(
+            format!("skin is known from {from} to {to} nm, and band `{}` is not within", band.name),
+            "use `bands.spectral`, or explicit bands with `from_nm` and `to_nm`",
+        );
     }
 }
 
@@ -149,7 +164,7 @@ fn conservative(at: At, medium: &Medium, bands: &[Band]) {
         Medium::Coefficients(given) if given.albedo.is_some() => "albedo",
         _ => "sigma_a_per_mm",
     };
-    let Some(coefficients) = medium.per_band(bands.len()) else { return };
+    let Some(coefficients) = medium.per_band(bands) else { return };
     let lossless = |(c, _): &(&BandMedium, &Band)| c.sigma_a == 0.0 && c.sigma_s > 0.0;
     if let Some((_, band)) = coefficients.iter().zip(bands).find(lossless) {
         at.to("coefficients").to(key).report_help(
