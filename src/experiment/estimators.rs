@@ -16,7 +16,15 @@ use crate::scene::{Scene, Sensor};
 pub fn builtin() -> Registry {
     Registry {
         samplers: super::samplers::builtin(),
-        entries: vec![PATH, SNEE, TWO_BOUNCE, BIDIRECTIONAL, LIGHT_TRACE],
+        entries: vec![
+            PATH,
+            SNEE,
+            TWO_BOUNCE,
+            BIDIRECTIONAL,
+            LIGHT_TRACE,
+            super::bssrdf_probe::BSSRDF_PROBE,
+            super::bssrdf_probe::BSSRDF_RAYS,
+        ],
     }
 }
 
@@ -74,7 +82,7 @@ const LIGHT_TRACE: RegistryEntry = RegistryEntry {
 };
 
 /// Whole paths start outside the body.
-fn looks_from_outside(kind: &str, scene: &Scene) -> Result<()> {
+pub fn looks_from_outside(kind: &str, scene: &Scene) -> Result<()> {
     match scene.sensor {
         Sensor::Vertex { .. } => Err(Error::input_help(
             format!("{kind} starts its paths outside the body, the sensor `vertex` stands inside"),
