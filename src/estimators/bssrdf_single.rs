@@ -81,3 +81,72 @@ fn scattered(
     let through = entrance.transmittance * transmittance(medium.sigma_t, way) * solid_angle;
     Some((arrival.light, medium.albedo * phase * through * arrival.value))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::geometry::Shape;
+    use crate::math::integrate;
+    use crate::optics::boundary::Boundary;
+    use crate::optics::bssrdf::{Exit, Model, MomentKind, Outgoing};
+    use crate::optics::fresnel::fresnel;
+    use crate::optics::medium::Medium;
+    use crate::optics::phase::HenyeyGreenstein;
+    use crate::scene::{Emission, Light, Scene, Sensor};
+    use crate::estimators::Layout;
+    use crate::geometry::FaceId;
+    use crate::sampling::distance::pdf_distance_exponential;
+
+    /// The mean over t, by quadrature, is albedo T12 p cos_i / (eta^2 (mu_i' + mu_o')) on a half-space: a deterministic
+    /// look at every factor of a sample.
+    #[test]
+    fn mean_over_distance_is_the_closed_form() {
+        for eta in [1.0, 1.3, 1.5] {
+            for toward in [DVec3::Z, DVec3::new(0.8, -0.1, 0.5), DVec3::new(-0.9, 0.3, 0.1)] {
+                let wi = toward.normalize();
+                let medium = Medium { sigma_t: 3.0, albedo: 0.8, phase: HenyeyGreenstein { g: 0.4 } };
+                let dir = DVec3::new(0.36, 0.48, -0.8);
+                let exit = Exit { point: DVec3::new(0.3, 0.2, 0.0), normal: DVec3::Z };
+                let sun = Emission::Directional { toward: wi, irradiance: vec![2.0] };
+                let sensor = Sensor::Probe { ray: Ray { origin: DVec3::Z, dir: -DVec3::Z }, paths: 1 };
+                let scene = Arc::new(Scene {
+                    shape: Arc::new(Shape::HalfSpace),
+                    boundary: vec![Boundary::Smooth { eta }],
+                    medium: vec![medium],
+                    lights: vec![Light { name: "sun".into(), emission: sun }],
+                    sensor,
+                });
+                let mut scores = Scores::new(Layout::new(&scene));
+                let model =
+                    Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
+                let skin = Skin::new(scene, &model, true).expect("a model");
+                let illumination = Illumination::new(&skin.scene);
+                let emergence = Emergence {
+                    exit,
+                    face: FaceId(0),
+                    dir,
+                    eta,
+                    bands: &[0],
+                    throughput: &[1.0],
+                    slot: 0,
+                };
+                let mut at = |t: f64| {
+                    let vertex = exit.point + dir * t;
+                    let drawn =
+                        scattered(&skin, &illumination, &emergence, 0, vertex, [0.5; 3], &mut scores);
+                    pdf_distance_exponential(3.0, t) * drawn.map_or(0.0, |(_, value)| value)
+                };
+                let mean = integrate(&mut at, 0.0, 15.0, 1e-13).value;
+                let surface = fresnel(wi.z, eta);
+                let inside = DVec3::new(-wi.x / eta, -wi.y / eta, -surface.cos_t);
+                let phase = medium.phase.pdf(-inside.dot(dir));
+                let f = medium.albedo * (1.0 - surface.reflectance) * phase
+                    / (eta * eta * (surface.cos_t + 0.8));
+                let expected = 2.0 * wi.z * f;
+                assert!((mean / expected - 1.0).abs() < 1e-9, "{eta} {toward}: {mean} {expected}");
+            }
+        }
+    }
+}
