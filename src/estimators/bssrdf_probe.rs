@@ -53,6 +53,7 @@ pub struct BssrdfProbe {
     illumination: Illumination,
     probes: usize,
     single: bool,
+    model: String,
     reach: Option<f64>,
 }
 
@@ -68,6 +69,7 @@ impl BssrdfProbe {
             illumination: Illumination::new(&skin.scene),
             probes: options.probes,
             single: adds_single(&skin, options.single),
+            model: options.model.to_string(),
             reach: options.reach,
             skin,
         })
@@ -83,7 +85,7 @@ impl Estimator for BssrdfProbe {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         for group in groups_among(&self.skin, bands) {
             for index in 0..self.skin.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(key, index, &group);
+                let streams = PathStreams::new(&self.skin, key, index, &group);
                 let mut gather = Probing { estimator: self, streams, hits: Vec::new() };
                 self.skin.play(&group, index, key, scores, &mut gather);
             }
@@ -92,6 +94,10 @@ impl Estimator for BssrdfProbe {
 
     fn band_use(&self) -> BandUse {
         BandUse::Shared
+    }
+
+    fn model(&self) -> Option<String> {
+        Some(self.model.clone())
     }
 
     fn bias(&self) -> Bias {
@@ -114,7 +120,7 @@ struct Probing<'a> {
 
 impl Gather for Probing<'_> {
     fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let BssrdfProbe { skin, lines, illumination, probes, single, reach } = self.estimator;
+        let BssrdfProbe { skin, lines, illumination, probes, single, reach, .. } = self.estimator;
         if *single {
             score_single(skin, illumination, emergence, &mut self.streams.single, scores);
         }
@@ -232,7 +238,10 @@ impl Line {
             Some(bounds) => {
                 let nearest = self.point + self.axis * (bounds.center - self.point).dot(self.axis);
                 let meets = (nearest - bounds.center).length() <= bounds.radius;
-                meets.then_some(Ray { origin: nearest - self.axis * (2.0 * bounds.radius), dir: self.axis })
+                meets.then_some(Ray {
+                    origin: nearest - self.axis * (2.0 * bounds.radius),
+                    dir: self.axis,
+                })
             }
             None => {
                 let dir = if self.axis.z > 0.0 { -self.axis } else { self.axis };

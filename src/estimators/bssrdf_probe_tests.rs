@@ -62,6 +62,12 @@ fn probe(scene: &Arc<Scene>) -> BssrdfProbe {
     BssrdfProbe::new(Arc::clone(scene), &probe_options()).expect("a scene that it serves")
 }
 
+/// Single scattering alone: no line is as near as this.
+fn single(scene: &Arc<Scene>) -> BssrdfProbe {
+    let options = ProbeOptions { reach: Some(0.0), ..probe_options() };
+    BssrdfProbe::new(Arc::clone(scene), &options).expect("a scene that it serves")
+}
+
 fn rays(scene: &Arc<Scene>) -> BssrdfRays {
     BssrdfRays::new(Arc::clone(scene), &ray_options()).expect("a scene that it serves")
 }
@@ -88,7 +94,7 @@ fn measure(
             *m2 += before * (x - *mean);
         }
     }
-    assert_eq!(scores.anomalies, [0; 3]);
+    assert!(scores.anomalies.iter().all(|&count| count == 0));
     let n = passes as f64;
     moments.into_iter().map(|(mean, m2)| (mean, (m2 / (n * (n - 1.0))).sqrt())).collect()
 }
@@ -252,7 +258,7 @@ fn lines_cross_every_sheet_once() {
             counts[hits.len()] += 1;
         }
         assert!(counts[2] > 100 && counts[4] > 100, "{counts:?}");
-        assert_eq!(scores.anomalies, [0; 3]);
+        assert!(scores.anomalies.iter().all(|&count| count == 0));
     }
 }
 
@@ -289,8 +295,7 @@ fn single_closed_form(eta: f64, medium: &Medium, toward: DVec3) -> f64 {
     medium.albedo * transmitted * medium.phase.pdf(mu) / way * wi.z
 }
 
-const SUNS: [DVec3; 3] =
-    [DVec3::Z, DVec3::new(1.0, 0.5, 0.7), DVec3::new(-0.9, 0.3, 0.2)];
+const SUNS: [DVec3; 3] = [DVec3::Z, DVec3::new(1.0, 0.5, 0.7), DVec3::new(-0.9, 0.3, 0.2)];
 
 /// 128 passes of 1024 paths; 5 standard errors are below 1 %.
 #[test]
@@ -298,7 +303,7 @@ fn single_scattering_of_a_half_space() {
     for (eta, medium) in [(1.3, medium(2.0, 0.9, 0.6)), (1.5, medium(0.5, 0.5, -0.3))] {
         for toward in SUNS {
             let scene = scene(Shape::HalfSpace, &[eta], &[medium], sun(toward), 1024);
-            let estimator = probe(&scene);
+            let estimator = single(&scene);
             let test = format!("single_scattering_of_a_half_space, {eta} {toward}");
             let means = measure(&estimator, &scene, TransportClass::Single, 128, &test);
             assert_mean("single", means[0], single_closed_form(eta, &medium, toward), 0.01);
@@ -307,16 +312,17 @@ fn single_scattering_of_a_half_space() {
 }
 
 /// The path tracer's class single, which nothing here has a part in: 512 passes of 1024 paths each, 5 standard errors
-/// of the difference below 3 %.
+/// of the difference below 6 %: a look from outside at what the closed form above holds to 1 %.
 #[test]
 fn single_scattering_is_that_of_path_tracing() {
     let media = [medium(2.0, 0.5, 0.4)];
     let scene = scene(Shape::HalfSpace, &[1.3], &media, sky(1, 1.0), 1024);
     let path = PathTracer::new(Arc::clone(&scene), Roulette::Analog);
-    let [ours, traced] = [("ours", &probe(&scene) as &dyn Estimator), ("path", &path)].map(|(name, e)| {
-        let test = format!("single_scattering_is_that_of_path_tracing, {name}");
-        measure(e, &scene, TransportClass::Single, 512, &test)[0]
-    });
+    let [ours, traced] =
+        [("ours", &single(&scene) as &dyn Estimator), ("path", &path)].map(|(name, e)| {
+            let test = format!("single_scattering_is_that_of_path_tracing, {name}");
+            measure(e, &scene, TransportClass::Single, 512, &test)[0]
+        });
     let error = (ours.1 * ours.1 + traced.1 * traced.1).sqrt();
-    assert_mean("single", (ours.0, error), traced.0, 0.03);
+    assert_mean("single", (ours.0, error), traced.0, 0.06);
 }

@@ -50,6 +50,7 @@ pub struct BssrdfRays {
     rays: usize,
     depth: Option<f64>,
     single: bool,
+    model: String,
     sees_all: bool,
 }
 
@@ -65,6 +66,7 @@ impl BssrdfRays {
             rays: options.rays,
             depth: options.depth,
             single: adds_single(&skin, options.single),
+            model: options.model.to_string(),
             sees_all: match &*skin.scene.shape {
                 Shape::Mesh(mesh) => is_convex(mesh),
                 shape => shape.is_convex(),
@@ -109,7 +111,7 @@ impl Estimator for BssrdfRays {
         for group in groups_among(&self.skin, bands) {
             let depth = self.depth(&group);
             for index in 0..self.skin.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(key, index, &group);
+                let streams = PathStreams::new(&self.skin, key, index, &group);
                 let mut gather = Shooting { estimator: self, streams, depth };
                 self.skin.play(&group, index, key, scores, &mut gather);
             }
@@ -118,6 +120,10 @@ impl Estimator for BssrdfRays {
 
     fn band_use(&self) -> BandUse {
         BandUse::Shared
+    }
+
+    fn model(&self) -> Option<String> {
+        Some(self.model.clone())
     }
 
     fn bias(&self) -> Bias {
@@ -166,11 +172,7 @@ impl Gather for Shooting<'_> {
 
 impl Shooting<'_> {
     /// The point under the exit.
-    fn below(
-        &self,
-        emergence: &Emergence<'_>,
-        scores: &mut Scores,
-    ) -> Option<DVec3> {
+    fn below(&self, emergence: &Emergence<'_>, scores: &mut Scores) -> Option<DVec3> {
         let shape = &self.estimator.skin.scene.shape;
         let down = Ray { origin: emergence.exit.point, dir: -emergence.exit.normal };
         scores.count(Cost::Rays);

@@ -47,7 +47,9 @@ pub(super) fn score_single(
         }
         scores.count(Cost::MediumEvents);
         let vertex = ray.at(t);
-        if let Some((light, value)) = scattered(skin, illumination, emergence, band, vertex, u_light, scores) {
+        if let Some((light, value)) =
+            scattered(skin, illumination, emergence, band, vertex, u_light, scores)
+        {
             scores.add(emergence.slot, band, TransportClass::Single, light, throughput * value);
         }
     }
@@ -87,6 +89,8 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::estimators::Layout;
+    use crate::geometry::FaceId;
     use crate::geometry::Shape;
     use crate::math::integrate;
     use crate::optics::boundary::Boundary;
@@ -94,10 +98,8 @@ mod tests {
     use crate::optics::fresnel::fresnel;
     use crate::optics::medium::Medium;
     use crate::optics::phase::HenyeyGreenstein;
-    use crate::scene::{Emission, Light, Scene, Sensor};
-    use crate::estimators::Layout;
-    use crate::geometry::FaceId;
     use crate::sampling::distance::pdf_distance_exponential;
+    use crate::scene::{Emission, Light, Scene, Sensor};
 
     /// The mean over t, by quadrature, is albedo T12 p cos_i / (eta^2 (mu_i' + mu_o')) on a half-space: a deterministic
     /// look at every factor of a sample.
@@ -119,8 +121,7 @@ mod tests {
                     sensor,
                 });
                 let mut scores = Scores::new(Layout::new(&scene));
-                let model =
-                    Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
+                let model = Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
                 let skin = Skin::new(scene, &model, true).expect("a model");
                 let illumination = Illumination::new(&skin.scene);
                 let emergence = Emergence {

@@ -12,6 +12,7 @@
 
 use std::sync::Arc;
 
+use super::choice::{choose_light, light_shares};
 use super::{Anomaly, Cost, Scores, TransportClass};
 use crate::error::{Error, Result};
 use crate::geometry::{FaceId, Hit, Ray, Side};
@@ -35,6 +36,8 @@ pub(super) struct Skin {
     pub groups: Vec<Vec<usize>>,
     /// Whether light that goes straight through is followed.
     pub straight: bool,
+    /// Probability of choosing each light, the mean over the bands.
+    choice: Vec<f64>,
 }
 
 /// A camera path that has been refracted into the body.
@@ -49,6 +52,15 @@ pub(super) struct Emergence<'a> {
     /// Per band of `bands`.
     pub throughput: &'a [f64],
     pub slot: usize,
+}
+
+impl Emergence<'_> {
+    /// The throughput of one of its bands.
+    #[inline]
+    pub fn throughput_of(&self, band: usize) -> f64 {
+        let place = self.bands.iter().position(|&own| own == band);
+        place.map_or(0.0, |place| self.throughput[place])
+    }
 }
 
 /// Collects light that leaves the body.
@@ -86,7 +98,23 @@ impl Skin {
                 None => groups.push(vec![band]),
             }
         }
-        Ok(Skin { scene, models, eta, groups, straight })
+        let shares = light_shares(&scene);
+        let mean =
+            |light: usize| shares.iter().map(|band| band[light]).sum::<f64>() / shares.len() as f64;
+        let choice = (0..scene.lights.len()).map(mean).collect();
+        Ok(Skin { models, eta, groups, straight, choice, scene })
+    }
+
+    /// A light for all bands, and the probability of that choice.
+    #[inline]
+    pub fn choose_light(&self, u: f64) -> Option<(usize, f64)> {
+        choose_light(&self.choice, u)
+    }
+
+    /// The index of a path's streams: each group of bands has its own.
+    #[inline]
+    pub fn lane(&self, index: usize, bands: &[usize]) -> u64 {
+        index as u64 * self.eta.len() as u64 + bands[0] as u64
     }
 
     /// What camera paths cannot find.
@@ -117,7 +145,6 @@ impl Skin {
         let [a, b] = sensor_stream.draw2();
         let [c, d] = sensor_stream.draw2();
         let start = self.scene.sensor.ray(index, [a, b, c, d]);
-        let lane = (index as u64) << 8 | bands[0] as u64; // a path of its own for each group
         let mut path = CameraPath {
             skin: self,
             bands,
@@ -128,7 +155,7 @@ impl Skin {
             ray: start.ray,
             from: None,
             has_met: false,
-            stream: key.stream(lane, Purpose::Walk),
+            stream: key.stream(self.lane(index, bands), Purpose::Walk),
         };
         scores.count(Cost::Paths);
         while path.step(scores, gather).is_some() {}

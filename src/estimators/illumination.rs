@@ -66,6 +66,7 @@ impl Illumination {
             last = Some((arrival.wi, entrance));
             let Some(entrance) = entrance else { continue };
             let entry = Entry { point: hit.point, normal: hit.shading_normal, dir: entrance.dir };
+            scores.count(Cost::Evaluations);
             let kernel = skin.models[band].kernel(&entry, &emergence.exit);
             let irradiance = entrance.transmittance * entrance.cos * arrival.value;
             let value = throughput * kernel * irradiance / pdf_area;
@@ -135,8 +136,8 @@ const SINGLE: u64 = 1 << 63;
 
 impl PathStreams {
     /// For path `index` of a pass and a group of bands.
-    pub fn new(key: &PassKey, index: usize, bands: &[usize]) -> PathStreams {
-        let lane = (index as u64) << 8 | bands[0] as u64;
+    pub fn new(skin: &Skin, key: &PassKey, index: usize, bands: &[usize]) -> PathStreams {
+        let lane = skin.lane(index, bands);
         PathStreams {
             lights: key.stream(lane, Purpose::Light),
             entries: key.stream(lane, Purpose::Connection),

@@ -268,7 +268,7 @@ fn draws_per_event() {
     for index in 0..1000 {
         let mut scores = Scores::new(layout.clone());
         let draws = Photon::play(&tracer, 0, index, &key, &mut scores);
-        let [paths, rays, shadow_rays, medium_events, boundary_events] = scores.cost;
+        let [paths, rays, shadow_rays, medium_events, boundary_events, ..] = scores.cost;
         let out = u64::from(scores.gates[0] > 0.0);
         let survived = medium_events - (1 - out); // else the last event ended it
         let flights = rays - 1 - out;

@@ -4,6 +4,7 @@
 //! and knows no file, thread or statistic. The runner folds scores into moments, zeros included.
 
 mod bands;
+pub mod bssrdf_density;
 pub mod bssrdf_probe;
 pub mod bssrdf_rays;
 mod bssrdf_single;
@@ -14,6 +15,7 @@ mod history;
 mod illumination;
 pub mod light_trace;
 pub mod path;
+pub mod point_cloud;
 mod scores;
 pub mod snee;
 mod walk;
@@ -40,6 +42,22 @@ pub trait Estimator: Send + Sync {
         Bias::Unbiased
     }
 
+    /// The model whose integral this estimates; none where it is light transport itself. Estimators of one integral
+    /// have to agree; between different ones lies a model error, which is measured and no failure.
+    fn model(&self) -> Option<String> {
+        None
+    }
+
+    /// Bands and classes in which the mean of any affordable number of passes is far from normal, known beforehand.
+    fn heavy_tails(&self) -> Vec<HeavyTail> {
+        Vec::new()
+    }
+
+    /// Memory that a pass takes for itself, bytes.
+    fn working_bytes(&self) -> usize {
+        0
+    }
+
     /// What a reader of its results must know, as a transport that it cannot sample.
     fn notes(&self) -> Vec<String> {
         Vec::new()
@@ -53,6 +71,17 @@ pub enum BandUse {
     EachAlone,
     /// One pass scores all bands and has one cost.
     Shared,
+}
+
+/// Scores whose sample mean has no valid interval.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HeavyTail {
+    /// In this band.
+    pub band: usize,
+    /// In this class, and in the total.
+    pub class: TransportClass,
+    /// Because.
+    pub reason: String,
 }
 
 /// What the mean of an estimator's scores is.

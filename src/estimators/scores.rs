@@ -19,12 +19,32 @@ pub enum Cost {
     MediumEvents,
     /// Reflections and refractions at the boundary.
     BoundaryEvents,
+    /// Points of a surface with the light that enters there.
+    CloudPoints,
+    /// Nodes of a hierarchy over them that a query looked at.
+    Nodes,
+    /// Points that a query by the hierarchy looked at.
+    Candidates,
+    /// Points that a query without hierarchy looked at.
+    Scanned,
+    /// Evaluated BSSRDFs, one a band.
+    Evaluations,
 }
 
 impl Cost {
     /// All counters, in the order of [`Scores::cost`].
-    pub const ALL: [Cost; 5] =
-        [Cost::Paths, Cost::Rays, Cost::ShadowRays, Cost::MediumEvents, Cost::BoundaryEvents];
+    pub const ALL: [Cost; 10] = [
+        Cost::Paths,
+        Cost::Rays,
+        Cost::ShadowRays,
+        Cost::MediumEvents,
+        Cost::BoundaryEvents,
+        Cost::CloudPoints,
+        Cost::Nodes,
+        Cost::Candidates,
+        Cost::Scanned,
+        Cost::Evaluations,
+    ];
 
     /// Its name in records.
     pub fn name(self) -> &'static str {
@@ -34,6 +54,11 @@ impl Cost {
             Cost::ShadowRays => "shadow_rays",
             Cost::MediumEvents => "medium_events",
             Cost::BoundaryEvents => "boundary_events",
+            Cost::CloudPoints => "cloud_points",
+            Cost::Nodes => "cloud_nodes",
+            Cost::Candidates => "cloud_candidates",
+            Cost::Scanned => "cloud_scanned",
+            Cost::Evaluations => "bssrdf_evaluations",
         }
     }
 }

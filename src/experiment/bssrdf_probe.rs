@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::bssrdf::ModelWords;
 use super::estimators::{looks_from_outside, read};
 use super::registry::RegistryEntry;
+use crate::estimators::bssrdf_density::{BssrdfDensity, DensityOptions};
 use crate::estimators::bssrdf_probe::{BssrdfProbe, ProbeOptions};
 use crate::estimators::bssrdf_rays::{BssrdfRays, RayOptions};
 
@@ -30,6 +31,18 @@ pub const BSSRDF_RAYS: RegistryEntry = RegistryEntry {
         let words: BssrdfRaysWords = read(options)?;
         looks_from_outside("bssrdf_rays", &scene)?;
         Ok(Box::new(BssrdfRays::new(scene, &words.options())?))
+    },
+};
+
+/// `bssrdf_density`.
+pub const BSSRDF_DENSITY: RegistryEntry = RegistryEntry {
+    kind: "bssrdf_density",
+    doc: "a BSSRDF summed over points whose irradiance is a density of flux; biased, unbiased without `radius_mm`",
+    options_schema: || schemars::schema_for!(BssrdfDensityWords),
+    build: |options, scene| {
+        let words: BssrdfDensityWords = read(options)?;
+        looks_from_outside("bssrdf_density", &scene)?;
+        Ok(Box::new(BssrdfDensity::new(scene, &words.options())?))
     },
 };
 
@@ -78,6 +91,27 @@ pub struct BssrdfRaysWords {
     pub straight: bool,
 }
 
+/// Options of `bssrdf_density`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BssrdfDensityWords {
+    /// The model; one that needs no directions.
+    pub model: ModelWords,
+    /// Points of the surface per pass.
+    #[schemars(range(min = 2, max = 16777216))]
+    pub samples: usize,
+    /// Radius of the discs over which irradiance is averaged, mm; biased. Without it each point has its own alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius_mm: Option<f64>,
+    /// Whether the single-scattering term is added; without it where the model leaves single scattering out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub single: Option<bool>,
+    /// Whether light that goes straight through the body is followed.
+    #[serde(default = "yes")]
+    pub straight: bool,
+}
+
 fn one() -> usize {
     1
 }
@@ -104,6 +138,18 @@ impl BssrdfRaysWords {
             model: (&self.model).into(),
             rays: self.rays,
             depth: self.depth_mm,
+            single: self.single,
+            straight: self.straight,
+        }
+    }
+}
+
+impl BssrdfDensityWords {
+    fn options(&self) -> DensityOptions {
+        DensityOptions {
+            model: (&self.model).into(),
+            samples: self.samples,
+            radius: self.radius_mm,
             single: self.single,
             straight: self.straight,
         }

@@ -4,11 +4,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
+use super::point_cloud::PointCloudWords;
 use super::registry::{Registry, RegistryEntry};
 use super::snee::SneeWords;
 use crate::error::{Error, Result};
 use crate::estimators::light_trace::LightTracer;
 use crate::estimators::path::{PathTracer, Roulette};
+use crate::estimators::point_cloud::PointCloud;
 use crate::estimators::snee::{Bidirectional, Snee, TwoBounce};
 use crate::scene::{Scene, Sensor};
 
@@ -22,8 +24,10 @@ pub fn builtin() -> Registry {
             TWO_BOUNCE,
             BIDIRECTIONAL,
             LIGHT_TRACE,
+            POINT_CLOUD,
             super::bssrdf_probe::BSSRDF_PROBE,
             super::bssrdf_probe::BSSRDF_RAYS,
+            super::bssrdf_probe::BSSRDF_DENSITY,
         ],
     }
 }
@@ -78,6 +82,17 @@ const LIGHT_TRACE: RegistryEntry = RegistryEntry {
     build: |options, scene| {
         let options: LightTraceOptions = read(options)?;
         Ok(Box::new(LightTracer::new(scene, options.paths)?))
+    },
+};
+
+const POINT_CLOUD: RegistryEntry = RegistryEntry {
+    kind: "point_cloud",
+    doc: "a BSSRDF summed over points of the surface, accepted by distance; unbiased for the model",
+    options_schema: || schemars::schema_for!(PointCloudWords),
+    build: |options, scene| {
+        let words: PointCloudWords = read(options)?;
+        looks_from_outside("point_cloud", &scene)?;
+        Ok(Box::new(PointCloud::new(scene, (&words).into())?))
     },
 };
 

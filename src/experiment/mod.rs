@@ -37,6 +37,9 @@ mod overrides;
 /// What pictures a file may ask for.
 pub mod picture;
 
+/// Words for `point_cloud`.
+pub mod point_cloud;
+
 /// The estimators and samplers that a program knows by name.
 pub mod registry;
 

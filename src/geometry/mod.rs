@@ -4,6 +4,7 @@
 
 mod analytic;
 pub mod audit;
+mod body_surface;
 mod clearance;
 mod mesh;
 mod normals;
@@ -18,6 +19,7 @@ mod topology;
 mod tree;
 mod triangle;
 
+pub use body_surface::{BodyPoint, BodySampler, FaceChoice};
 pub use mesh::Mesh;
 pub use normals::Normals;
 pub use obj::load_obj;

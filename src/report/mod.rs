@@ -13,6 +13,7 @@ use crate::results::timing::Timing;
 use crate::results::{atomic, json::canonical};
 use crate::verify::comparisons;
 use crate::verify::judge::{Case, Looks, judge};
+use crate::verify::model_errors::{self, ModelError, model_errors};
 use crate::verify::verdict::{self, Verdict};
 
 /// Bytes as text, for data URIs.
@@ -48,6 +49,8 @@ pub struct Material {
     pub rows: Vec<Measurement>,
     /// Efficiencies of pairs of estimators.
     pub comparisons: Vec<comparisons::Row>,
+    /// Models against light transport itself.
+    pub model_errors: Vec<ModelError>,
     /// The pictures, in the order of cells and estimators.
     pub figures: Vec<Figure>,
     /// Grids of split pictures.
@@ -68,8 +71,8 @@ pub struct Figure {
     pub caption: String,
 }
 
-/// Makes every derived view of a results folder: `measurements.csv`, `comparisons.csv`, `verdicts.csv`, `summary.json`,
-/// `images/`, `report.md` and `report.html`. The record is judged by itself, with the second look that a
+/// Makes every derived view of a results folder: `measurements.csv`, `comparisons.csv`, `model_errors.csv` where there are
+/// models, `verdicts.csv`, `summary.json`, `images/`, `report.md` and `report.html`. The record is judged by itself, with the second look that a
 /// verification may have left beside it.
 pub fn write(folder: &RecordFolder) -> Result<Material> {
     let stored = folder.read()?;
@@ -87,7 +90,18 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     let stored = Stored { timing: timing.clone(), ..stored };
     let splits = split::write_splits(folder, &stored, &folder.read_pictures()?)?;
     let comparisons = comparisons::comparisons(&stored);
-    let material = Material { stored, timing, provenance, verdicts, rows, comparisons, figures, splits };
+    let model_errors = model_errors(&stored);
+    let material = Material {
+        stored,
+        timing,
+        provenance,
+        verdicts,
+        rows,
+        comparisons,
+        model_errors,
+        figures,
+        splits,
+    };
     let page = page::page(&material);
     let views = [
         ("measurements.csv", measurements::to_csv(&material.rows)),
@@ -99,6 +113,10 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     ];
     for (name, text) in views {
         folder.write_view(name, text.as_bytes())?;
+    }
+    if !material.model_errors.is_empty() {
+        folder
+            .write_view("model_errors.csv", model_errors::to_csv(&material.model_errors).as_bytes())?;
     }
     Ok(material)
 }

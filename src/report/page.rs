@@ -4,7 +4,9 @@
 use super::Material;
 use super::document::{Block, Document, FigureBlock};
 use super::number::significant;
-use super::table::{Table, claim_table, comparison_table, measurement_table, verdict_table};
+use super::table::{
+    Table, claim_table, comparison_table, measurement_table, model_error_table, verdict_table,
+};
 use crate::results::measurements::Measurement;
 use crate::verify::levels::FAMILY_LEVEL;
 use crate::verify::verdict::Outcome;
@@ -16,6 +18,7 @@ pub(super) fn page(material: &Material) -> Document {
     if material.stored.record.samplers.is_empty() {
         blocks.extend(measured(material));
         blocks.extend(super::split::blocks(&material.splits));
+        blocks.extend(model_errors(material));
         blocks.extend(efficiency(material));
         blocks.extend(cost(material));
         blocks.extend(notes(material));
@@ -113,6 +116,16 @@ fn figure_block(figure: &super::Figure) -> FigureBlock {
     }
 }
 
+fn model_errors(material: &Material) -> Vec<Block> {
+    if material.model_errors.is_empty() {
+        return Vec::new();
+    }
+    let text = "What a model's mean is off by, relative to light transport itself; in brackets the 95 % interval. A \
+                property of the model, not of an implementation: it is no claim and cannot fail.";
+    let table = Block::Table(model_error_table(&material.model_errors));
+    vec![heading("Model errors"), Block::Text(text.into()), table]
+}
+
 fn efficiency(material: &Material) -> Vec<Block> {
     if material.comparisons.is_empty() {
         return Vec::new();
@@ -149,7 +162,12 @@ fn cost(material: &Material) -> Vec<Block> {
             cost.map_or(String::new(), |c| significant(pick(c.cpu_seconds, c.wall_seconds), 3))
         };
         let rate = cost.and_then(|c| c.paths_per_second());
-        let work: Vec<String> = run.cost.iter().map(|(name, count)| format!("{name} {count}")).collect();
+        let work: Vec<String> = run
+            .cost
+            .iter()
+            .filter(|(_, count)| **count > 0)
+            .map(|(name, count)| format!("{name} {count}"))
+            .collect();
         table.push(vec![
             cell.label.clone(),
             run.estimator.clone(),

@@ -5,6 +5,7 @@ use crate::results::csv_text;
 use crate::results::measurements::Measurement;
 use crate::results::record::CostMeasure;
 use crate::verify::comparisons::{Row, measure_name};
+use crate::verify::model_errors::ModelError;
 use crate::verify::verdict::Verdict;
 
 /// A header and rows of text.
@@ -173,6 +174,37 @@ pub fn claim_table(verdicts: &[Verdict]) -> Table {
         table.push(row);
     }
     table
+}
+
+/// Model errors: a row for each model, observable, class and band.
+pub fn model_error_table(rows: &[ModelError]) -> Table {
+    let mut table = Table::new(&[
+        "cell",
+        "model of",
+        "band",
+        "observable",
+        "class",
+        "model",
+        "truth",
+        "model error",
+        "note",
+    ]);
+    for row in rows {
+        let (low, high) = row.interval();
+        let percent = |x: f64| format!("{:+.1}", 100.0 * x);
+        table.push(vec![
+            row.cell.clone(),
+            row.estimator.clone(),
+            row.band.clone(),
+            row.observable.name.clone(),
+            row.observable.class.clone(),
+            with_error(row.value.value, row.value.std_error),
+            with_error(row.expected.value, row.expected.std_error),
+            format!("{} [{}, {}] %", percent(row.relative.value), percent(low), percent(high)),
+            row.note.clone(),
+        ]);
+    }
+    table.without_empty_columns()
 }
 
 /// Efficiencies: a row for each pair, class and measure of cost.

@@ -103,6 +103,12 @@ pub struct EstimatorRun {
     pub kind: String,
     /// What it promises of its mean.
     pub bias: Bias,
+    /// The model whose integral it estimates; none where it is light transport itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<String>,
+    /// Where its mean is known beforehand to be far from normal.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub heavy_tails: Vec<HeavyTail>,
     /// What a reader must know (a transport that it cannot sample).
     pub notes: Vec<String>,
     /// Number of independent passes.
@@ -121,6 +127,18 @@ pub struct EstimatorRun {
     pub cost: BTreeMap<String, u64>,
     /// Counts of what must not go unseen, by name (`nonfinite`, `lost_ray`, `wrong_side`).
     pub anomalies: BTreeMap<String, u64>,
+}
+
+/// Scores whose sample mean has no valid interval.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeavyTail {
+    /// Index into [`Record::bands`].
+    pub band: usize,
+    /// In this class, and in `all`.
+    pub class: String,
+    /// Because.
+    pub reason: String,
 }
 
 /// What an estimator promises of its mean.

@@ -103,6 +103,8 @@ fn run(e: usize, name: &str, noise: f64, arrays: &mut Arrays) -> EstimatorRun {
         control_of: None,
         kind: "path".into(),
         bias: Bias::Unbiased,
+        model: None,
+        heavy_tails: vec![],
         notes: vec![],
         passes: PASSES,
         observables: vec![observable("all"), observable("single")],

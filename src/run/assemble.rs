@@ -14,7 +14,9 @@ use crate::experiment::build::inputs;
 use crate::results::json::hash_json;
 use crate::results::npy::Array;
 use crate::results::provenance::fingerprint;
-use crate::results::record::{Bias, Cell, EstimatorRun, Image, Record, Replay, SCHEMA_VERSION};
+use crate::results::record::{
+    Bias, Cell, EstimatorRun, HeavyTail, Image, Record, Replay, SCHEMA_VERSION,
+};
 use crate::results::store::{Arrays, costs_path, gates_path, pixels_path, spread_path};
 use crate::results::timing::{self, Timing};
 
@@ -143,6 +145,8 @@ fn estimator_run(
             estimators::Bias::Consistent => Bias::Consistent,
             estimators::Bias::Biased(why) => Bias::Biased(why),
         },
+        model: job.estimator.model(),
+        heavy_tails: job.estimator.heavy_tails().into_iter().map(heavy_tail).collect(),
         notes: job.estimator.notes(),
         passes: finished.passes,
         observables: named(&job.layout),
@@ -152,4 +156,8 @@ fn estimator_run(
         cost: counts(Cost::ALL.map(Cost::name).into(), &finished.tally.cost),
         anomalies: counts(Anomaly::ALL.map(Anomaly::name).into(), &finished.tally.anomalies),
     }
+}
+
+fn heavy_tail(tail: estimators::HeavyTail) -> HeavyTail {
+    HeavyTail { band: tail.band, class: tail.class.name().into(), reason: tail.reason }
 }

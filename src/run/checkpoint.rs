@@ -126,9 +126,10 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
 mod tests {
     use super::super::job::spread;
     use super::*;
+    use crate::estimators::Cost;
 
     fn work(pass: u64) -> Work {
-        Work { cost: [pass; 5], cpu_seconds: 0.25 * pass as f64, settled: pass % 2 }
+        Work { cost: [pass; Cost::ALL.len()], cpu_seconds: 0.25 * pass as f64, settled: pass % 2 }
     }
 
     fn block(passes: u64, keep_level: u32) -> Block {

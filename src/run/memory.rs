@@ -22,18 +22,19 @@ impl Estimate {
     /// holds one image per bit of its passes, and as much again while its state is written. Each thread
     /// holds the images of its block (sized by time: large images have blocks of a few passes) and one
     /// more waits to be collected. Jobs that are timed side by side are under way together, and two batches
-    /// of each may wait for the turn of those before them.
+    /// of each may wait for the turn of those before them. What an estimator needs for a pass it needs on each thread.
     pub fn new(jobs: &[Job], shapes: usize, threads: usize, passes: Option<u64>) -> Estimate {
         let image = |job: &Job| 16 * job.layout.pixels() * job.layout.bands();
         let gates = |job: &Job| 128 * 40 * job.layout.observables().len() * job.layout.bands();
         let largest = jobs.iter().map(image).max().unwrap_or(0);
+        let own = jobs.iter().map(|job| job.estimator.working_bytes()).max().unwrap_or(0);
         let side_by_side = |group| jobs.iter().filter(|job| job.side_by_side == Some(group)).count();
         let arms = jobs.iter().filter_map(|job| job.side_by_side).map(side_by_side).max().unwrap_or(1);
         let bits = passes.map_or(20, |passes| passes.max(1).ilog2() as usize + 1);
         Estimate {
             shapes,
             results: jobs.iter().map(|job| 2 * (image(job) + gates(job))).sum(),
-            working: (2 * bits * arms + (3 + 2 * arms) * threads) * largest,
+            working: (2 * bits * arms + (3 + 2 * arms) * threads) * largest + threads * own,
         }
     }
 

@@ -19,6 +19,9 @@ pub mod radial;
 /// The keyed random streams.
 pub mod stream;
 
+/// Points of a cloud by distance, independently.
+pub mod thinning;
+
 /// Points of a volume by direction and distance towards a given point.
 pub mod towards;
 

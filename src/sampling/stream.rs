@@ -21,6 +21,8 @@ pub enum Purpose {
     Connection = 4,
     /// The band that steers a walk shared by all.
     Hero = 5,
+    /// Points of a surface with the light that enters there.
+    Cloud = 6,
 }
 
 /// The key of one (experiment, cell, bands, estimator, stage).
@@ -107,6 +109,13 @@ impl Stream {
     pub fn draw(&mut self) -> f64 {
         self.draws += 1;
         (self.generator.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+    }
+
+    /// The next 64 random bits.
+    #[inline]
+    pub fn draw_bits(&mut self) -> u64 {
+        self.draws += 1;
+        self.generator.next_u64()
     }
 
     /// The next two.

@@ -89,6 +89,16 @@ impl Light {
         }
     }
 
+    /// What another band has in a direction that was drawn from this light: radiance, or irradiance of parallel light.
+    #[inline]
+    pub fn sampled_radiance(&self, band: usize, wi: DVec3) -> f64 {
+        match &self.emission {
+            Emission::Directional { irradiance, .. } => irradiance[band],
+            Emission::Cap { radiance, .. } => radiance[band],
+            Emission::Map(map) => map.eval(band, wi).0,
+        }
+    }
+
     /// Radiance integrated over directions, W/mm^2: the weight with which a light is chosen.
     pub fn strength(&self, band: usize) -> f64 {
         match &self.emission {

@@ -116,10 +116,14 @@ pub fn comparisons(stored: &Stored) -> Vec<Row> {
 fn subjects(stored: &Stored) -> Vec<Subject<'_>> {
     let mut subjects = Vec::new();
     for (index, cell) in stored.record.cells.iter().enumerate() {
-        let Some(first) = cell.runs.iter().find(|run| run.control_of.is_none()) else { continue };
-        let others = cell.runs.iter().filter(|run| run.estimator != first.estimator);
-        let own = |run: &&EstimatorRun| run.control_of.as_ref().is_none_or(|of| *of == first.estimator);
-        for run in others.filter(own) {
+        for run in &cell.runs {
+            // Against the first that estimates the same.
+            let same = |first: &&EstimatorRun| first.control_of.is_none() && first.model == run.model;
+            let Some(first) = cell.runs.iter().find(same) else { continue };
+            let is_own = run.control_of.as_ref().is_none_or(|of| *of == first.estimator);
+            if run.estimator == first.estimator || !is_own {
+                continue;
+            }
             let metric = first.observables.first().map(|o| &o.name);
             let pixels = [first, run].iter().all(|run| run.image.is_some()).then(Observable::pixels);
             let classes = first.observables.iter().filter(|o| Some(&o.name) == metric);

@@ -19,6 +19,8 @@ pub mod verdict;
 pub mod comparisons;
 /// Claims of efficiency.
 pub mod efficiency;
+/// What models are off by.
+pub mod model_errors;
 /// What counts of work cost.
 pub mod weights;
 

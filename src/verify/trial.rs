@@ -3,7 +3,9 @@
 use super::efficiency::{self, Shown};
 use super::levels::SHARED_ERROR;
 use super::verdict::{Outcome, Verdict};
-use crate::results::record::{Against, Bias, Comparison, EstimatorRun, Observable, Quantity, Record};
+use crate::results::record::{
+    Against, Bias, Comparison, EstimatorRun, HeavyTail, Observable, Quantity, Record,
+};
 use crate::results::store::Stored;
 use crate::stats::goodness::{Goodness, Proportion};
 use crate::stats::hypothesis::{Estimate, Spread, Test};
@@ -185,6 +187,15 @@ impl<'a> Arm<'a> {
         (!finite).then(|| format!("{name} has a mean or moment that is not finite"))
     }
 
+    /// Why its mean is known beforehand not to be nearly normal.
+    fn known_tail(&self, quantity: &Quantity) -> Option<String> {
+        let class = &quantity.observable.class;
+        let concerns =
+            |tail: &&HeavyTail| tail.band == quantity.band && (class == "all" || *class == tail.class);
+        let tail = self.run.heavy_tails.iter().find(concerns)?;
+        Some(format!("heavy tail, known beforehand: {}: {}", self.run.estimator, tail.reason))
+    }
+
     /// Why its mean is not nearly normal.
     pub fn tail_objection(&self) -> Option<String> {
         let name = &self.run.estimator;
@@ -241,6 +252,8 @@ pub(super) fn trial(stored: &Stored, index: usize, comparison: &Comparison) -> T
         arms.iter()
             .find_map(|arm| arm.objection())
             .or_else(|| bias_objection(&claim, &arms))
+            .or_else(|| model_objection(&claim, &arms))
+            .or_else(|| arms.iter().find_map(|arm| arm.known_tail(&comparison.quantity)))
             .or_else(|| silence_objection(&claim, &comparison.quantity, &arms))
     };
     let evidence = match (objection, &a) {
@@ -331,6 +344,22 @@ fn bias_objection(claim: &Claim, arms: &[&Arm]) -> Option<String> {
         Bias::Biased(why) => Some(format!("{} is biased: {why}", arm.run.estimator)),
         Bias::Unbiased | Bias::Consistent => None,
     })
+}
+
+/// Estimators of different integrals owe each other nothing; a control may say that they differ.
+fn model_objection(claim: &Claim, arms: &[&Arm]) -> Option<String> {
+    let [a, b] = arms else { return None };
+    if claim.expect == Expect::Differs || a.run.model == b.run.model {
+        return None;
+    }
+    let name = |arm: &Arm| arm.run.model.clone().unwrap_or_else(|| "light transport".into());
+    Some(format!(
+        "{} estimates {}, {} {}: their difference is a model error, which the report shows",
+        a.run.estimator,
+        name(a),
+        b.run.estimator,
+        name(b)
+    ))
 }
 
 /// Two estimators that both scored nothing agree on nothing: they may share what keeps them dark. A

@@ -112,6 +112,17 @@ impl Model {
     }
 }
 
+impl std::fmt::Display for Model {
+    /// Its name, with what its source leaves open.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Model::Classical { moments, outgoing } => {
+                write!(f, "the classical dipole ({moments:?} moments, {outgoing:?} outgoing)")
+            }
+        }
+    }
+}
+
 impl Kernel {
     fn radial(profile: Profile, outgoing: Outgoing, moments: &Moments) -> Kernel {
         let passed = match outgoing {
@@ -130,6 +141,13 @@ impl Bssrdf {
             Kernel::Radial { profile, scale } => {
                 scale * profile.exitance((exit.point - entry.point).length())
             }
+        }
+    }
+
+    /// Whether the kernel depends on the directions at the entry, beside distance.
+    pub fn needs_directions(&self) -> bool {
+        match &self.kernel {
+            Kernel::Radial { .. } => false,
         }
     }
 

@@ -69,6 +69,8 @@ fn stored(seed: u64, noise: f64) -> Stored {
         control_of: None,
         kind: "path".into(),
         bias: Bias::Unbiased,
+        model: None,
+        heavy_tails: vec![],
         notes: vec![],
         passes: PASSES,
         observables: names.into_iter().map(|name| Observable { name, class: "all".into() }).collect(),

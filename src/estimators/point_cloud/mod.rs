@@ -1,0 +1,272 @@
+//! The point-cloud method for BSSRDFs (Dal Corso & Frisvad 2018: direct Monte Carlo integration, two phases).
+//!
+//! Phase one, once a pass: M points of the surface with density f per area, at each one direction to a light, and the
+//! flux Phi = E / f that enters there. Phase two, for each camera path that is refracted into the body at x_o:
+//!   L_r = 1/M sum_p S(x_p, x_o) Phi_p B_p / p(d_p),   B_p = 1 with probability p(d_p), d_p = |x_o - x_p|,
+//! the source's V(xi, e^(-sigma_tr d)) e^(+sigma_tr d) with p(d) = e^(-sigma_tr d). Given the points E[B_p / p] = 1, and over
+//! the points each term has mean int S E dA, whatever p > 0 is: unbiased with respect to the model, which knows no
+//! visibility inside the body. What p decides is variance: the second moment of a term is E[(S Phi)^2 / p], and
+//! where p falls faster than S^2 does, it grows with the size of the body ([`Acceptance`]).
+//!
+//! The camera path's branch of refraction has probability T21, so the kernel leaves T21 out ([`super::emergence`]).
+//! Light is sampled by strength with a shadow ray. Pixels of a pass share the points: their errors are correlated within a
+//! pass, and independent between passes, each of which has points of its own.
+
+mod cloud;
+
+use std::sync::Arc;
+
+use self::cloud::Cloud;
+use super::emergence::{Emergence, Gather, Skin};
+use super::{Anomaly, BandUse, Cost, Estimator, HeavyTail, Scores, TransportClass};
+use crate::error::{Error, Result};
+use crate::geometry::{BodySampler, FaceChoice};
+use crate::optics::bssrdf::{Entry, Model};
+use crate::sampling::stream::{PassKey, Purpose, Stream};
+use crate::sampling::thinning::{Accepted, Form, Rule, Work, scan};
+use crate::scene::Scene;
+
+/// How a point's probability of acceptance follows from its distance d.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Acceptance {
+    /// p = 1: every point is evaluated.
+    All,
+    /// e^(-sigma_tr d) of the band: bands accept by themselves.
+    Band,
+    /// e^(-m d) with the mean m of sigma_tr over the bands: the source's rule for RGB. In a band with sigma_tr < m/2 the
+    /// variance grows exponentially with the size of the body.
+    Mean,
+    /// e^(-m d) with the smallest sigma_tr: bounded in every band, and accepts the most.
+    Minimum,
+    /// The mean over the bands of e^(-sigma_tr d): bounded in every band, accepts fewer than the smallest does.
+    MeanOfExponentials,
+    /// max(e^(-m d), least), m the mean.
+    Floor(f64),
+    /// In proportion to the mean over the bands of the kernel over its integral, as many as the mean of exponentials
+    /// accepts over a disc as wide as the body.
+    Kernel,
+}
+
+/// ln of the growth of the variance beyond which a mean is not judged.
+const HEAVY: f64 = 3.0;
+
+/// How accepted points are found; both have the same law.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Search {
+    /// By a hierarchy over the points.
+    #[default]
+    Hierarchy,
+    /// By asking every point, as the source does.
+    Scan,
+}
+
+/// Options of the estimator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointCloudOptions {
+    /// The BSSRDF.
+    pub model: Model,
+    /// M.
+    pub samples: usize,
+    /// How points are drawn from the surface.
+    pub faces: FaceChoice,
+    /// p(d).
+    pub acceptance: Acceptance,
+    /// How accepted points are found.
+    pub search: Search,
+    /// Whether single scattering is added; `None` where the model leaves it out.
+    pub single: Option<bool>,
+    /// Whether light that goes straight through the body is followed.
+    pub straight: bool,
+}
+
+/// The estimator, for one scene.
+#[derive(Debug)]
+pub struct PointCloud {
+    skin: Skin,
+    sampler: BodySampler,
+    options: PointCloudOptions,
+    /// Per group of the skin: which bands accept by which rule.
+    rules: Vec<Vec<(Vec<usize>, Rule)>>,
+}
+
+impl PointCloud {
+    /// For a scene with a finite body and smooth or matched boundaries.
+    ///
+    /// # Errors
+    /// A half-space or slab, a rough boundary, a medium that the model does not fit.
+    pub fn new(scene: Arc<Scene>, options: PointCloudOptions) -> Result<PointCloud> {
+        let (Some(sampler), Some(bounds)) =
+            (BodySampler::new(&scene.shape, options.faces), scene.shape.bounds())
+        else {
+            return Err(Error::input_help(
+                "point_cloud draws points uniformly from the surface, which a half-space or slab has without end",
+                "use a finite body, or bssrdf_probe",
+            ));
+        };
+        let skin = Skin::new(scene, &options.model, options.straight)?;
+        let rules = rules(&skin, options.acceptance, 2.0 * bounds.radius);
+        Ok(PointCloud { skin, sampler, options, rules })
+    }
+}
+
+/// The rule of each group of bands.
+fn rules(skin: &Skin, acceptance: Acceptance, diameter: f64) -> Vec<Vec<(Vec<usize>, Rule)>> {
+    let sigmas: Vec<f64> = skin.models.iter().map(|model| model.sigma_tr).collect();
+    let mean = sigmas.iter().sum::<f64>() / sigmas.len() as f64;
+    let common = match acceptance {
+        Acceptance::All => Form::All,
+        Acceptance::Mean => Form::Exponential { sigma: mean },
+        Acceptance::Minimum | Acceptance::Band => {
+            Form::Exponential { sigma: sigmas.iter().fold(f64::INFINITY, |least, &s| least.min(s)) }
+        }
+        Acceptance::MeanOfExponentials => Form::MeanOfExponentials { sigmas: sigmas.clone() },
+        Acceptance::Floor(least) => Form::Floor { sigma: mean, least },
+        Acceptance::Kernel => in_proportion(skin, &sigmas, diameter),
+    };
+    if acceptance == Acceptance::Band {
+        let own = |band: usize| (vec![band], Rule::new(Form::Exponential { sigma: sigmas[band] }));
+        return skin.groups.iter().map(|group| group.iter().map(|&band| own(band)).collect()).collect();
+    }
+    let rule = Rule::new(common);
+    skin.groups.iter().map(|group| vec![(group.clone(), rule.clone())]).collect()
+}
+
+/// Accepts in proportion to the kernels, on average over a disc of radius `reach` as many as the mean of exponentials:
+/// int_0^R e^(-s d) 2 d dd / R^2 = 2 (1 - (1 + a) e^(-a)) / a^2 with a = s R.
+fn in_proportion(skin: &Skin, sigmas: &[f64], reach: f64) -> Form {
+    use crate::math::{exp, integrate};
+    let mean_of = |sigma: f64| {
+        let a = sigma * reach;
+        if a < 1e-3 { 1.0 - 2.0 / 3.0 * a } else { 2.0 * (1.0 - (1.0 + a) * exp(-a)) / (a * a) }
+    };
+    let mean = sigmas.iter().map(|&sigma| mean_of(sigma)).sum::<f64>() / sigmas.len() as f64;
+    let whole: Vec<f64> = skin
+        .models
+        .iter()
+        // In x = sqrt(d / R) the profile is smooth at 0 too: d = R x^2, d dd = 2 R^2 x^3 dx.
+        .map(|model| integrate(|x| model.falloff(reach * x * x) * x * x * x, 0.0, 1.0, 1e-12).value)
+        .collect();
+    let falloff = |d: f64| {
+        let d = d.max(1e-6 * reach); // some profiles have a pole
+        skin.models.iter().zip(&whole).map(|(model, whole)| model.falloff(d) / whole).sum::<f64>()
+    };
+    Form::proportional(falloff, reach, mean.min(1.0))
+}
+
+impl Estimator for PointCloud {
+    fn pass(&self, _bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        let cloud = Cloud::new(&self.skin, &self.sampler, self.options.samples, key);
+        scores.cost[Cost::CloudPoints as usize] += cloud.len() as u64;
+        scores.cost[Cost::ShadowRays as usize] += cloud.shadow_rays;
+        scores.anomalies[Anomaly::WrongSide as usize] += cloud.wrong_side;
+        for (group, rules) in self.skin.groups.iter().zip(&self.rules) {
+            for index in 0..self.skin.scene.sensor.rays_per_pass() {
+                let stream = key.stream(self.skin.lane(index, group), Purpose::Connection);
+                let mut sum = CloudSum {
+                    skin: &self.skin,
+                    cloud: &cloud,
+                    rules,
+                    search: self.options.search,
+                    stream,
+                };
+                self.skin.play(group, index, key, scores, &mut sum);
+            }
+        }
+    }
+
+    fn band_use(&self) -> BandUse {
+        BandUse::Shared
+    }
+
+    fn model(&self) -> Option<String> {
+        Some(self.options.model.to_string())
+    }
+
+    /// Under p = e^(-m d) an accepted term of a band with effective transport s weighs like e^((m - s) d), with a Pareto
+    /// tail of index m / (m - s) on an unbounded surface: without variance where m > 2 s. A finite body cuts the tail off
+    /// at its diameter D; the variance has then grown by about e^((m - 2 s) D).
+    fn heavy_tails(&self) -> Vec<HeavyTail> {
+        if self.options.acceptance != Acceptance::Mean {
+            return Vec::new(); // weights of all other rules are bounded by what the kernel loses, or by their floor
+        }
+        let diameter =
+            self.skin.scene.shape.bounds().map_or(f64::INFINITY, |bounds| 2.0 * bounds.radius);
+        let sigmas = || self.skin.models.iter().map(|model| model.sigma_tr);
+        let mean = sigmas().sum::<f64>() / sigmas().count() as f64;
+        let heavy = sigmas().enumerate().filter(|(_, s)| (mean - 2.0 * s) * diameter > HEAVY);
+        heavy
+            .map(|(band, s)| HeavyTail {
+                band,
+                class: TransportClass::Multiple,
+                reason: format!(
+                    "accepted by the mean of sigma_tr, {mean:.3}/mm, a band of {s:.3}/mm has tail index {:.2} on a body \
+                     {diameter:.3} mm wide",
+                    mean / (mean - s)
+                ),
+            })
+            .collect()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.skin.notes()
+    }
+
+    fn working_bytes(&self) -> usize {
+        Cloud::bytes(&self.skin, self.options.samples)
+    }
+}
+
+/// L_r of one camera path.
+struct CloudSum<'a> {
+    skin: &'a Skin,
+    cloud: &'a Cloud,
+    rules: &'a [(Vec<usize>, Rule)],
+    search: Search,
+    stream: Stream,
+}
+
+impl Gather for CloudSum<'_> {
+    fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
+        let lights = self.skin.scene.lights.len();
+        for (bands, rule) in self.rules {
+            let mut sums = vec![0.0; bands.len() * lights];
+            let (cloud, models, at) = (self.cloud, &self.skin.models, emergence.exit.point);
+            let mut work = Work::default();
+            let add = |accepted: Accepted| {
+                let place = accepted.index;
+                let entry: Entry = cloud.entry(place, emergence.eta);
+                let sums = sums.iter_mut().skip(cloud.light(place)).step_by(lights);
+                for (sum, &band) in sums.zip(bands) {
+                    let kernel = models[band].kernel(&entry, &emergence.exit);
+                    *sum += kernel * cloud.flux(place, band) * accepted.weight;
+                }
+            };
+            match self.search {
+                Search::Hierarchy => cloud.tree.thin(at, rule, &mut self.stream, &mut work, add),
+                Search::Scan => {
+                    let all = 0..cloud.len();
+                    scan(cloud.tree.axes(), all, at, rule, &mut self.stream, &mut work, add);
+                }
+            }
+            count(scores, self.search, &work, bands.len());
+            for (k, sum) in sums.into_iter().enumerate() {
+                let (band, light) = (bands[k / lights], k % lights);
+                let throughput = emergence.throughput_of(band);
+                scores.add(emergence.slot, band, TransportClass::Multiple, light, throughput * sum);
+            }
+        }
+    }
+}
+
+fn count(scores: &mut Scores, search: Search, work: &Work, bands: usize) {
+    let asked = match search {
+        Search::Hierarchy => Cost::Candidates,
+        Search::Scan => Cost::Scanned,
+    };
+    scores.cost[asked as usize] += work.candidates;
+    scores.cost[Cost::Nodes as usize] += work.nodes;
+    scores.cost[Cost::Evaluations as usize] += work.accepted * bands as u64;
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,238 @@
+//! Thinning: each point x_i of a cloud is accepted independently with probability p(|x - x_i|), and what is accepted
+//! weighs 1/p, so that the expected sum over the accepted is the sum over all.
+//!
+//! p is positive and does not increase with distance. [`scan`] asks every point; [`PointTree`] makes acceptances of the
+//! same law from a hierarchy, without visiting most of the points that it rejects.
+//!
+//! Uniform numbers decide against p down to 2^-106 ([`Stream::draw_fine`]): with 24 bits, the one number 0 would accept
+//! points of p < 2^-24 with probability 2^-24 and weights e^(+sigma d) without bound, a bias of orders of magnitude in
+//! large bodies; with 53 bits the same happens beyond optical depth 36.7.
+
+mod scan;
+mod tree;
+
+pub use scan::scan;
+pub use tree::PointTree;
+
+#[cfg(test)]
+mod tests;
+
+use super::stream::Stream;
+use crate::math::exp;
+
+/// The probability of acceptance by distance (mm), and what makes deciding cheap.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rule {
+    form: Form,
+    /// Square of the distance beyond which p is at most 2^-k, for each k; a uniform number in [2^-k, 2^(1-k)) can only
+    /// accept what is nearer.
+    reach_squared: [f64; LEVELS],
+}
+
+/// Halvings that have a reach of their own; smaller numbers decide without.
+const LEVELS: usize = 64;
+
+/// Forms of p(d).
+#[derive(Clone, Debug, PartialEq)]
+pub enum Form {
+    /// 1.
+    All,
+    /// e^(-sigma d).
+    Exponential {
+        /// 1/mm, not negative.
+        sigma: f64,
+    },
+    /// The mean of e^(-sigma d) over several sigma.
+    MeanOfExponentials {
+        /// 1/mm, not negative.
+        sigmas: Vec<f64>,
+    },
+    /// max(e^(-sigma d), least).
+    Floor {
+        /// 1/mm, not negative.
+        sigma: f64,
+        /// In (0, 1].
+        least: f64,
+    },
+    /// Linear between values at distances `reach` (k/n)^2, k = 0..=n; beyond `reach` the last value.
+    Table {
+        /// Not increasing, in (0, 1].
+        values: Vec<f64>,
+        /// mm, positive.
+        reach: f64,
+    },
+}
+
+impl Form {
+    /// min(1, c f(d)) as a table, for a function that does not increase. What is tabulated is the probability by
+    /// definition: tables coarser than `f` cost variance, not bias.
+    ///
+    /// c makes the mean of p over the disc of radius `reach` equal to `mean` (at most 1), so that two rules can be
+    /// compared at equal numbers of accepted points.
+    pub fn proportional(f: impl Fn(f64) -> f64, reach: f64, mean: f64) -> Form {
+        const CELLS: usize = 2048;
+        let at = |k: usize| reach * square(k as f64 / CELLS as f64);
+        let values: Vec<f64> = (0..=CELLS).map(|k| f(at(k))).collect();
+        // Simpson's rule is wasted on a kink: the trapezoidal rule on the grid itself, int p 2 d dd / reach^2.
+        let mean_of = |c: f64| {
+            let p = |k: usize| (c * values[k]).min(1.0);
+            let cell = |k: usize| (square(at(k + 1)) - square(at(k))) * 0.5 * (p(k) + p(k + 1));
+            (0..CELLS).map(cell).sum::<f64>() / (reach * reach)
+        };
+        // Bisection in the exponent: from c f = 1 nowhere to everywhere.
+        let [mut lo, mut hi] = [values[0], values[CELLS]].map(|value| -crate::math::log2(value));
+        for _ in 0..60 {
+            let middle = 0.5 * (lo + hi);
+            if mean_of(crate::math::pow(2.0, middle)) < mean {
+                lo = middle;
+            } else {
+                hi = middle;
+            }
+        }
+        let c = crate::math::pow(2.0, 0.5 * (lo + hi));
+        Form::Table { values: values.iter().map(|value| (c * value).min(1.0)).collect(), reach }
+    }
+
+    /// p(d).
+    #[inline]
+    pub fn probability(&self, d: f64) -> f64 {
+        match self {
+            Form::All => 1.0,
+            Form::Exponential { sigma } => exp(-sigma * d),
+            Form::MeanOfExponentials { sigmas } => {
+                sigmas.iter().map(|sigma| exp(-sigma * d)).sum::<f64>() / sigmas.len() as f64
+            }
+            Form::Floor { sigma, least } => exp(-sigma * d).max(*least),
+            Form::Table { values, reach } => {
+                let cells = values.len() - 1;
+                let at = cells as f64 * (d / reach).sqrt();
+                let k = at as usize;
+                if k >= cells {
+                    return values[cells];
+                }
+                let [from, to] = [k, k + 1].map(|k| square(k as f64 / cells as f64));
+                let share = (d / reach - from) / (to - from);
+                values[k] + share.clamp(0.0, 1.0) * (values[k + 1] - values[k])
+            }
+        }
+    }
+}
+
+impl Rule {
+    /// With everything that depends on p alone.
+    pub fn new(form: Form) -> Rule {
+        let reach_squared = std::array::from_fn(|k| {
+            let reach = reach(&form, crate::math::pow(2.0, -(k as f64)));
+            reach * reach
+        });
+        Rule { form, reach_squared }
+    }
+
+    /// p(d), in (0, 1] but for underflow.
+    #[inline]
+    pub fn probability(&self, d: f64) -> f64 {
+        self.form.probability(d)
+    }
+
+    /// What an accepted point at distance d weighs: 1/p(d).
+    #[inline]
+    pub fn weight(&self, d: f64) -> f64 {
+        1.0 / self.probability(d)
+    }
+
+    /// Whether p varies by more than a factor between two distances, with `most` at the nearer.
+    #[inline]
+    fn varies(&self, factor: f64, [near, far]: [f64; 2], most: f64) -> bool {
+        match self.form {
+            Form::All => false,
+            // Without another exponential: e^x > 1 + x + x^2/2 says yes too rarely by what does not matter here.
+            Form::Exponential { sigma } => {
+                let x = sigma * (far - near);
+                1.0 + x + 0.5 * x * x > factor
+            }
+            _ => most > factor * self.probability(far),
+        }
+    }
+
+    /// Whether the number `u` could accept at this squared distance; false only where it does not.
+    #[inline]
+    fn may_accept(&self, u: f64, squared_distance: f64) -> bool {
+        // u = 2^(e - 1023) (1 + m): at least 2^-k with k = 1023 - e.
+        let k = 1023 - (u.to_bits() >> 52) as usize;
+        k >= LEVELS || squared_distance < self.reach_squared[k]
+    }
+}
+
+/// A distance beyond which p is at most `least`, from above; infinite where there is none.
+fn reach(form: &Form, least: f64) -> f64 {
+    let (mut lo, mut hi) = (0.0, 1.0);
+    while form.probability(hi) > least {
+        lo = hi;
+        hi *= 2.0;
+        if hi > 1e30 {
+            return f64::INFINITY;
+        }
+    }
+    for _ in 0..80 {
+        let middle = 0.5 * (lo + hi);
+        if form.probability(middle) > least {
+            lo = middle;
+        } else {
+            hi = middle;
+        }
+    }
+    hi * (1.0 + 1e-9) // rounding of p and of squares
+}
+
+fn square(x: f64) -> f64 {
+    x * x
+}
+
+/// An accepted point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Accepted {
+    /// Its index, in the order of the tree.
+    pub index: usize,
+    /// Its distance, mm.
+    pub distance: f64,
+    /// 1/p.
+    pub weight: f64,
+}
+
+/// Counts of what a query did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Nodes of the hierarchy.
+    pub nodes: u64,
+    /// Points that a random number was spent on.
+    pub candidates: u64,
+    /// Points accepted.
+    pub accepted: u64,
+}
+
+/// Decides about the point at squared distance `squared`.
+#[inline]
+fn decide(rule: &Rule, u: f64, squared: f64) -> Option<(f64, f64)> {
+    if !rule.may_accept(u, squared) {
+        return None;
+    }
+    let distance = squared.sqrt();
+    let p = rule.probability(distance);
+    (u < p).then(|| (distance, 1.0 / p))
+}
+
+impl Stream {
+    /// A uniform number in [0, 1) whose digits do not end at 2^-53: small numbers have their own 53 digits, down to
+    /// multiples of 2^-106, so that P(u < p) = p for every p that matters.
+    #[inline]
+    pub fn draw_fine(&mut self) -> f64 {
+        const FEW: f64 = 1.0 / (1u64 << 20) as f64;
+        let u = self.draw();
+        if u < FEW { self.lengthen(u) } else { u }
+    }
+
+    #[cold]
+    fn lengthen(&mut self, u: f64) -> f64 {
+        u + self.draw() * (1.0 / (1u64 << 53) as f64)
+    }
+}
