@@ -4,10 +4,15 @@
 //! and knows no file, thread or statistic. The runner folds scores into moments, zeros included.
 
 mod bands;
+pub mod bssrdf_density;
+pub mod bssrdf_probe;
+pub mod bssrdf_rays;
+mod bssrdf_single;
 mod choice;
 mod crossing;
 mod emergence;
 mod history;
+mod illumination;
 pub mod light_trace;
 pub mod path;
 pub mod point_cloud;

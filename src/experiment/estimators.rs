@@ -18,7 +18,17 @@ use crate::scene::{Scene, Sensor};
 pub fn builtin() -> Registry {
     Registry {
         samplers: super::samplers::builtin(),
-        entries: vec![PATH, SNEE, TWO_BOUNCE, BIDIRECTIONAL, LIGHT_TRACE, POINT_CLOUD],
+        entries: vec![
+            PATH,
+            SNEE,
+            TWO_BOUNCE,
+            BIDIRECTIONAL,
+            LIGHT_TRACE,
+            POINT_CLOUD,
+            super::bssrdf_probe::BSSRDF_PROBE,
+            super::bssrdf_probe::BSSRDF_RAYS,
+            super::bssrdf_probe::BSSRDF_DENSITY,
+        ],
     }
 }
 
@@ -87,7 +97,7 @@ const POINT_CLOUD: RegistryEntry = RegistryEntry {
 };
 
 /// Whole paths start outside the body.
-fn looks_from_outside(kind: &str, scene: &Scene) -> Result<()> {
+pub fn looks_from_outside(kind: &str, scene: &Scene) -> Result<()> {
     match scene.sensor {
         Sensor::Vertex { .. } => Err(Error::input_help(
             format!("{kind} starts its paths outside the body, the sensor `vertex` stands inside"),

@@ -10,6 +10,9 @@ use crate::error::{Error, Result};
 /// The words for BSSRDF models.
 pub mod bssrdf;
 
+/// Words for the estimators that integrate a BSSRDF without a point cloud.
+pub mod bssrdf_probe;
+
 /// From words to scenes.
 pub mod build;
 

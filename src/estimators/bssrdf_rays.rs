@@ -1,0 +1,187 @@
+//! BSSRDF integration by rays from inside: one goes under the surface, shoots rays in all directions, and looks at the
+//! illumination where they meet the surface.
+//!
+//! The rays start from a point on the normal below the exit, at most half way to the opposite side, in uniform
+//! directions w. The first surface point that each meets from inside is an entry; its density is
+//!   pdf_area = |n_i . w| / (4 pi d^2),
+//! d being the ray's length. From a depth h below a plane that is h / (4 pi (r^2 + h^2)^(3/2)), the shape of a dipole's
+//! source without absorption, which keeps the weights bounded for every h. (From the exit itself nothing would be seen of
+//! the plane or the face that it lies on.)
+//!
+//! What such rays cannot see: entries that the body's own boundary hides from the point below the exit. There are none
+//! in a convex body.
+
+use std::sync::Arc;
+
+use super::bssrdf_probe::adds_single;
+use super::bssrdf_single::score_single;
+use super::emergence::{Emergence, Gather, Skin};
+use super::illumination::{Illumination, PathStreams, groups_among};
+use super::{Anomaly, BandUse, Bias, Cost, Estimator, Scores};
+use crate::error::Result;
+use crate::geometry::{Mesh, Ray, Shape, Side};
+use crate::math::DVec3;
+use crate::optics::bssrdf::Model;
+use crate::sampling::stream::PassKey;
+use crate::sampling::warp::{pdf_cap, square_to_cap};
+use crate::scene::Scene;
+
+/// What the estimator is built with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RayOptions {
+    /// The model.
+    pub model: Model,
+    /// Rays per emergence, positive.
+    pub rays: usize,
+    /// How far below the exit they start, mm; `None`: the reduced mean free path (of a group of bands, the geometric
+    /// mean of its least and its largest).
+    pub depth: Option<f64>,
+    /// Whether the single-scattering term is added; `None`: where the model leaves it out.
+    pub single: Option<bool>,
+    /// Whether light that goes straight through is followed.
+    pub straight: bool,
+}
+
+/// The estimator, for one scene.
+#[derive(Debug)]
+pub struct BssrdfRays {
+    skin: Skin,
+    illumination: Illumination,
+    rays: usize,
+    depth: Option<f64>,
+    single: bool,
+    model: String,
+    sees_all: bool,
+}
+
+impl BssrdfRays {
+    /// For a scene.
+    ///
+    /// # Errors
+    /// A rough boundary; a medium that the model does not fit.
+    pub fn new(scene: Arc<Scene>, options: &RayOptions) -> Result<BssrdfRays> {
+        let skin = Skin::new(scene, &options.model, options.straight)?;
+        Ok(BssrdfRays {
+            illumination: Illumination::new(&skin.scene),
+            rays: options.rays,
+            depth: options.depth,
+            single: adds_single(&skin, options.single),
+            model: options.model.to_string(),
+            sees_all: match &*skin.scene.shape {
+                Shape::Mesh(mesh) => is_convex(mesh),
+                shape => shape.is_convex(),
+            },
+            skin,
+        })
+    }
+
+    fn depth(&self, bands: &[usize]) -> f64 {
+        self.depth.unwrap_or_else(|| {
+            let mfp = bands.iter().map(|&band| {
+                let medium = &self.skin.scene.medium[band];
+                1.0 / (medium.sigma_t * (1.0 - medium.albedo * medium.phase.g))
+            });
+            let (least, most) = mfp.fold((f64::INFINITY, 0f64), |(a, b), mfp| (a.min(mfp), b.max(mfp)));
+            (least * most).sqrt()
+        })
+    }
+}
+
+/// Pairs of triangle and vertex that a look at a mesh's convexity may take.
+const MOST_PAIRS: usize = 1 << 30;
+
+/// Whether no vertex of a mesh stands out over the plane of one of its triangles by more than rounding. Not asked of
+/// convex meshes that are very large, which then count as not known to be convex.
+fn is_convex(mesh: &Mesh) -> bool {
+    let vertices = mesh.vertices();
+    if mesh.triangles().len().saturating_mul(vertices.len()) > MOST_PAIRS {
+        return false;
+    }
+    let rounding = 64.0 * f64::EPSILON * mesh.bounds().radius;
+    mesh.triangles().iter().all(|triangle| {
+        let [a, b, c] = triangle.map(|i| vertices[i as usize]);
+        let normal = (b - a).cross(c - a);
+        let bound = rounding * normal.length();
+        vertices.iter().all(|v| (*v - a).dot(normal) <= bound)
+    })
+}
+
+impl Estimator for BssrdfRays {
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        for group in groups_among(&self.skin, bands) {
+            let depth = self.depth(&group);
+            for index in 0..self.skin.scene.sensor.rays_per_pass() {
+                let streams = PathStreams::new(&self.skin, key, index, &group);
+                let mut gather = Shooting { estimator: self, streams, depth };
+                self.skin.play(&group, index, key, scores, &mut gather);
+            }
+        }
+    }
+
+    fn band_use(&self) -> BandUse {
+        BandUse::Shared
+    }
+
+    fn model(&self) -> Option<String> {
+        Some(self.model.clone())
+    }
+
+    fn bias(&self) -> Bias {
+        if self.sees_all {
+            Bias::Unbiased
+        } else {
+            Bias::Biased("entries that cannot be seen from under the exit are left out".into())
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.skin.notes()
+    }
+}
+
+struct Shooting<'a> {
+    estimator: &'a BssrdfRays,
+    streams: PathStreams,
+    depth: f64,
+}
+
+impl Gather for Shooting<'_> {
+    fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
+        let BssrdfRays { skin, illumination, rays, single, .. } = self.estimator;
+        if *single {
+            score_single(skin, illumination, emergence, &mut self.streams.single, scores);
+        }
+        let Some(origin) = self.below(emergence, scores) else { return };
+        let shape = &skin.scene.shape;
+        for _ in 0..*rays {
+            let u = self.streams.entries.draw2();
+            let u_light = self.streams.lights.draw3();
+            let ray = Ray { origin, dir: square_to_cap(2.0, u) };
+            scores.count(Cost::Rays);
+            let Some(hit) = shape.intersect(&ray, Side::Inside, None, f64::INFINITY) else {
+                if shape.bounds().is_some() {
+                    scores.note(Anomaly::LostRay);
+                }
+                continue;
+            };
+            let pdf_area = pdf_cap(2.0) * ray.dir.dot(hit.normal).abs() / (hit.t * hit.t);
+            illumination.enter(skin, emergence, &hit, *rays as f64 * pdf_area, u_light, scores);
+        }
+    }
+}
+
+impl Shooting<'_> {
+    /// The point under the exit.
+    fn below(&self, emergence: &Emergence<'_>, scores: &mut Scores) -> Option<DVec3> {
+        let shape = &self.estimator.skin.scene.shape;
+        let down = Ray { origin: emergence.exit.point, dir: -emergence.exit.normal };
+        scores.count(Cost::Rays);
+        let opposite = shape.intersect(&down, Side::Inside, Some(emergence.face), f64::INFINITY);
+        let point = down.at(opposite.map_or(self.depth, |hit| self.depth.min(0.5 * hit.t)));
+        if shape.contains(point) {
+            return Some(point);
+        }
+        scores.note(Anomaly::WrongSide); // the shading normal points into the body
+        None
+    }
+}

@@ -1,0 +1,155 @@
+//! What a light sends to a point of the surface, and what of it goes in and comes out elsewhere: the part that all
+//! ways of choosing the point share.
+
+use super::choice::{choose_light, light_shares};
+use super::emergence::{Emergence, Skin};
+use super::{Anomaly, Cost, Scores, TransportClass};
+use crate::geometry::{Hit, Ray};
+use crate::math::{DVec3, Frame};
+use crate::optics::bssrdf::Entry;
+use crate::optics::fresnel::fresnel;
+use crate::sampling::stream::{PassKey, Purpose, Stream};
+use crate::scene::Scene;
+
+/// Draws one light of a scene, and a direction from it.
+#[derive(Debug)]
+pub(super) struct Illumination {
+    /// Per band.
+    shares: Vec<Vec<f64>>,
+}
+
+/// A direction from one light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arrival {
+    pub light: usize,
+    /// Towards the light.
+    pub wi: DVec3,
+    /// Radiance over the density of light and direction, W/mm^2.
+    pub value: f64,
+}
+
+impl Illumination {
+    pub fn new(scene: &Scene) -> Illumination {
+        Illumination { shares: light_shares(scene) }
+    }
+
+    /// One light in proportion to its strength (`u[0]`), a direction from it; `None` where no light shines.
+    #[inline]
+    pub fn draw(&self, scene: &Scene, band: usize, u: [f64; 3]) -> Option<Arrival> {
+        let (light, choice) = choose_light(&self.shares[band], u[0])?;
+        let sample = scene.lights[light].sample(band, [u[1], u[2]]);
+        let value = sample.radiance / (choice * sample.pdf.unwrap_or(1.0));
+        Some(Arrival { light, wi: sample.wi, value })
+    }
+
+    /// Scores, for one light sample per band, what enters at `hit` and leaves at the emergence. `pdf_area` is the
+    /// density of the entry point, 1/mm^2, times the number of points that are drawn so.
+    ///
+    /// Bands whose light samples are the same direction share its shadow ray.
+    pub fn enter(
+        &self,
+        skin: &Skin,
+        emergence: &Emergence<'_>,
+        hit: &Hit,
+        pdf_area: f64,
+        u: [f64; 3],
+        scores: &mut Scores,
+    ) {
+        let scene = &*skin.scene;
+        let mut last: Option<(DVec3, Option<Entrance>)> = None;
+        for (&band, throughput) in emergence.bands.iter().zip(emergence.throughput) {
+            let Some(arrival) = self.draw(scene, band, u) else { continue };
+            let entrance = match last {
+                Some((wi, entrance)) if wi == arrival.wi => entrance,
+                _ => Entrance::lit(scene, hit, arrival.wi, emergence.eta, scores),
+            };
+            last = Some((arrival.wi, entrance));
+            let Some(entrance) = entrance else { continue };
+            let entry = Entry { point: hit.point, normal: hit.shading_normal, dir: entrance.dir };
+            scores.count(Cost::Evaluations);
+            let kernel = skin.models[band].kernel(&entry, &emergence.exit);
+            let irradiance = entrance.transmittance * entrance.cos * arrival.value;
+            let value = throughput * kernel * irradiance / pdf_area;
+            scores.add(emergence.slot, band, TransportClass::Multiple, arrival.light, value);
+        }
+    }
+}
+
+/// Light that goes through the boundary from outside.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entrance {
+    /// Between the normal and the direction to the light.
+    pub cos: f64,
+    /// Between the normal and the direction inside, positive.
+    pub cos_inside: f64,
+    /// T12.
+    pub transmittance: f64,
+    /// Unit direction of travel inside.
+    pub dir: DVec3,
+}
+
+impl Entrance {
+    /// For light from `wi`, with the cosine and the transmittance of the shading normal. `None` from below, or where
+    /// the light is above one of the two normals and below the other, which is counted.
+    #[inline]
+    pub fn at(hit: &Hit, wi: DVec3, eta: f64, scores: &mut Scores) -> Option<Entrance> {
+        let frame = Frame::about(hit.shading_normal);
+        let local = frame.to_local(wi);
+        let [geometric, shading] = [wi.dot(hit.normal) > 0.0, local.z > 0.0];
+        if geometric != shading {
+            scores.note(Anomaly::WrongSide);
+        }
+        if !(geometric && shading) {
+            return None;
+        }
+        let surface = fresnel(local.z, eta);
+        if surface.cos_t == 0.0 {
+            return None; // total reflection, of a body that is optically thinner than what is around it
+        }
+        let dir = frame.to_world(DVec3::new(-local.x / eta, -local.y / eta, -surface.cos_t));
+        let transmittance = 1.0 - surface.reflectance;
+        Some(Entrance { cos: local.z, cos_inside: surface.cos_t, transmittance, dir })
+    }
+
+    /// The same where nothing stands between the point and the light.
+    #[inline]
+    pub fn lit(scene: &Scene, hit: &Hit, wi: DVec3, eta: f64, scores: &mut Scores) -> Option<Entrance> {
+        let entrance = Entrance::at(hit, wi, eta, scores)?;
+        scores.count(Cost::ShadowRays);
+        let shadow_ray = Ray { origin: hit.point, dir: wi };
+        (!scene.shape.occluded(&shadow_ray, Some(hit.face))).then_some(entrance)
+    }
+}
+
+/// The streams of one camera path beside its walk.
+pub(super) struct PathStreams {
+    /// Of light samples at entries.
+    pub lights: Stream,
+    /// Of entries.
+    pub entries: Stream,
+    /// Of the single-scattering term, which then shifts none of the others.
+    pub single: Stream,
+}
+
+/// Sets the streams of single scattering apart from those of entries. Indices stay below it.
+const SINGLE: u64 = 1 << 63;
+
+impl PathStreams {
+    /// For path `index` of a pass and a group of bands.
+    pub fn new(skin: &Skin, key: &PassKey, index: usize, bands: &[usize]) -> PathStreams {
+        let lane = skin.lane(index, bands);
+        PathStreams {
+            lights: key.stream(lane, Purpose::Light),
+            entries: key.stream(lane, Purpose::Connection),
+            single: key.stream(lane | SINGLE, Purpose::Light),
+        }
+    }
+}
+
+/// The groups of a skin, as far as they are among `bands`.
+pub(super) fn groups_among(skin: &Skin, bands: &[usize]) -> Vec<Vec<usize>> {
+    let among = |group: &Vec<usize>| -> Vec<usize> {
+        group.iter().copied().filter(|band| bands.contains(band)).collect()
+    };
+    skin.groups.iter().map(among).filter(|group| !group.is_empty()).collect()
+}
