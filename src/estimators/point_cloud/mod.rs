@@ -17,12 +17,15 @@ mod cloud;
 use std::sync::Arc;
 
 use self::cloud::Cloud;
+use super::bssrdf_probe::adds_single;
+use super::bssrdf_single::score_single;
 use super::emergence::{Emergence, Gather, Skin};
+use super::illumination::{Illumination, PathStreams};
 use super::{Anomaly, BandUse, Cost, Estimator, HeavyTail, Scores, TransportClass};
 use crate::error::{Error, Result};
 use crate::geometry::{BodySampler, FaceChoice};
 use crate::optics::bssrdf::{Entry, Model};
-use crate::sampling::stream::{PassKey, Purpose, Stream};
+use crate::sampling::stream::PassKey;
 use crate::sampling::thinning::{Accepted, Form, Rule, Work, scan};
 use crate::scene::Scene;
 
@@ -87,6 +90,8 @@ pub struct PointCloud {
     options: PointCloudOptions,
     /// Per group of the skin: which bands accept by which rule.
     rules: Vec<Vec<(Vec<usize>, Rule)>>,
+    illumination: Illumination,
+    single: bool,
 }
 
 impl PointCloud {
@@ -105,7 +110,9 @@ impl PointCloud {
         };
         let skin = Skin::new(scene, &options.model, options.straight)?;
         let rules = rules(&skin, options.acceptance, 2.0 * bounds.radius);
-        Ok(PointCloud { skin, sampler, options, rules })
+        let illumination = Illumination::new(&skin.scene);
+        let single = adds_single(&skin, options.single);
+        Ok(PointCloud { skin, sampler, options, rules, illumination, single })
     }
 }
 
@@ -161,14 +168,8 @@ impl Estimator for PointCloud {
         scores.anomalies[Anomaly::WrongSide as usize] += cloud.wrong_side;
         for (group, rules) in self.skin.groups.iter().zip(&self.rules) {
             for index in 0..self.skin.scene.sensor.rays_per_pass() {
-                let stream = key.stream(self.skin.lane(index, group), Purpose::Connection);
-                let mut sum = CloudSum {
-                    skin: &self.skin,
-                    cloud: &cloud,
-                    rules,
-                    search: self.options.search,
-                    stream,
-                };
+                let streams = PathStreams::new(&self.skin, key, index, group);
+                let mut sum = CloudSum { estimator: self, cloud: &cloud, rules, streams };
                 self.skin.play(group, index, key, scores, &mut sum);
             }
         }
@@ -218,42 +219,58 @@ impl Estimator for PointCloud {
 
 /// L_r of one camera path.
 struct CloudSum<'a> {
-    skin: &'a Skin,
+    estimator: &'a PointCloud,
     cloud: &'a Cloud,
     rules: &'a [(Vec<usize>, Rule)],
-    search: Search,
-    stream: Stream,
+    streams: PathStreams,
 }
 
 impl Gather for CloudSum<'_> {
     fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let lights = self.skin.scene.lights.len();
+        let PointCloud { skin, options, illumination, single, .. } = self.estimator;
         for (bands, rule) in self.rules {
-            let mut sums = vec![0.0; bands.len() * lights];
-            let (cloud, models, at) = (self.cloud, &self.skin.models, emergence.exit.point);
-            let mut work = Work::default();
-            let add = |accepted: Accepted| {
-                let place = accepted.index;
-                let entry: Entry = cloud.entry(place, emergence.eta);
-                let sums = sums.iter_mut().skip(cloud.light(place)).step_by(lights);
-                for (sum, &band) in sums.zip(bands) {
-                    let kernel = models[band].kernel(&entry, &emergence.exit);
-                    *sum += kernel * cloud.flux(place, band) * accepted.weight;
-                }
-            };
-            match self.search {
-                Search::Hierarchy => cloud.tree.thin(at, rule, &mut self.stream, &mut work, add),
-                Search::Scan => {
-                    let all = 0..cloud.len();
-                    scan(cloud.tree.axes(), all, at, rule, &mut self.stream, &mut work, add);
-                }
+            self.sum(bands, rule, emergence, options.search, scores);
+        }
+        if *single {
+            score_single(skin, illumination, emergence, &mut self.streams.single, scores);
+        }
+    }
+}
+
+impl CloudSum<'_> {
+    /// The sum over accepted points in bands that accept together.
+    fn sum(
+        &mut self,
+        bands: &[usize],
+        rule: &Rule,
+        emergence: &Emergence<'_>,
+        search: Search,
+        scores: &mut Scores,
+    ) {
+        let skin = &self.estimator.skin;
+        let (cloud, models, at) = (self.cloud, &skin.models, emergence.exit.point);
+        let lights = skin.scene.lights.len();
+        let mut sums = vec![0.0; bands.len() * lights];
+        let mut work = Work::default();
+        let add = |accepted: Accepted| {
+            let place = accepted.index;
+            let entry: Entry = cloud.entry(place, emergence.eta);
+            let sums = sums.iter_mut().skip(cloud.light(place)).step_by(lights);
+            for (sum, &band) in sums.zip(bands) {
+                let kernel = models[band].kernel(&entry, &emergence.exit);
+                *sum += kernel * cloud.flux(place, band) * accepted.weight;
             }
-            count(scores, self.search, &work, bands.len());
-            for (k, sum) in sums.into_iter().enumerate() {
-                let (band, light) = (bands[k / lights], k % lights);
-                let throughput = emergence.throughput_of(band);
-                scores.add(emergence.slot, band, TransportClass::Multiple, light, throughput * sum);
-            }
+        };
+        let stream = &mut self.streams.entries;
+        match search {
+            Search::Hierarchy => cloud.tree.thin(at, rule, stream, &mut work, add),
+            Search::Scan => scan(cloud.tree.axes(), 0..cloud.len(), at, rule, stream, &mut work, add),
+        }
+        count(scores, search, &work, bands.len());
+        for (k, sum) in sums.into_iter().enumerate() {
+            let (band, light) = (bands[k / lights], k % lights);
+            let value = emergence.throughput_of(band) * sum;
+            scores.add(emergence.slot, band, TransportClass::Multiple, light, value);
         }
     }
 }
