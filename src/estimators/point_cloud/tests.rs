@@ -142,7 +142,7 @@ fn what_does_not_fit_is_refused() {
         let mut scene = Arc::into_inner(scene(vec![sky()])).expect("alone");
         change(&mut scene);
         let options = options(Acceptance::All, Search::Scan);
-        PointCloud::new(Arc::new(scene), options).err().expect("refused").to_string()
+        PointCloud::new(Arc::new(scene), options).expect_err("refused").to_string()
     };
     assert!(with(&|scene| scene.shape = Arc::new(Shape::HalfSpace)).contains("finite body"));
     assert!(with(&|scene| scene.boundary[1] = rough).contains("rough"));
