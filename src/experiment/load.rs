@@ -125,8 +125,7 @@ impl Loader<'_> {
         }
         let names = estimators.map(Node::items).unwrap_or_default();
         let names = names.iter().filter_map(|entry| entry.get("name")?.as_str()).collect();
-        let bands = at.typed::<Bands>("bands");
-        let bands = bands.map(|bands| bands.list().into_iter().map(|band| band.name).collect());
+        let bands = self.bands().map(|bands| bands.list().into_iter().map(|band| band.name).collect());
         let known = Known { estimators: names, bands, axes, budget: at.typed("budget") };
         let claims = at.to("claim");
         for (i, entry) in self.root.get("claim").map(Node::items).unwrap_or_default().iter().enumerate()
