@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Writes two tables of what the classical dipole makes of a sphere under a uniform sky:
+"""Writes three tables of what the classical dipole makes of a sphere under a uniform sky:
 
     python3 -m venv venv && venv/bin/pip install mpmath
     venv/bin/python scripts/sphere_under_sky.py 0 > experiments/verify/small_spheres.csv
     venv/bin/python scripts/sphere_under_sky.py 1 > experiments/verify/large_spheres.csv
+    venv/bin/python scripts/sphere_under_sky.py 2 > experiments/figures/red_tail.csv
 
 Irradiance that enters is the same at every point, pi L (1 - F_ext), F_ext = 2 int F mu dmu from outside; in chord length
 d the area of a sphere is 2 pi d dd. So the radiance that leaves any point is T(mu) L (1 - F_ext) D with
@@ -19,13 +20,13 @@ from mpmath import exp, mp, mpf, nstr, pi, quad, sqrt
 
 mp.dps = 30
 
-# Reduced scattering and absorption, 1/mm, red green blue; index; and two radii, mm. With the smaller one the mean over the
+# Reduced scattering and absorption, 1/mm, red green blue; index; and radii, mm. With the smaller one the mean over the
 # bands of the effective transport coefficient, less twice the smallest, times the diameter is below 3; with the larger
-# it is above in all of them but marble, where it is negative.
+# it is above in all of them but marble, where it is negative; the third is far above.
 MATERIALS = {
-    "skin1": ((0.74, 0.88, 1.01), (0.032, 0.17, 0.48), 1.3, (5, 20)),
+    "skin1": ((0.74, 0.88, 1.01), (0.032, 0.17, 0.48), 1.3, (5, 20, 40)),
     "marble": ((2.19, 2.62, 3.00), (0.0021, 0.0041, 0.0071), 1.5, (5, 20)),
-    "ketchup": ((0.18, 0.07, 0.03), (0.061, 0.97, 1.45), 1.3, (1.2, 10)),
+    "ketchup": ((0.18, 0.07, 0.03), (0.061, 0.97, 1.45), 1.3, (1.2, 10, 20)),
     "wholemilk": ((2.55, 3.21, 3.77), (0.0011, 0.0024, 0.014), 1.3, (5, 50)),
 }
 
@@ -65,6 +66,8 @@ print("# classical dipole (Jensen et al. 2001), exact Fresnel moments, quadratur
 print("# scripts/sphere_under_sky.py writes this file and says how.")
 print("label,material,radius_mm,eta,R,G,B")
 for name, (scattering, absorption, n, radii) in MATERIALS.items():
+    if int(sys.argv[1]) >= len(radii):
+        continue
     radius = radii[int(sys.argv[1])]
     values = [nstr(diffused(s, a, n, mpf(str(radius))), 12) for s, a in zip(scattering, absorption)]
     print(f"{name},{name},{radius},{n},{','.join(values)}")

@@ -23,7 +23,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
     ("stats", &["math"]),
     ("results", &["math", "stats"]),
     ("verify", &["math", "stats", "results"]),
-    ("report", &["stats", "results", "verify"]),
+    ("report", &["math", "stats", "results", "verify"]),
     // The bridge.
     ("experiment", &EXPERIMENT),
     ("run", &RUN),

@@ -3,16 +3,38 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::results::pictures;
+use crate::results::pictures::{self, Wanted};
 
 /// One picture: exactly one kind. Pictures are views of a record and change none of its bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{ "required": ["split"] }]))]
+#[schemars(extend("oneOf" = [{ "required": ["split"] }, { "required": ["running"] }]))]
 pub struct PictureEntry {
     /// Two estimators side by side.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split: Option<Split>,
+    /// Means as passes add up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub running: Option<Running>,
+}
+
+/// A plot a cell: the mean of one number over the first passes, with its interval, as passes add up; and the value that
+/// an `equals` claim expects of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Running {
+    /// The estimators; all of them without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
+    pub estimators: Option<Vec<String>>,
+    /// The observable; the sensor's first one without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observable: Option<String>,
+    /// The transport class; `all` without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<String>,
+    /// The band.
+    pub band: String,
 }
 
 /// A grid of pictures, a picture a cell of the sweep: its left half by one estimator, its right half by
@@ -38,15 +60,29 @@ pub struct Split {
 }
 
 /// What the results folder keeps of the pictures that a file asks for.
-pub fn wanted(entries: &[PictureEntry]) -> Vec<pictures::Split> {
-    let split = |entry: &PictureEntry| {
-        entry.split.as_ref().map(|words| pictures::Split {
-            left: words.left.clone(),
-            right: words.right.clone(),
-            rows: words.rows.clone(),
-            columns: words.columns.clone(),
-            exposure_stops: words.exposure_stops,
-        })
-    };
-    entries.iter().filter_map(split).collect()
+pub fn wanted(entries: &[PictureEntry]) -> Vec<Wanted> {
+    entries.iter().filter_map(PictureEntry::wanted).collect()
+}
+
+impl PictureEntry {
+    fn wanted(&self) -> Option<Wanted> {
+        let split = self.split.as_ref().map(|words| {
+            Wanted::Split(pictures::Split {
+                left: words.left.clone(),
+                right: words.right.clone(),
+                rows: words.rows.clone(),
+                columns: words.columns.clone(),
+                exposure_stops: words.exposure_stops,
+            })
+        });
+        let running = self.running.as_ref().map(|words| {
+            Wanted::Running(pictures::Running {
+                estimators: words.estimators.clone(),
+                observable: words.observable.clone(),
+                class: words.class.clone().unwrap_or_else(|| "all".into()),
+                band: words.band.clone(),
+            })
+        });
+        split.or(running)
+    }
 }

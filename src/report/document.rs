@@ -30,13 +30,22 @@ pub enum Block {
     Wide(FigureBlock),
 }
 
+/// The file of a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Picture {
+    /// PNG.
+    Png(Vec<u8>),
+    /// SVG.
+    Svg(String),
+}
+
 /// One picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigureBlock {
     /// Path relative to the page.
     pub path: String,
-    /// The PNG file.
-    pub png: Vec<u8>,
+    /// What is shown.
+    pub picture: Picture,
     /// What it is, in a few words.
     pub title: String,
     /// What it shows.

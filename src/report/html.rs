@@ -1,7 +1,7 @@
 //! The page as one HTML file: no network, pictures as data URIs, light and dark, readable on a phone.
 
 use super::base64;
-use super::document::{Block, Document, FigureBlock};
+use super::document::{Block, Document, FigureBlock, Picture};
 use super::table::Table;
 
 const STYLE: &str = include_str!("style.css");
@@ -63,13 +63,15 @@ fn field(text: &str) -> String {
 }
 
 fn figure(f: &FigureBlock) -> String {
-    format!(
-        "<figure><img alt=\"{title}\" src=\"data:image/png;base64,{data}\">\
-         <figcaption><b>{title}</b><br>{caption}</figcaption></figure>\n",
-        title = escape(&f.title),
-        data = base64::encode(&f.png),
-        caption = escape(&f.caption)
-    )
+    let title = escape(&f.title);
+    let picture = match &f.picture {
+        Picture::Png(png) => {
+            format!("<img alt=\"{title}\" src=\"data:image/png;base64,{}\">", base64::encode(png))
+        }
+        Picture::Svg(svg) => svg.clone(),
+    };
+    let caption = escape(&f.caption);
+    format!("<figure>{picture}<figcaption><b>{title}</b><br>{caption}</figcaption></figure>\n")
 }
 
 fn escape(text: &str) -> String {

@@ -26,6 +26,10 @@ pub mod html;
 pub mod number;
 /// What the page says.
 mod page;
+/// Line plots.
+pub mod plot;
+/// Means as passes add up.
+mod running;
 /// Two estimators in one picture.
 pub mod split;
 /// Aligned text, Markdown and CSV.
@@ -55,6 +59,8 @@ pub struct Material {
     pub figures: Vec<Figure>,
     /// Grids of split pictures.
     pub splits: Vec<split::SplitFigure>,
+    /// Plots of means as passes add up.
+    pub running: Vec<document::FigureBlock>,
 }
 
 /// A picture of one run.
@@ -88,7 +94,10 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     let rows = measurements(&stored, timing.as_ref());
     let figures = write_figures(folder, &stored)?;
     let stored = Stored { timing: timing.clone(), ..stored };
-    let splits = split::write_splits(folder, &stored, &folder.read_pictures()?)?;
+    let wanted = folder.read_pictures()?;
+    let (splits, running) = (&split::wanted(&wanted), &running::wanted(&wanted));
+    let splits = split::write_splits(folder, &stored, splits)?;
+    let running = running::write_running(folder, &stored, running)?;
     let comparisons = comparisons::comparisons(&stored);
     let model_errors = model_errors(&stored);
     let material = Material {
@@ -101,6 +110,7 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
         model_errors,
         figures,
         splits,
+        running,
     };
     let page = page::page(&material);
     let views = [

@@ -2,7 +2,7 @@
 //! to make it again.
 
 use super::Material;
-use super::document::{Block, Document, FigureBlock};
+use super::document::{Block, Document, FigureBlock, Picture};
 use super::number::significant;
 use super::table::{
     Table, claim_table, comparison_table, measurement_table, model_error_table, verdict_table,
@@ -18,6 +18,7 @@ pub(super) fn page(material: &Material) -> Document {
     if material.stored.record.samplers.is_empty() {
         blocks.extend(measured(material));
         blocks.extend(super::split::blocks(&material.splits));
+        blocks.extend(super::running::blocks(&material.running));
         blocks.extend(model_errors(material));
         blocks.extend(efficiency(material));
         blocks.extend(cost(material));
@@ -110,7 +111,7 @@ fn measured(material: &Material) -> Vec<Block> {
 fn figure_block(figure: &super::Figure) -> FigureBlock {
     FigureBlock {
         path: format!("{}.png", figure.stem),
-        png: figure.png.clone(),
+        picture: Picture::Png(figure.png.clone()),
         title: figure.estimator.clone(),
         caption: figure.caption.clone(),
     }

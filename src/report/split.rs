@@ -2,13 +2,13 @@
 //! both shown alike, beside the CPU time that each half took. That they took the same is stated where it is
 //! so, and where it is not, by how much they differ.
 
-use super::document::{Block, Document, FigureBlock};
+use super::document::{self, Block, Document, FigureBlock};
 use super::number::significant;
 use super::table::Table;
 use crate::error::Result;
 use crate::results::canvas::{Canvas, Unshown};
 use crate::results::image::{Picture, gain};
-use crate::results::pictures::Split;
+use crate::results::pictures::{Split, Wanted};
 use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::{RecordFolder, Stored};
 
@@ -37,6 +37,15 @@ pub struct SplitFigure {
     pub caption: String,
     /// A row for each cell.
     pub table: Table,
+}
+
+/// The grids that are asked for.
+pub(super) fn wanted(all: &[Wanted]) -> Vec<Split> {
+    let split = |wanted: &Wanted| match wanted {
+        Wanted::Split(split) => Some(split.clone()),
+        Wanted::Running(_) => None,
+    };
+    all.iter().filter_map(split).collect()
 }
 
 /// Draws every grid that is asked for, and each of its pictures by itself, into `images/`.
@@ -75,7 +84,7 @@ impl SplitFigure {
     fn blocks(&self) -> [Block; 2] {
         let figure = FigureBlock {
             path: format!("{}.png", self.stem),
-            png: self.png.clone(),
+            picture: document::Picture::Png(self.png.clone()),
             title: self.title.clone(),
             caption: self.caption.clone(),
         };

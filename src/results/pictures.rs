@@ -3,6 +3,16 @@
 
 use serde::{Deserialize, Serialize};
 
+/// A picture that is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Wanted {
+    /// Two estimators side by side.
+    Split(Split),
+    /// Means as passes add up.
+    Running(Running),
+}
+
 /// A grid of pictures, a picture a cell, whose left half is one estimator's and whose right half another's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -17,4 +27,18 @@ pub struct Split {
     pub columns: Option<String>,
     /// Stops by which all pictures are brightened; none for a white of each picture's own.
     pub exposure_stops: Option<f64>,
+}
+
+/// A plot a cell: the mean of one number over the first passes, with its interval, as passes add up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Running {
+    /// The estimators, or all.
+    pub estimators: Option<Vec<String>>,
+    /// The observable; the sensor's first one without it.
+    pub observable: Option<String>,
+    /// The transport class.
+    pub class: String,
+    /// The band.
+    pub band: String,
 }

@@ -19,7 +19,7 @@ use serde::de::DeserializeOwned;
 
 use super::json::{canonical, hash_hex};
 use super::npy::Array;
-use super::pictures::Split;
+use super::pictures::Wanted;
 use super::record::{EstimatorRun, Quantity, Record, SCHEMA_VERSION};
 use super::{atomic, provenance::Provenance, timing::Timing};
 use crate::error::{Error, Result};
@@ -220,7 +220,7 @@ impl RecordFolder {
     }
 
     /// Writes `pictures.json`, or removes it where no picture is asked for.
-    pub fn write_pictures(&self, pictures: &[Split]) -> Result<()> {
+    pub fn write_pictures(&self, pictures: &[Wanted]) -> Result<()> {
         let path = self.root.join("pictures.json");
         if !pictures.is_empty() {
             return self.write_view("pictures.json", canonical(&pictures).as_bytes());
@@ -234,7 +234,7 @@ impl RecordFolder {
     }
 
     /// Reads `pictures.json`; nothing where it is not there.
-    pub fn read_pictures(&self) -> Result<Vec<Split>> {
+    pub fn read_pictures(&self) -> Result<Vec<Wanted>> {
         Ok(self.read_json("pictures.json")?.unwrap_or_default())
     }
 

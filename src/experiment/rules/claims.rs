@@ -145,7 +145,7 @@ pub(super) fn estimator(at: At, name: &str, known: &Known) {
 }
 
 /// A band of this name is there.
-fn band(at: At, name: &str, known: &Known) {
+pub(super) fn band(at: At, name: &str, known: &Known) {
     let Some(bands) = &known.bands else { return };
     if !bands.iter().any(|band| band == name) {
         let names: Vec<&str> = bands.iter().map(String::as_str).collect();

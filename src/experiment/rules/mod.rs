@@ -70,6 +70,11 @@ impl<'a> At<'a> {
         At { node: self.node.at(&[word]).unwrap_or(self.node), ..self }
     }
 
+    /// Whether there is an entry `word`.
+    pub fn has(self, word: &str) -> bool {
+        self.node.at(&[word]).is_some()
+    }
+
     /// The key under which it stands.
     pub fn key(self) -> At<'a> {
         At { is_key: true, ..self }

@@ -1,7 +1,7 @@
 //! Rules of `[[picture]]`.
 
 use super::At;
-use super::claims::{Known, axis, estimator};
+use super::claims::{Known, axis, band, estimator};
 use crate::experiment::picture::{PictureEntry, Split};
 use crate::experiment::schema::Sensor;
 
@@ -9,6 +9,13 @@ use crate::experiment::schema::Sensor;
 pub fn picture(at: At, picture: &PictureEntry, known: &Known) {
     if let Some(words) = &picture.split {
         split(at.to("split"), words, known);
+    }
+    if let Some(words) = &picture.running {
+        let at = at.to("running");
+        for (i, name) in words.estimators.iter().flatten().enumerate() {
+            estimator(at.to("estimators").item(i), name, known);
+        }
+        band(at.to("band"), &words.band, known);
     }
 }
 
@@ -35,11 +42,13 @@ fn split(at: At, words: &Split, known: &Known) {
     }
 }
 
-/// Pictures need pixels: `at` is the list of pictures, `sensor` that of a cell.
+/// Split pictures need pixels: `at` is the list of pictures, `sensor` that of a cell.
 pub fn has_pixels(at: At, sensor: &Sensor) {
-    if at.count() > 0 && matches!(sensor, Sensor::Probe { .. } | Sensor::Flux { .. }) {
-        at.item(0).report_help(
-            "a picture needs pixels, and the sensor has none",
+    let first = (0..at.count()).find(|i| at.item(*i).has("split"));
+    let Some(first) = first else { return };
+    if matches!(sensor, Sensor::Probe { .. } | Sensor::Flux { .. }) {
+        at.item(first).report_help(
+            "a split picture needs pixels, and the sensor has none",
             "take an `orthographic` or a `perspective` sensor in every cell, or drop the picture",
         );
     }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::experiment::picture::wanted;
+use crate::results::pictures::Wanted;
 
 const SWEEP: &str = r#"[[sweep]]
 key = "object.medium.coefficients.g"
@@ -51,5 +52,6 @@ fn pictures_are_no_part_of_the_resolved_experiment() {
     let without = good(text("").split("[[picture]]").next().expect("a file"));
     assert_eq!(with.resolved(), without.resolved());
     let there = wanted(&with.file.picture);
-    assert_eq!((there.len(), there[0].rows.as_deref(), there[0].left.as_str()), (1, Some("g"), "mis"));
+    let [Wanted::Split(split)] = &there[..] else { panic!("{there:?}") };
+    assert_eq!((split.rows.as_deref(), split.left.as_str()), (Some("g"), "mis"));
 }

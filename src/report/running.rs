@@ -1,0 +1,173 @@
+//! Means as passes add up: a plot a cell, with the 95 % interval that each estimator states after so many passes and the
+//! value that a claim expects. An interval that is valid covers the expected value, now and later, in 19 of 20
+//! estimators; one whose scores have too heavy a tail sits beside it, and is narrow.
+
+use super::document::{Block, FigureBlock, Picture};
+use super::plot::{Axis, Plot, Point, Series};
+use crate::error::Result;
+use crate::results::pictures::{Running, Wanted};
+use crate::results::record::{Against, Cell, EstimatorRun, Observable, Quantity};
+use crate::results::store::{RecordFolder, Stored};
+use crate::stats::moments::Moments;
+use crate::stats::tails::critical_value;
+use crate::stats::tree::Merge;
+
+/// Confidence of the bands.
+const CONFIDENCE: f64 = 0.95;
+
+/// The plots of this kind.
+pub(super) fn wanted(all: &[Wanted]) -> Vec<Running> {
+    let running = |wanted: &Wanted| match wanted {
+        Wanted::Running(running) => Some(running.clone()),
+        Wanted::Split(_) => None,
+    };
+    all.iter().filter_map(running).collect()
+}
+
+/// Draws every plot that is asked for into `images/`.
+pub(super) fn write_running(
+    folder: &RecordFolder,
+    stored: &Stored,
+    wanted: &[Running],
+) -> Result<Vec<FigureBlock>> {
+    let mut figures = Vec::new();
+    for (number, running) in wanted.iter().enumerate() {
+        for (index, cell) in stored.record.cells.iter().enumerate() {
+            let Some((plot, title)) = plot(stored, index, cell, running) else { continue };
+            let svg = plot.to_svg();
+            let path = format!("images/running-{}-{index:03}.svg", number + 1);
+            folder.write_view(&path, svg.as_bytes())?;
+            figures.push(FigureBlock {
+                path,
+                picture: Picture::Svg(svg),
+                title,
+                caption: CAPTION.into(),
+            });
+        }
+    }
+    Ok(figures)
+}
+
+const CAPTION: &str = "Mean over the first passes with the 95 % interval from their own variance; dashed: the value that is \
+                       expected.";
+
+/// What the page says of them.
+pub(super) fn blocks(figures: &[FigureBlock]) -> Vec<Block> {
+    if figures.is_empty() {
+        return Vec::new();
+    }
+    let heading = Block::Heading(2, "Means as passes add up".into());
+    [heading].into_iter().chain(figures.iter().cloned().map(Block::Wide)).collect()
+}
+
+fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option<(Plot, String)> {
+    let band = stored.record.bands.iter().position(|band| band.name == running.band)?;
+    let is_shown = |run: &&EstimatorRun| {
+        let is_named = running.estimators.as_ref().is_none_or(|names| names.contains(&run.estimator));
+        is_named && run.control_of.is_none()
+    };
+    let runs: Vec<&EstimatorRun> = cell.runs.iter().filter(is_shown).collect();
+    let first = runs.first()?.observables.first()?.name.clone();
+    let observable =
+        Observable { name: running.observable.clone().unwrap_or(first), class: running.class.clone() };
+    let series: Vec<Series> = runs
+        .iter()
+        .filter_map(|run| {
+            let estimator = run.estimator.clone();
+            let quantity = Quantity { cell: index, estimator, observable: observable.clone(), band };
+            let points = means(&stored.batches(&quantity)?);
+            Some(Series { name: run.estimator.clone(), points })
+        })
+        .collect();
+    let expected = stored.record.comparisons.iter().find_map(|comparison| {
+        let Quantity { cell, observable: of, band: own, .. } = &comparison.quantity;
+        match comparison.against {
+            Against::Value { value, .. } if (*cell, of, *own) == (index, &observable, band) => {
+                Some(value)
+            }
+            _ => None,
+        }
+    });
+    let levels: Vec<(f64, String)> =
+        expected.map(|value| (value, "expected".into())).into_iter().collect();
+    let range = Some(range(&series, expected)?);
+    let title = [&*cell.label, &observable.name, &observable.class, &running.band]
+        .into_iter()
+        .filter(|part| !part.is_empty())
+        .collect::<Vec<_>>()
+        .join(", ");
+    let plot = Plot {
+        x: Axis { label: "passes".into(), is_log: true, range: None },
+        y: Axis { label: "mean".into(), is_log: false, range },
+        series,
+        levels,
+    };
+    Some((plot, title))
+}
+
+/// Mean and interval after each batch but the first few, which have none.
+fn means(batches: &[Moments]) -> Vec<Point> {
+    let mut all = Moments::default();
+    let mut points = Vec::new();
+    for batch in batches {
+        all = all.merge(*batch);
+        if all.n < 8 {
+            continue;
+        }
+        let reach = critical_value(1.0 - CONFIDENCE, all.n as f64 - 1.0) * all.std_error();
+        points.push(Point {
+            x: all.n as f64,
+            y: all.mean,
+            low: all.mean - reach,
+            high: all.mean + reach,
+        });
+    }
+    points
+}
+
+/// Heights that show the second half of every line with its band, and what is expected.
+fn range(series: &[Series], expected: Option<f64>) -> Option<[f64; 2]> {
+    let late = series.iter().flat_map(|series| &series.points[series.points.len() / 4..]);
+    let heights = late.flat_map(|p| [p.low, p.high]).chain(expected).filter(|y| y.is_finite());
+    let [low, high] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], y| [a.min(y), b.max(y)]);
+    let margin = 0.05 * (high - low);
+    (low < high).then_some([low - margin, high + margin])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::sample;
+
+    #[test]
+    fn means_and_intervals_are_those_of_the_first_passes() {
+        let batches: Vec<Moments> = [[1.0, 3.0], [2.0, 2.0], [5.0, 1.0], [2.0, 4.0], [3.0, 3.0]]
+            .iter()
+            .map(|pair| pair.iter().fold(Moments::default(), |all, x| all.merge(Moments::of(*x))))
+            .collect();
+        let points = means(&batches);
+        assert_eq!(points.iter().map(|p| p.x).collect::<Vec<_>>(), [8.0, 10.0]);
+        assert!((points[0].y - 2.5).abs() < 1e-15 && (points[1].y - 2.6).abs() < 1e-15);
+        // s^2 = (2.25 + .25 + .25 + .25 + 6.25 + 2.25 + .25 + 2.25) / 7 = 2, t(7) = 2.3646.
+        assert!((points[0].high - 2.5 - 2.364_624 * (2.0f64 / 8.0).sqrt()).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_plot_has_its_estimators_and_the_expected_value() {
+        let stored = sample::stored(0.1);
+        let record = &stored.record;
+        let quantity = &record.comparisons[0].quantity;
+        let wanted = Running {
+            estimators: Some(vec![quantity.estimator.clone()]),
+            observable: Some(quantity.observable.name.clone()),
+            class: quantity.observable.class.clone(),
+            band: record.bands[quantity.band].name.clone(),
+        };
+        let (plot, _) =
+            plot(&stored, quantity.cell, &record.cells[quantity.cell], &wanted).expect("a plot");
+        assert_eq!(plot.series.len(), 1);
+        assert!(!plot.series[0].points.is_empty());
+        let unknown = Running { band: "ultraviolet".into(), ..wanted };
+        assert!(super::plot(&stored, 0, &record.cells[0], &unknown).is_none());
+    }
+}
