@@ -12,14 +12,16 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 10] = [
+const PAGES: [&str; 12] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
+    "docs/bssrdf.md",
     "docs/comparing-records.md",
     "docs/experiment-file.md",
     "docs/judging-other-renderers.md",
     "docs/limits.md",
+    "docs/subdivision.md",
     "examples/ci-gate/README.md",
     "results/README.md",
     "scripts/README.md",
@@ -167,8 +169,10 @@ fn every_snippet_is_accepted() {
     let (count, errors) = refused(&text("docs/experiment-file.md"));
     assert!(errors.is_empty(), "snippets of docs/experiment-file.md, by their line: {errors}");
     assert!(count > 40, "only {count} snippets were found");
+    let (_, errors) = refused(&text("docs/bssrdf.md"));
+    assert!(errors.is_empty(), "snippets of docs/bssrdf.md, by their line: {errors}");
     let with_toml = PAGES.into_iter().filter(|page| !blocks(&text(page), "toml").is_empty());
-    let judged = ["README.md", "CONTRIBUTING.md", "docs/experiment-file.md"];
+    let judged = ["README.md", "CONTRIBUTING.md", "docs/bssrdf.md", "docs/experiment-file.md"];
     assert_eq!(with_toml.collect::<Vec<_>>(), judged, "each page with TOML needs a test of it");
 }
 

@@ -1,3 +1,5 @@
+//! Point clouds against quadrature, by every rule and search.
+
 use std::f64::consts::PI;
 
 use super::*;

@@ -1,3 +1,5 @@
+//! The law of thinning, and what it costs.
+
 use super::*;
 use crate::math::DVec3;
 use crate::sampling::stream::{Purpose, StreamKey};
