@@ -37,7 +37,9 @@ fn split(at: At, words: &Split, known: &Known) {
 
 /// Pictures need pixels: `at` is the list of pictures, `sensor` that of a cell.
 pub fn has_pixels(at: At, sensor: &Sensor) {
-    if at.count() > 0 && matches!(sensor, Sensor::Probe { .. } | Sensor::Flux { .. }) {
+    if at.count() > 0
+        && matches!(sensor, Sensor::Probe { .. } | Sensor::Flux { .. } | Sensor::Rings { .. })
+    {
         at.item(0).report_help(
             "a picture needs pixels, and the sensor has none",
             "take an `orthographic` or a `perspective` sensor in every cell, or drop the picture",
