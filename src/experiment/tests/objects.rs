@@ -204,8 +204,8 @@ fn rings_widen_on_planes() {
         "7:16",
         "another sensor",
     );
-    holds(&errors(&rings("0, 1, 1")), "edges must increase, 1 follows 1", "7:35", "");
-    holds(&errors(&rings("0, 2, 1")), "edges must increase, 1 follows 2", "7:35", "");
-    holds(&errors(&rings("-1, 1")), "a radius must be at least 0, is -1", "7:29", "");
+    holds(&errors(&rings("0, 1, 1")), "edges must increase, 1 follows 1", "7:36", "");
+    holds(&errors(&rings("0, 2, 1")), "edges must increase, 1 follows 2", "7:36", "");
+    holds(&errors(&rings("-1, 1")), "a radius must be at least 0, is -1", "7:30", "");
     assert!(errors(&rings("1")).contains("at least 2"));
 }
