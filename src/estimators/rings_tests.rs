@@ -120,8 +120,8 @@ fn rings_of_the_classical_dipole() {
 }
 
 /// Photons come in at the origin, camera paths leave there: ring by ring they find the same, through smooth, rough and no
-/// boundaries, on a half-space and on a slab that is lit from below too. 256 passes of 4096 paths of either; 5 standard
-/// errors of the difference are below 8 %.
+/// boundaries, on a half-space and on a slab that is lit from below too. 128 passes of 4096 paths of either; 5 standard
+/// errors of the difference are below 11 %.
 #[test]
 fn photons_and_camera_paths_agree_ring_by_ring() {
     let slab = || Shape::Slab { thickness: 0.6 };
@@ -137,9 +137,9 @@ fn photons_and_camera_paths_agree_ring_by_ring() {
         let [light, camera] =
             [("light", &photons as &dyn Estimator), ("camera", &paths)].map(|(kind, e)| {
                 let test = format!("photons_and_camera_paths_agree_ring_by_ring, {name}, {kind}");
-                measure(e, &scene, None, 256, &test)
+                measure(e, &scene, None, 128, &test)
             });
-        assert_alike(name, &light, &camera, 0.08);
+        assert_alike(name, &light, &camera, 0.11);
     }
 }
 
