@@ -47,12 +47,22 @@ pub(super) fn score_single(
         }
         scores.count(Cost::MediumEvents);
         let vertex = ray.at(t);
-        if let Some((light, value)) =
+        if let Some(Scattered { light, entry, value }) =
             scattered(skin, illumination, emergence, band, vertex, u_light, scores)
         {
-            scores.add(emergence.slot, band, TransportClass::Single, light, throughput * value);
+            let slot = skin.scene.sensor.slot_of(emergence.slot, entry);
+            scores.add(slot, band, TransportClass::Single, light, throughput * value);
         }
     }
+}
+
+/// What a vertex sends to the exit.
+#[derive(Clone, Copy, Debug)]
+struct Scattered {
+    light: usize,
+    /// Where its light came in, by the refracted way: exact where that is.
+    entry: DVec3,
+    value: f64,
 }
 
 /// Light and its part that a vertex on the refracted ray scatters along it, the way to the exit left out.
@@ -64,7 +74,7 @@ fn scattered(
     vertex: DVec3,
     u: [f64; 3],
     scores: &mut Scores,
-) -> Option<(usize, f64)> {
+) -> Option<Scattered> {
     let scene = &*skin.scene;
     let arrival = illumination.draw(scene, band, u)?;
     let to_light = Ray { origin: vertex, dir: arrival.wi };
@@ -81,7 +91,9 @@ fn scattered(
     let solid_angle = entrance.cos / (emergence.eta * emergence.eta * entrance.cos_inside);
     let phase = medium.phase.pdf(-entrance.dir.dot(emergence.dir));
     let through = entrance.transmittance * transmittance(medium.sigma_t, way) * solid_angle;
-    Some((arrival.light, medium.albedo * phase * through * arrival.value))
+    let entry = vertex - entrance.dir * way;
+    let value = medium.albedo * phase * through * arrival.value;
+    Some(Scattered { light: arrival.light, entry, value })
 }
 
 #[cfg(test)]
@@ -137,7 +149,7 @@ mod tests {
                     let vertex = exit.point + dir * t;
                     let drawn =
                         scattered(&skin, &illumination, &emergence, 0, vertex, [0.5; 3], &mut scores);
-                    pdf_distance_exponential(3.0, t) * drawn.map_or(0.0, |(_, value)| value)
+                    pdf_distance_exponential(3.0, t) * drawn.map_or(0.0, |drawn| drawn.value)
                 };
                 let mean = integrate(&mut at, 0.0, 15.0, 1e-13).value;
                 let surface = fresnel(wi.z, eta);

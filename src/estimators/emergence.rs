@@ -260,11 +260,12 @@ impl CameraPath<'_> {
         if !self.has_met {
             return;
         }
+        let slot = self.skin.scene.sensor.slot_of(self.slot, self.ray.origin);
         for (light, source) in self.skin.scene.lights.iter().enumerate() {
             for (&band, throughput) in self.bands.iter().zip(&self.throughput) {
                 let (radiance, _) = source.eval(band, self.ray.dir);
                 if radiance > 0.0 {
-                    scores.add(self.slot, band, TransportClass::Surface, light, throughput * radiance);
+                    scores.add(slot, band, TransportClass::Surface, light, throughput * radiance);
                 }
             }
         }

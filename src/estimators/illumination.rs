@@ -56,6 +56,7 @@ impl Illumination {
         scores: &mut Scores,
     ) {
         let scene = &*skin.scene;
+        let slot = scene.sensor.slot_of(emergence.slot, hit.point);
         let mut last: Option<(DVec3, Option<Entrance>)> = None;
         for (&band, throughput) in emergence.bands.iter().zip(emergence.throughput) {
             let Some(arrival) = self.draw(scene, band, u) else { continue };
@@ -70,7 +71,7 @@ impl Illumination {
             let kernel = skin.models[band].kernel(&entry, &emergence.exit);
             let irradiance = entrance.transmittance * entrance.cos * arrival.value;
             let value = throughput * kernel * irradiance / pdf_area;
-            scores.add(emergence.slot, band, TransportClass::Multiple, arrival.light, value);
+            scores.add(slot, band, TransportClass::Multiple, arrival.light, value);
         }
     }
 }

@@ -14,7 +14,7 @@
 //!   finite body     L / (p P N) * pi R^2: starting points are uniform on the disc of the bounding sphere's
 //!                   radius R across the direction, through which all light that can meet the body comes
 //!   planar face     L / (p P N) * |cos|: power per area of the face on which the light shines, every
-//!                   point of which is alike
+//!                   point of which is alike; it comes in at the origin of the face
 //! with the irradiance in place of L / p for parallel light. Photons that miss the body score nothing:
 //! light that has not met the body is not scored.
 //!
@@ -62,14 +62,14 @@ impl LightTracer {
     pub fn new(scene: Arc<Scene>, photons: Option<usize>) -> Result<LightTracer> {
         let bounds = scene.shape.bounds();
         let fits = match (&scene.sensor, bounds) {
-            (Sensor::FaceFlux { .. }, bounds) => bounds.is_none(),
+            (Sensor::FaceFlux { .. } | Sensor::Rings(_), bounds) => bounds.is_none(),
             (sensor, Some(_)) => sensor.receives(),
             (_, None) => false,
         };
         if !fits {
             return Err(Error::input_help(
                 "light_trace cannot serve this sensor: no photon hits a single point or direction",
-                "it serves `flux`, and `orthographic` with `acceptance_sr` (bodies of finite size)",
+                "it serves `flux`, `rings`, and `orthographic` with `acceptance_sr` (bodies of finite size)",
             ));
         }
         let photons = photons.unwrap_or(scene.sensor.rays_per_pass());

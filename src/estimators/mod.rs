@@ -94,3 +94,6 @@ pub enum Bias {
     /// Something else, for this reason.
     Biased(String),
 }
+
+#[cfg(test)]
+mod rings_tests;

@@ -421,7 +421,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
                     }
                 };
                 let value = self.throughput * weight * radiance;
-                self.score(class, index, value);
+                self.score(class, index, self.ray.origin, value);
             }
         }
     }
@@ -441,14 +441,16 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         if self.exit.is_some() { self.rivals.unidirectional() } else { [1.0, 1.0] }
     }
 
-    /// Adds a contribution of the walk to what its sensor slot counts.
+    /// Adds a contribution of the walk to what its sensor slot counts; its light has come in at `entry`.
     #[inline]
-    fn score(&mut self, class: TransportClass, light: usize, value: f64) {
-        let place = Place { slot: self.slot, band: self.band, class, light };
+    fn score(&mut self, class: TransportClass, light: usize, entry: DVec3, value: f64) {
+        let slot = self.scene.sensor.slot_of(self.slot, entry);
+        let place = Place { slot, band: self.band, class, light };
         self.bands.score(self.scores, place, value);
     }
 
-    /// The same for a path that has left the walk, with what the bands made of it since.
+    /// The same for a path that has left the walk, with what the bands made of it since. Where it ends is not known
+    /// here: sensors that ask are not served by techniques that score so.
     #[inline]
     pub fn score_with(&mut self, bands: &B, class: TransportClass, light: usize, value: f64) {
         let place = Place { slot: self.slot, band: self.band, class, light };
@@ -505,7 +507,9 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         if self.scene.shape.occluded(&shadow, Some(hit.face)) {
             return;
         }
-        self.score_connection((index, choice), (sample.wi, sample.pdf), value * sample.radiance, pdf);
+        let entry = self.ray.origin;
+        let value = value * sample.radiance;
+        self.score_connection((index, choice), (sample.wi, sample.pdf), entry, value, pdf);
     }
 
     /// Samples a light from a medium vertex, straight through a matched boundary.
@@ -517,14 +521,15 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
             return;
         }
         let phase = self.medium.phase.pdf(self.ray.dir.dot(sample.wi));
-        let Some(through) = self.transmittance_out(sample.wi) else { return };
+        let Some((through, entry)) = self.transmittance_out(sample.wi) else { return };
         let own = phase * through;
-        self.score_connection((index, choice), (sample.wi, sample.pdf), own * sample.radiance, own);
+        let value = own * sample.radiance;
+        self.score_connection((index, choice), (sample.wi, sample.pdf), entry, value, own);
     }
 
     /// Transmittance from the path's medium vertex to infinity along `dir`, through every part of the
-    /// body on the way.
-    fn transmittance_out(&mut self, dir: DVec3) -> Option<f64> {
+    /// body on the way, and the last point of the boundary there.
+    fn transmittance_out(&mut self, dir: DVec3) -> Option<(f64, DVec3)> {
         let mut ray = Ray { origin: self.ray.origin, dir };
         let mut from = None;
         let mut inside_length = 0.0;
@@ -541,7 +546,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
                     side = other(side);
                 }
                 None if side == Side::Outside => {
-                    return Some(transmittance(self.medium.sigma_t, inside_length));
+                    return Some((transmittance(self.medium.sigma_t, inside_length), ray.origin));
                 }
                 None => {
                     if self.bounds.is_some() {
@@ -553,12 +558,13 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         }
     }
 
-    /// Adds a light sample towards `wi`: `value` is f |cos| (or phase times transmittance) times radiance, `own`
+    /// Adds a light sample towards `wi`, whose light comes in at `entry`: `value` is f |cos| (or phase times transmittance) times radiance, `own`
     /// the density with which the path's own sampling draws the direction. Against parallel light it has none.
     fn score_connection(
         &mut self,
         (light, choice): (usize, f64),
         (wi, pdf): (DVec3, Option<f64>),
+        entry: DVec3,
         value: f64,
         own: f64,
     ) {
@@ -576,7 +582,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
             None => value / choice * (choice / (walks * choice + rivals)),
         };
         let score = self.throughput * estimate;
-        self.score(self.history.class(), light, score);
+        self.score(self.history.class(), light, entry, score);
     }
 
     #[inline]

@@ -16,7 +16,7 @@ use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::results::exr_file::{ExrImage, read_exr};
 use crate::results::json::hash_hex;
 use crate::results::record::Band;
-use crate::scene::{Acceptance, Emission, FluxFace, LatLong, Light, Scene, Screen, Sensor};
+use crate::scene::{Acceptance, Emission, FluxFace, LatLong, Light, Rings, Scene, Screen, Sensor};
 
 /// Builds the scenes of an experiment; equal shapes and maps are built once and shared.
 pub struct Builder<'a> {
@@ -300,6 +300,19 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Result<Sensor> {
             },
             None => Sensor::FaceFlux { faces: faces(shape), bins: *bins, paths: *paths_per_pass },
         },
+        schema::Sensor::Rings { edges_mm, paths_per_pass } => {
+            if shape.bounds().is_some() {
+                return Err(Error::input_help(
+                    "the sensor `rings` looks at a plane without end",
+                    "use it with a half_space or a slab",
+                ));
+            }
+            Sensor::Rings(Rings {
+                reach: outside(shape),
+                edges: edges_mm.clone(),
+                paths: *paths_per_pass,
+            })
+        }
     })
 }
 
@@ -329,9 +342,14 @@ fn before(shape: &Shape, screen: Screen) -> Screen {
     Screen { origin: screen.origin - back.max(0.0) * screen.view, ..screen }
 }
 
+/// How far outside a half-space or slab rays start, mm: of the body's own size, so that scaled scenes are the same.
+fn outside(shape: &Shape) -> f64 {
+    if let Shape::Slab { thickness } = shape { *thickness } else { 1.0 }
+}
+
 fn faces(shape: &Shape) -> Vec<FluxFace> {
     let thickness = if let Shape::Slab { thickness } = shape { *thickness } else { 0.0 };
-    let reach = if thickness > 0.0 { thickness } else { 1.0 };
+    let reach = outside(shape);
     let top = FluxFace { name: "top", point: DVec3::ZERO, reach, frame: Frame::about(DVec3::Z) };
     let point = DVec3::new(0.0, 0.0, -thickness);
     let bottom = FluxFace { name: "bottom", point, reach, frame: Frame::about(-DVec3::Z) };
@@ -346,6 +364,7 @@ fn sensor_position(sensor: &Sensor) -> Option<DVec3> {
         Sensor::Orthographic(_)
         | Sensor::Accepting(_)
         | Sensor::FaceFlux { .. }
+        | Sensor::Rings(_)
         | Sensor::BodyFlux { .. } => None,
     }
 }

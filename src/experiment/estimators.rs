@@ -50,6 +50,7 @@ const SNEE: RegistryEntry = RegistryEntry {
     build: |options, scene| {
         let words: SneeWords = read(options)?;
         looks_from_outside("snee", &scene)?;
+        knows_no_entries("snee", &scene)?;
         Ok(Box::new(Snee::new(scene, words.options()?)?))
     },
 };
@@ -71,13 +72,14 @@ const BIDIRECTIONAL: RegistryEntry = RegistryEntry {
     build: |options, scene| {
         let options: PathOptions = read(options)?;
         looks_from_outside("bidirectional", &scene)?;
+        knows_no_entries("bidirectional", &scene)?;
         Ok(Box::new(Bidirectional::new(scene, options.roulette.into())?))
     },
 };
 
 const LIGHT_TRACE: RegistryEntry = RegistryEntry {
     kind: "light_trace",
-    doc: "analog tracing from the lights, into `flux` or `acceptance_sr`; unbiased at true normals",
+    doc: "analog tracing from the lights, into `flux`, `rings` or `acceptance_sr`; unbiased at true normals",
     options_schema: || schemars::schema_for!(LightTraceOptions),
     build: |options, scene| {
         let options: LightTraceOptions = read(options)?;
@@ -102,6 +104,17 @@ pub fn looks_from_outside(kind: &str, scene: &Scene) -> Result<()> {
         Sensor::Vertex { .. } => Err(Error::input_help(
             format!("{kind} starts its paths outside the body, the sensor `vertex` stands inside"),
             "use two_bounce, or another sensor",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Rings count light by where it came in, which connections here do not keep.
+fn knows_no_entries(kind: &str, scene: &Scene) -> Result<()> {
+    match scene.sensor {
+        Sensor::Rings(_) => Err(Error::input_help(
+            format!("{kind} does not keep where light came in, by which the sensor `rings` counts"),
+            "use light_trace, path, bssrdf_probe or bssrdf_rays, or the sensor `flux`",
         )),
         _ => Ok(()),
     }

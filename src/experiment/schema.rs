@@ -456,6 +456,17 @@ pub enum Sensor {
         #[schemars(range(min = 1, max = 1048576))]
         paths_per_pass: usize,
     },
+    /// Radiant exitance of the top face of a `half_space` or `slab` by the distance, along the face, between where
+    /// light comes in and where it leaves; W/mm^2. Observables `ring_i`, and `all` of every ring and beyond.
+    Rings {
+        /// Edges of the rings, mm, increasing from 0 or more.
+        #[schemars(length(min = 2, max = 1025))]
+        edges_mm: Vec<f64>,
+        /// Independent paths whose mean is one pass.
+        #[serde(default = "default_paths_per_pass")]
+        #[schemars(range(min = 1, max = 1048576))]
+        paths_per_pass: usize,
+    },
 }
 
 fn default_paths_per_pass() -> usize {

@@ -160,7 +160,10 @@ impl Scope<'_> {
         };
         match self.experiment.cells[cell].sensor {
             Sensor::Orthographic { .. } | Sensor::Perspective { .. } => {}
-            Sensor::Probe { .. } | Sensor::Vertex { .. } | Sensor::Flux { .. } => {
+            Sensor::Probe { .. }
+            | Sensor::Vertex { .. }
+            | Sensor::Flux { .. }
+            | Sensor::Rings { .. } => {
                 return Err(Error::input_help(
                     format!("{}, whose sensor has none", place()),
                     "leave `observable` out, or take an `orthographic` or a `perspective` sensor",

@@ -6,7 +6,7 @@ mod sensor;
 
 pub use latlong::{Bright, LatLong};
 pub use light::{Emission, Light, LightSample};
-pub use sensor::{Acceptance, FluxFace, Pinhole, Region, Screen, Sensor, SensorRay};
+pub use sensor::{Acceptance, FluxFace, Pinhole, Region, Rings, Screen, Sensor, SensorRay};
 
 use std::sync::Arc;
 

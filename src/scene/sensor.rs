@@ -39,6 +39,8 @@ pub enum Sensor {
         /// Paths per bin and pass.
         paths: usize,
     },
+    /// Radiant exitance of the top face of a half-space or slab by how far from the exit its light came in.
+    Rings(Rings),
     /// Flux of a finite body by the cosine between exit direction and axis.
     BodyFlux {
         /// Sphere around the body.
@@ -127,6 +129,34 @@ impl Acceptance {
     }
 }
 
+/// Rings about a point of the top face of a half-space or slab.
+///
+/// The lights shine on the whole face, and every point of it is alike. So exitance at a point from light that came
+/// in within a ring around it is the exitance out of that ring of light that came in at the point: camera paths leave at
+/// the origin and find where light came in, photons come in at the origin and leave somewhere. The distance between
+/// the two is taken along the face, also where light comes in by a slab's other face; light that the surface
+/// reflects leaves where it came in, at distance 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rings {
+    /// How far outside its rays start, mm.
+    pub reach: f64,
+    /// Edges of the rings, mm, increasing: ring i is edges[i] <= r < edges[i + 1].
+    pub edges: Vec<f64>,
+    /// Paths per pass.
+    pub paths: usize,
+}
+
+impl Rings {
+    /// The slot of what no ring holds; ring i has slot i + 1.
+    const OUTSIDE: usize = 0;
+
+    fn slot(&self, entry: DVec3) -> usize {
+        let r = (entry.x * entry.x + entry.y * entry.y).sqrt();
+        let below = self.edges.partition_point(|&edge| edge <= r);
+        if below < self.edges.len() { below } else { Self::OUTSIDE }
+    }
+}
+
 /// One face of a half-space or slab.
 #[derive(Clone, Debug)]
 pub struct FluxFace {
@@ -182,6 +212,7 @@ impl Sensor {
             | Sensor::Accepting(Acceptance { screen, .. }) => screen.width * screen.height,
             Sensor::Probe { paths, .. } | Sensor::Vertex { paths, .. } => *paths,
             Sensor::FaceFlux { faces, bins, paths } => faces.len() * bins * paths,
+            Sensor::Rings(rings) => rings.paths,
             Sensor::BodyFlux { bins, paths, .. } => bins * paths,
         }
     }
@@ -192,6 +223,8 @@ impl Sensor {
     /// proportional to mu inside the bin. Over a body, Phi_bin = int dw int L dA_perp
     /// = 2 pi dmu * pi R^2 mean(L), directions uniform in the bin, positions uniform on the disc of the
     /// bounding sphere's radius R across the direction.
+    ///
+    /// Rings: the rays are those of a face's flux in one bin; their slot waits for [`Self::slot_of`].
     #[inline]
     pub fn ray(&self, index: usize, u: [f64; 4]) -> SensorRay {
         match self {
@@ -219,6 +252,11 @@ impl Sensor {
                 let weight = PI * (edge(bin + 1) - edge(bin)) / *paths as f64;
                 SensorRay { ray: Ray { origin: face.point + face.reach * out, dir: -out }, weight, slot }
             }
+            Sensor::Rings(Rings { reach, paths, .. }) => {
+                let out = Frame::about(DVec3::Z).to_world(square_to_cosine_hemisphere([u[0], u[1]]));
+                let ray = Ray { origin: *reach * out, dir: -out };
+                SensorRay { ray, weight: PI / *paths as f64, slot: Rings::OUTSIDE }
+            }
             Sensor::BodyFlux { bounds, frame, bins, paths } => {
                 let slot = index / paths;
                 let width = 2.0 / *bins as f64;
@@ -234,6 +272,16 @@ impl Sensor {
         }
     }
 
+    /// Where light counts that a ray of slot `slot` finds, having come in at the point `entry` of the body: rings look
+    /// at that point, all others have decided by the ray.
+    #[inline]
+    pub fn slot_of(&self, slot: usize, entry: DVec3) -> usize {
+        match self {
+            Sensor::Rings(rings) => rings.slot(entry),
+            _ => slot,
+        }
+    }
+
     /// What light that leaves the body for good along `out` scores: its slot, and the factor from the
     /// power that it carries to the slot's unit. The adjoint of [`Self::ray`]: what the rays of a slot
     /// find as radiance, all light that leaves finds as power.
@@ -242,6 +290,7 @@ impl Sensor {
     /// they are counted on (radiance is constant along a line):
     ///   body    the lines of a bin are its slot, and its flux is their power: factor 1
     ///   face    the same with power per area of the face, as every point of it is alike: factor 1
+    ///   ring    as of a face; it takes light that came in at the origin, by where `out` starts: factor 1
     ///   pixel   its lines cross its square of area A within the cap, so that their power is
     ///           int_A dA int_cap L cos dw; a pixel's value is the mean of L in that very measure, whose
     ///           whole is A int_cap cos dw = A pi sin^2: factor 1 / (A pi sin^2)
@@ -260,6 +309,7 @@ impl Sensor {
                     .find(|(_, mu)| *mu > 0.0)?;
                 Some((index * bins + bin(mu, 1.0 / *bins as f64, *bins), 1.0))
             }
+            Sensor::Rings(rings) => (out.dir.z > 0.0).then(|| (rings.slot(out.origin), 1.0)),
             Sensor::BodyFlux { frame, bins, .. } => {
                 let mu = frame.n.dot(out.dir);
                 Some((bin(mu + 1.0, 2.0 / *bins as f64, *bins), 1.0))
@@ -278,7 +328,10 @@ impl Sensor {
     /// of its lines pass through one point.
     pub fn receives(&self) -> bool {
         match self {
-            Sensor::FaceFlux { .. } | Sensor::BodyFlux { .. } | Sensor::Accepting(_) => true,
+            Sensor::FaceFlux { .. }
+            | Sensor::Rings(_)
+            | Sensor::BodyFlux { .. }
+            | Sensor::Accepting(_) => true,
             Sensor::Orthographic(_)
             | Sensor::Perspective(_)
             | Sensor::Probe { .. }
@@ -302,13 +355,18 @@ impl Sensor {
                 .iter()
                 .flat_map(|face| (0..*bins).map(move |bin| named(format!("{}_{bin}", face.name), true)))
                 .collect(),
+            Sensor::Rings(rings) => {
+                let each = (0..rings.edges.len() - 1).map(|ring| named(format!("ring_{ring}"), true));
+                std::iter::once(named("all".into(), true)).chain(each).collect()
+            }
             Sensor::BodyFlux { bins, .. } => {
                 (0..*bins).map(|bin| named(format!("flux_{bin}"), true)).collect()
             }
         }
     }
 
-    /// The regions a slot counts in, each with its factor: an image's mean and the slot's tile.
+    /// The regions a slot counts in, each with its factor: an image's mean and the slot's tile, all light that leaves
+    /// and the slot's ring.
     #[inline]
     pub fn regions_of(&self, slot: usize) -> [(usize, f64); 2] {
         match self {
@@ -320,6 +378,8 @@ impl Sensor {
             }
             Sensor::Probe { .. } | Sensor::Vertex { .. } => [(0, 1.0), (0, 0.0)],
             Sensor::FaceFlux { .. } | Sensor::BodyFlux { .. } => [(slot, 1.0), (slot, 0.0)],
+            Sensor::Rings(_) if slot == Rings::OUTSIDE => [(0, 1.0), (0, 0.0)],
+            Sensor::Rings(_) => [(0, 1.0), (slot, 1.0)],
         }
     }
 }
@@ -431,6 +491,45 @@ mod tests {
         };
         let bounds = BoundingSphere { center: DVec3::new(0.0, 0.5, 0.0), radius: 1.5 };
         Sensor::Accepting(Acceptance::new(screen, height, bounds))
+    }
+
+    /// Rings begin with their inner edge, end before their outer one, and count in `all` too; what none holds
+    /// counts there alone. Camera paths and photons are told apart from other slots by the same distance.
+    #[test]
+    fn rings_by_distance_along_the_face() {
+        let sensor = Sensor::Rings(Rings { reach: 1.0, edges: vec![0.5, 1.0, 5.0], paths: 3 });
+        let names: Vec<String> = sensor.regions().into_iter().map(|region| region.name).collect();
+        assert_eq!(names, ["all", "ring_0", "ring_1"]);
+        let up = DVec3::new(0.6, 0.0, 0.8);
+        for (r, regions) in [
+            (0.0, [(0, 1.0), (0, 0.0)]),
+            (0.4999, [(0, 1.0), (0, 0.0)]),
+            (0.5, [(0, 1.0), (1, 1.0)]),
+            (0.9999, [(0, 1.0), (1, 1.0)]),
+            (1.0, [(0, 1.0), (2, 1.0)]),
+            (4.9999, [(0, 1.0), (2, 1.0)]),
+            (5.0, [(0, 1.0), (0, 0.0)]),
+            (1e300, [(0, 1.0), (0, 0.0)]),
+        ] {
+            for depth in [0.0, 2.0] {
+                let point = DVec3::new(r, 0.0, -depth);
+                let slot = sensor.slot_of(0, point);
+                assert_eq!(sensor.regions_of(slot), regions, "{r}");
+                assert_eq!(sensor.receive(&Ray { origin: point, dir: up }), Some((slot, 1.0)));
+                assert_eq!(sensor.receive(&Ray { origin: point, dir: -up }), None);
+            }
+        }
+        let face =
+            FluxFace { name: "top", point: DVec3::ZERO, reach: 1.0, frame: Frame::about(DVec3::Z) };
+        let flux = Sensor::FaceFlux { faces: vec![face], bins: 1, paths: 3 };
+        assert_eq!(sensor.rays_per_pass(), 3);
+        for u in [0.1, 0.7] {
+            let u = [u, 0.3, 0.2, 0.9];
+            let (ring, face) = (sensor.ray(2, u), flux.ray(2, u));
+            assert!((ring.ray.dir - face.ray.dir).length() < 1e-15);
+            assert!((ring.ray.origin - face.ray.origin).length() < 1e-15);
+            assert_eq!(ring.weight, face.weight);
+        }
     }
 
     fn receiving() -> Vec<Sensor> {

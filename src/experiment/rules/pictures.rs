@@ -46,7 +46,7 @@ fn split(at: At, words: &Split, known: &Known) {
 pub fn has_pixels(at: At, sensor: &Sensor) {
     let first = (0..at.count()).find(|i| at.item(*i).has("split"));
     let Some(first) = first else { return };
-    if matches!(sensor, Sensor::Probe { .. } | Sensor::Flux { .. }) {
+    if matches!(sensor, Sensor::Probe { .. } | Sensor::Flux { .. } | Sensor::Rings { .. }) {
         at.item(first).report_help(
             "a split picture needs pixels, and the sensor has none",
             "take an `orthographic` or a `perspective` sensor in every cell, or drop the picture",

@@ -9,7 +9,7 @@ use crate::math::DVec3;
 const PARALLEL: f64 = 1e-9;
 
 /// Directions are directions, `up` is not along the view, fluxes of planes are about +z, and
-/// caps of directions look at finite bodies.
+/// caps of directions look at finite bodies, rings lie on planes and widen.
 pub fn sensor(at: At, sensor: &Sensor, shape: Option<&Shape>) {
     let is_planar = matches!(shape, Some(Shape::HalfSpace {} | Shape::Slab { .. }));
     match sensor {
@@ -46,6 +46,15 @@ pub fn sensor(at: At, sensor: &Sensor, shape: Option<&Shape>) {
                 at.report("the axis must be +z on a half_space and on a slab");
             }
         }
+        Sensor::Rings { edges_mm, .. } => {
+            if shape.is_some() && !is_planar {
+                at.to("rings").report_help(
+                    "rings lie on the top face of a half_space or slab",
+                    "take one of these, or another sensor",
+                );
+            }
+            edges(at.to("rings").to("edges_mm"), edges_mm);
+        }
     }
 }
 
@@ -54,6 +63,15 @@ pub fn direction(at: At, direction: &Direction) -> bool {
     match direction {
         Direction::Vector(vector) => nonzero(at, *vector),
         Direction::Polar(_) => true,
+    }
+}
+
+fn edges(at: At, edges: &[f64]) {
+    if let Some(first) = edges.first().filter(|first| !(**first >= 0.0)) {
+        at.item(0).report(format!("a radius must be at least 0, is {first}"));
+    }
+    for (i, pair) in edges.windows(2).enumerate().filter(|(_, pair)| !(pair[0] < pair[1])) {
+        at.item(i + 1).report(format!("edges must increase, {} follows {}", pair[1], pair[0]));
     }
 }
 

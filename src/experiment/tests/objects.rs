@@ -187,3 +187,25 @@ fn lights_are_not_negative_and_have_unique_names() {
     let message = refused_with(&format!("[[light]]\nname = \"light_1\"\n{LIGHT}\n"));
     holds(&message, "two lights are named `light_1`", "15:8", "");
 }
+
+/// Rings lie on planes and widen.
+#[test]
+fn rings_widen_on_planes() {
+    let rings = |edges: &str| {
+        GOOD.replace("sphere = { radius_mm = 1.0 }", "half_space = {}")
+            .replace(SENSOR, &format!("sensor.rings = {{ edges_mm = [{edges}] }}"))
+    };
+    good(&rings("0, 0.5, 1"));
+    good(&rings("0.5, 1").replace("half_space = {}", "slab = { thickness_mm = 1 }"));
+    let on_a_sphere = GOOD.replace(SENSOR, "sensor.rings = { edges_mm = [0, 1] }");
+    holds(
+        &errors(&on_a_sphere),
+        "rings lie on the top face of a half_space or slab",
+        "7:16",
+        "another sensor",
+    );
+    holds(&errors(&rings("0, 1, 1")), "edges must increase, 1 follows 1", "7:36", "");
+    holds(&errors(&rings("0, 2, 1")), "edges must increase, 1 follows 2", "7:36", "");
+    holds(&errors(&rings("-1, 1")), "a radius must be at least 0, is -1", "7:30", "");
+    assert!(errors(&rings("1")).contains("at least 2"));
+}
