@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use super::{acceptance, cloud};
+
 /// What may be wrong. Every place that can hold a defect asks for its own by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Defect {
@@ -81,6 +83,21 @@ pub enum Defect {
     PlaneCosineMissing,
     BounceAzimuthMirrored,
     BounceThetaOff,
+    // Acceptance of points by distance.
+    ExponentOff,
+    WeightClamped,
+    WeightOfMean,
+    CoarseUniform,
+    BoundAtCentre,
+    SharedNumber,
+    GapFromOne,
+    // The point-cloud method.
+    FaceCountMissing,
+    ExitTwice,
+    EntryTwice,
+    MeanWeighsBand,
+    NoReweighting,
+    CloudClamped,
     // The verifier.
     VarianceByDifference,
     DeviationForError,
@@ -97,6 +114,10 @@ pub enum Family {
     Subdivision,
     /// In a sampler.
     Sampler,
+    /// In the acceptance of points by distance.
+    Acceptance,
+    /// In the point-cloud method.
+    Cloud,
     /// In the verifier's arithmetic.
     Verifier,
     /// Nowhere.
@@ -118,7 +139,8 @@ pub struct Planted {
     pub expected: &'static [&'static str],
 }
 
-const fn row(
+/// A row of the tracer's.
+pub const fn row(
     name: &'static str,
     defect: Defect,
     what: &'static str,
@@ -127,7 +149,8 @@ const fn row(
     Planted { name, defect, family: Family::Tracer, what, expected }
 }
 
-const fn of(family: Family, row: Planted) -> Planted {
+/// The same of another family.
+pub const fn of(family: Family, row: Planted) -> Planted {
     Planted { family, ..row }
 }
 
@@ -624,7 +647,8 @@ pub const SHAM: Planted = of(Family::Sham, row("sham", Defect::None, "nothing is
 
 /// The sham, then every defect.
 pub fn all() -> Vec<Planted> {
-    let planted = [TRACER, SUBDIVISION, SAMPLERS, VERIFIER].into_iter().flatten();
+    let planted = [TRACER, SUBDIVISION, SAMPLERS, acceptance::ROWS, cloud::ROWS, VERIFIER];
+    let planted = planted.into_iter().flatten();
     std::iter::once(SHAM).chain(planted.copied()).collect()
 }
 

@@ -14,7 +14,9 @@
 //! the same levels, as for any user. All defects get the same experiments (`*.toml` here), the same budgets,
 //! and streams that their names name.
 
+mod acceptance;
 mod alone;
+mod cloud;
 mod connection;
 mod defects;
 mod identities;
@@ -33,10 +35,12 @@ use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
 
+use acceptance::{Acceptance, AcceptanceOptions};
 use alone::{TwoBounce, TwoBounceOptions};
+use cloud::{Cloud, CloudOptions};
 use defects::{Defect, Family, Planted, planted};
 use scatterproof::experiment::estimators::{builtin, read};
-use scatterproof::experiment::registry::{Registry, RegistryEntry};
+use scatterproof::experiment::registry::{Registry, RegistryEntry, SamplerEntry};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use subdivision::{FluxOptions, Photons, Subdivision};
@@ -51,6 +55,12 @@ struct NoOptions {}
 fn registry() -> Registry {
     let mut registry = builtin();
     registry.samplers.extend(samplers::entries());
+    registry.samplers.push(SamplerEntry {
+        kind: "planted_acceptance",
+        doc: "points accepted by distance, and the planted defect",
+        options_schema: || schemars::schema_for!(AcceptanceOptions),
+        build: |options| Ok(Box::new(Acceptance::new(&read(options)?, planted()))),
+    });
     registry.entries.extend([
         RegistryEntry {
             kind: "tracer",
@@ -82,6 +92,12 @@ fn registry() -> Registry {
             doc: "an analog light tracer into the bins of a flux, without defects",
             options_schema: || schemars::schema_for!(FluxOptions),
             build: |options, scene| Ok(Box::new(Photons { scene, options: read(options)? })),
+        },
+        RegistryEntry {
+            kind: "planted_cloud",
+            doc: "the second point-cloud method, and the planted defect",
+            options_schema: || schemars::schema_for!(CloudOptions),
+            build: |options, scene| Ok(Box::new(Cloud::new(scene, read(options)?, planted()))),
         },
     ]);
     registry

@@ -59,7 +59,7 @@ impl Outcome {
 }
 
 /// The experiments of this folder, and the family of defects that each is to find.
-const EXPERIMENTS: [(Family, &str, &str); 11] = [
+const EXPERIMENTS: [(Family, &str, &str); 15] = [
     (Family::Tracer, "furnace.toml", include_str!("furnace.toml")),
     (Family::Tracer, "map.toml", include_str!("map.toml")),
     (Family::Tracer, "matched.toml", include_str!("matched.toml")),
@@ -71,7 +71,14 @@ const EXPERIMENTS: [(Family, &str, &str); 11] = [
     (Family::Subdivision, "bumpy.toml", include_str!("bumpy.toml")),
     (Family::Subdivision, "subdivision.toml", include_str!("subdivision.toml")),
     (Family::Sampler, "samplers.toml", include_str!("samplers.toml")),
+    (Family::Acceptance, "acceptance.toml", include_str!("acceptance.toml")),
+    (Family::Acceptance, "thinning.toml", include_str!("thinning.toml")),
+    (Family::Cloud, "cloud.toml", include_str!("cloud.toml")),
+    (Family::Cloud, "faces.toml", include_str!("faces.toml")),
 ];
+
+/// Those on samplers.
+const ON_SAMPLERS: [&str; 3] = ["samplers", "acceptance", "thinning"];
 
 /// A sky of 8 x 4 texels, dim but for one next to the zenith.
 fn write_sky(path: &Path) {
@@ -138,7 +145,7 @@ fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
 }
 
 /// Test -> the worst of its verdicts, from the table that `verify --csv` writes. A test is named
-/// `experiment.claim`; one claim on samplers is many tests, which are named `samplers.test`.
+/// `experiment.claim`; one claim on samplers is many tests, which are named `experiment.test`.
 fn seen_in(table: &str) -> BTreeMap<String, Seen> {
     let mut reader = csv::Reader::from_reader(table.as_bytes());
     let mut tests = BTreeMap::new();
@@ -149,7 +156,7 @@ fn seen_in(table: &str) -> BTreeMap<String, Seen> {
             "underpowered" => Seen::Underpowered,
             _ => Seen::Defect,
         };
-        let of = if row["experiment"] == "samplers" { "test" } else { "claim" };
+        let of = if ON_SAMPLERS.contains(&row["experiment"].as_str()) { "test" } else { "claim" };
         let worst = tests.entry(format!("{}.{}", row["experiment"], row[of])).or_insert(seen);
         *worst = seen.max(*worst);
     }
