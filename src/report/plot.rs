@@ -97,7 +97,7 @@ impl Scale {
         if self.is_log && to / from > 8.0 {
             let decades = (log10(from).floor() as i32)..=(log10(to).ceil() as i32);
             let every = 1 + (log10(to / from) as usize) / 8;
-            let all = decades.step_by(every).map(|k| power_of_ten(k));
+            let all = decades.step_by(every).map(power_of_ten);
             return all.filter(|tick| *tick >= from * 0.999 && *tick <= to * 1.001).collect();
         }
         let rough = (to - from) / 5.0;
