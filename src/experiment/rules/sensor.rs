@@ -67,10 +67,10 @@ pub fn direction(at: At, direction: &Direction) -> bool {
 }
 
 fn edges(at: At, edges: &[f64]) {
-    if let Some(first) = edges.first().filter(|first| !(**first >= 0.0)) {
+    if let Some(first) = edges.first().filter(|first| **first < 0.0) {
         at.item(0).report(format!("a radius must be at least 0, is {first}"));
     }
-    for (i, pair) in edges.windows(2).enumerate().filter(|(_, pair)| !(pair[0] < pair[1])) {
+    for (i, pair) in edges.windows(2).enumerate().filter(|(_, pair)| pair[0] >= pair[1]) {
         at.item(i + 1).report(format!("edges must increase, {} follows {}", pair[1], pair[0]));
     }
 }
