@@ -155,19 +155,18 @@ mod tests {
     #[test]
     fn a_plot_has_its_estimators_and_the_expected_value() {
         let stored = sample::stored(0.1);
-        let record = &stored.record;
-        let quantity = &record.comparisons[0].quantity;
+        let cell = &stored.record.cells[0];
+        let (run, observable) = (&cell.runs[0], &cell.runs[0].observables[0]);
         let wanted = Running {
-            estimators: Some(vec![quantity.estimator.clone()]),
-            observable: Some(quantity.observable.name.clone()),
-            class: quantity.observable.class.clone(),
-            band: record.bands[quantity.band].name.clone(),
+            estimators: Some(vec![run.estimator.clone()]),
+            observable: Some(observable.name.clone()),
+            class: observable.class.clone(),
+            band: stored.record.bands[0].name.clone(),
         };
-        let (plot, _) =
-            plot(&stored, quantity.cell, &record.cells[quantity.cell], &wanted).expect("a plot");
+        let (plot, _) = plot(&stored, 0, cell, &wanted).expect("a plot");
         assert_eq!(plot.series.len(), 1);
         assert!(!plot.series[0].points.is_empty());
         let unknown = Running { band: "ultraviolet".into(), ..wanted };
-        assert!(super::plot(&stored, 0, &record.cells[0], &unknown).is_none());
+        assert!(super::plot(&stored, 0, cell, &unknown).is_none());
     }
 }

@@ -34,7 +34,7 @@ fn pictures_name_estimators_and_axes() {
     holds(&message, "rows and columns are the same axis", "21:63", "");
     let message = picture("left = \"mis\", right = \"snee\", exposure_stops = nan");
     assert!(message.contains("exposure_stops"), "{message}");
-    assert!(errors(&text("")).contains("`split` is needed"), "{}", errors(&text("")));
+    assert!(errors(&text("")).contains("`split`, `running` is needed"), "{}", errors(&text("")));
 }
 
 #[test]
@@ -42,7 +42,15 @@ fn pictures_need_pixels() {
     let split = "split = { left = \"mis\", right = \"snee\" }";
     let message =
         errors(&format!("{GOOD}[[estimator]]\nname = \"snee\"\nsnee = {{}}\n[[picture]]\n{split}\n"));
-    assert!(message.contains("a picture needs pixels, and the sensor has none"), "{message}");
+    assert!(message.contains("a split picture needs pixels, and the sensor has none"), "{message}");
+}
+
+#[test]
+fn plots_of_means_name_estimators_and_a_band() {
+    let plot = |words: &str| errors(&text(&format!("running = {{ {words} }}")));
+    assert!(plot("band = \"infrared\"").contains("unknown band `infrared`"));
+    assert!(plot("estimators = [\"mos\"], band = \"R\"").contains("unknown estimator `mos`"));
+    assert!(plot("class = \"multiple\"").contains("missing key"));
 }
 
 // How a record is shown is no part of what it is.
