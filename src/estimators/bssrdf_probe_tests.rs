@@ -7,6 +7,8 @@ use super::super::path::{PathTracer, Roulette};
 use super::super::{Layout, TransportClass};
 use super::*;
 use crate::geometry::{Mesh, procedural};
+use crate::geometry::{Ray, Shape, Side};
+use crate::math::DVec3;
 use crate::math::integrate;
 use crate::optics::boundary::Boundary;
 use crate::optics::bssrdf::{Entry, Exit, MomentKind, Outgoing};
@@ -14,7 +16,6 @@ use crate::optics::fresnel::fresnel;
 use crate::optics::medium::Medium;
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::StreamKey;
-use crate::sampling::warp::square_to_cap;
 use crate::scene::{Emission, Light, Sensor};
 
 const MODEL: Model = Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
@@ -218,52 +219,6 @@ fn depth_does_not_matter_and_reach_does() {
         assert_mean(name, means[0], expected, 0.01);
     }
 }
-
-fn brute_force_crossings(mesh: &Mesh, line: &Line) -> usize {
-    let frame = Frame::about(line.axis);
-    let flat = |i: u32| frame.to_local(mesh.vertices()[i as usize] - line.point);
-    let crossed = |triangle: &&[u32; 3]| {
-        let corners = triangle.map(flat);
-        let turn = |a: DVec3, b: DVec3| a.x * b.y - a.y * b.x > 0.0;
-        let turns = [0, 1, 2].map(|k| turn(corners[k], corners[(k + 1) % 3]));
-        turns[0] == turns[1] && turns[1] == turns[2]
-    };
-    mesh.triangles().iter().filter(crossed).count()
-}
-
-/// A line meets every sheet of a mesh once: as many crossings as triangles over the line, in turns in and out.
-#[test]
-fn lines_cross_every_sheet_once() {
-    let meshes = [
-        procedural::torus(0.7, 0.3, [24, 12], true).expect("a torus"),
-        procedural::cavity_sphere(1.0, 0.5, 3, false).expect("a shell"),
-        procedural::drilled_box(DVec3::new(1.5, 1.0, 0.7), [3, 2], 0.4).expect("a plate"),
-    ];
-    let mut stream = StreamKey::named("lines_cross_every_sheet_once").pass(0).stream(0, WALK);
-    for mesh in meshes {
-        let shape = Shape::Mesh(mesh.clone());
-        let scene = scene(shape, &[1.3], &[medium(2.0, 0.95, 0.3)], sky(1, 2.0), 1);
-        let mut scores = Scores::new(Layout::new(&scene));
-        let mut counts = [0; 32];
-        for _ in 0..3000 {
-            let [a, b] = stream.draw2();
-            let axis = square_to_cap(2.0, [a, b]);
-            let middle = DVec3::from_array(stream.draw3()) - DVec3::splat(0.5);
-            let line = Line { point: middle, axis, radius: 0.0 };
-            let mut hits = Vec::new();
-            line.cross(&scene.shape, &mut hits, &mut scores);
-            for (k, hit) in hits.iter().enumerate() {
-                assert_eq!(hit.normal.dot(axis) < 0.0, k % 2 == 0);
-            }
-            assert_eq!(hits.len(), brute_force_crossings(&mesh, &line), "{line:?}");
-            counts[hits.len()] += 1;
-        }
-        assert!(counts[2] > 100 && counts[4] > 100, "{counts:?}");
-        assert!(scores.anomalies.iter().all(|&count| count == 0));
-    }
-}
-
-const WALK: crate::sampling::stream::Purpose = crate::sampling::stream::Purpose::Walk;
 
 /// Meshes that are known to be convex are seen whole from inside.
 #[test]

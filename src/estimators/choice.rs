@@ -1,5 +1,6 @@
 //! One light out of several, with probability proportional to its strength.
 
+use crate::sampling::discrete::choose_share;
 use crate::scene::Scene;
 
 /// Probability of choosing each light, per band; all 0 where no light shines.
@@ -18,21 +19,4 @@ pub fn light_shares(scene: &Scene) -> Vec<Vec<f64>> {
 #[inline]
 pub fn choose_light(shares: &[f64], u: f64) -> Option<(usize, f64)> {
     choose_share(shares.iter().copied(), u)
-}
-
-/// The index that `u` selects out of shares that sum to 1, and its share.
-#[inline]
-pub fn choose_share(shares: impl Iterator<Item = f64>, u: f64) -> Option<(usize, f64)> {
-    let mut rest = u;
-    let mut last = None;
-    for (index, share) in shares.enumerate() {
-        if rest < share {
-            return Some((index, share));
-        }
-        rest -= share;
-        if share > 0.0 {
-            last = Some((index, share));
-        }
-    }
-    last // rounding of the sum
 }

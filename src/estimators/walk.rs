@@ -558,8 +558,9 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         }
     }
 
-    /// Adds a light sample towards `wi`, whose light comes in at `entry`: `value` is f |cos| (or phase times transmittance) times radiance, `own`
-    /// the density with which the path's own sampling draws the direction. Against parallel light it has none.
+    /// Adds a light sample towards `wi`, whose light comes in at `entry`: `value` is f |cos| (or phase times
+    /// transmittance) times radiance, `own` the density with which the path's own sampling draws the direction. Against
+    /// parallel light it has none.
     fn score_connection(
         &mut self,
         (light, choice): (usize, f64),

@@ -7,7 +7,9 @@ use super::point_cloud::{FacesWords, SearchWords};
 use crate::geometry::FaceChoice;
 use crate::math::exp;
 use crate::samplers::body::BodySurfaceSampler;
+use crate::samplers::lines::LineSampler;
 use crate::samplers::thinning::{ThinningSampler, View};
+use crate::sampling::radial::Radial;
 use crate::sampling::thinning::{Form, Rule};
 
 /// Options of `body_surface`.
@@ -111,5 +113,28 @@ impl Thinning {
         };
         let by_tree = self.search == SearchWords::Hierarchy;
         ThinningSampler::new(Rule::new(form), by_tree, view, self.points, self.radius_mm)
+    }
+}
+
+/// Options of `probe_crossings`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProbedSphere {
+    /// Radius of the sphere, mm.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius_mm: f64,
+    /// A band each: a Gaussian density of the distance from the axis, of standard deviation 1 over this, mm.
+    #[schemars(length(min = 1), inner(range(min = 0.001)))]
+    pub sigma_per_mm: Vec<f64>,
+}
+
+impl ProbedSphere {
+    /// The sampler: Gaussians of variance 1/sigma^2, which have no pole.
+    pub fn sampler(&self) -> LineSampler {
+        let gaussian =
+            |sigma: &f64| Radial::Gaussian { variance: 1.0 / (sigma * sigma), r_max: f64::INFINITY };
+        let densities: Vec<Radial> = self.sigma_per_mm.iter().map(gaussian).collect();
+        let mean = self.sigma_per_mm.iter().sum::<f64>() / self.sigma_per_mm.len() as f64;
+        LineSampler::new(self.radius_mm, densities, 1.0 / mean)
     }
 }

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
-use super::cloud_samplers::{Body, Thinning};
+use super::cloud_samplers::{Body, ProbedSphere, Thinning};
 use super::estimators::read;
 use super::registry::SamplerEntry;
 use crate::error::{Error, Result};
@@ -57,6 +57,8 @@ pub fn builtin() -> Vec<SamplerEntry> {
             Surface => |o| Ok(MeshSampler::new(&o.shape.mesh()?, o.triangles == Triangles::ByArea))),
         entry!("body_surface", "points on a sphere or a box",
             Body => |o| Ok(o.sampler())),
+        entry!("probe_crossings", "where a BSSRDF's probes through a sphere cross its surface",
+            ProbedSphere => |o| Ok(o.sampler())),
         entry!("thinning", "points of a cloud accepted by distance, by hierarchy or by asking all",
             Thinning => |o| Ok(o.sampler())),
         entry!("exponential_distance", "free flights",

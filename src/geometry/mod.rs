@@ -6,6 +6,7 @@ mod analytic;
 pub mod audit;
 mod body_surface;
 mod clearance;
+mod lines;
 mod mesh;
 mod normals;
 mod obj;
@@ -20,6 +21,7 @@ mod tree;
 mod triangle;
 
 pub use body_surface::{BodyPoint, BodySampler, FaceChoice};
+pub use lines::{Line, Lines, Met};
 pub use mesh::Mesh;
 pub use normals::Normals;
 pub use obj::load_obj;

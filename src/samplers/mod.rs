@@ -14,6 +14,7 @@ pub mod distance;
 pub mod facets;
 pub mod joint;
 pub mod light;
+pub mod lines;
 pub mod lobe;
 pub mod phase;
 pub mod radial;

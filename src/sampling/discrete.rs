@@ -13,6 +13,23 @@ pub fn choose(u: f64, share: f64) -> (bool, f64) {
     }
 }
 
+/// The index that `u` selects out of shares that sum to 1, and its share.
+#[inline]
+pub fn choose_share(shares: impl Iterator<Item = f64>, u: f64) -> Option<(usize, f64)> {
+    let mut rest = u;
+    let mut last = None;
+    for (index, share) in shares.enumerate() {
+        if rest < share {
+            return Some((index, share));
+        }
+        rest -= share;
+        if share > 0.0 {
+            last = Some((index, share));
+        }
+    }
+    last // rounding of the sum
+}
+
 /// A choice by its distribution function: exact at both ends, O(log n).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cumulative {

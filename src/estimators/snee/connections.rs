@@ -25,11 +25,11 @@ use super::guide::Guide;
 use super::{BandSetup, last_vertex, subdivision};
 use crate::estimators::Cost;
 use crate::estimators::bands::Bands;
-use crate::estimators::choice::choose_share;
 use crate::estimators::walk::{Exit, Rivals, Walk};
 use crate::geometry::{Hit, Ray, Side};
 use crate::math::{DVec3, exp, ln};
 use crate::optics::boundary::Boundary;
+use crate::sampling::discrete::choose_share;
 use crate::sampling::stream::Stream;
 
 /// A medium vertex that connections start from.

@@ -67,9 +67,16 @@ fn probability_does_not_increase() {
     }
 }
 
+/// Effective transport of skin1, marble, ketchup and whole milk (Jensen et al. 2001), red, green, blue each, 1/mm.
+const BANDS: [f64; 12] = [
+    0.27224, 0.73178, 1.46479, 0.11752, 0.17966, 0.25308, 0.21001, 1.73966, 2.53732, 0.09175, 0.15208,
+    0.39866,
+];
+
 #[test]
 fn probability_times_weight_is_one() {
-    for (name, rule) in rules() {
+    let bands = BANDS.map(|sigma| ("a band", Rule::new(Form::Exponential { sigma })));
+    for (name, rule) in rules().into_iter().chain(bands) {
         for k in 0..2000 {
             let d = 0.05 * f64::from(k);
             let one = rule.probability(d) * rule.weight(d);
