@@ -140,7 +140,7 @@ impl Acceptance {
 pub struct Rings {
     /// How far outside its rays start, mm.
     pub reach: f64,
-    /// Edges of the rings, mm, increasing: ring i is edges[i] <= r < edges[i + 1].
+    /// Edges of the rings, mm, increasing: ring i is `edges[i] <= r < edges[i + 1]`.
     pub edges: Vec<f64>,
     /// Paths per pass.
     pub paths: usize,

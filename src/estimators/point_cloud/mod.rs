@@ -8,7 +8,7 @@
 //! visibility inside the body. What p decides is variance: the second moment of a term is E[(S Phi)^2 / p], and
 //! where p falls faster than S^2 does, it grows with the size of the body ([`Acceptance`]).
 //!
-//! The camera path's branch of refraction has probability T21, so the kernel leaves T21 out ([`super::emergence`]).
+//! The camera path's branch of refraction has probability T21, so the kernel leaves T21 out (`emergence.rs`).
 //! Light is sampled by strength with a shadow ray. Pixels of a pass share the points: their errors are correlated within a
 //! pass, and independent between passes, each of which has points of its own.
 

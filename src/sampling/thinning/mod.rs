@@ -1,10 +1,10 @@
 //! Thinning: each point x_i of a cloud is accepted independently with probability p(|x - x_i|), and what is accepted
 //! weighs 1/p, so that the expected sum over the accepted is the sum over all.
 //!
-//! p is positive and does not increase with distance. [`scan`] asks every point; [`PointTree`] makes acceptances of the
+//! p is positive and does not increase with distance. `scan` asks every point; `PointTree` makes acceptances of the
 //! same law from a hierarchy, without visiting most of the points that it rejects.
 //!
-//! Uniform numbers decide against p down to 2^-106 ([`Stream::draw_fine`]): with 24 bits, the one number 0 would accept
+//! Uniform numbers decide against p down to 2^-106 (`Stream::draw_fine`): with 24 bits, the one number 0 would accept
 //! points of p < 2^-24 with probability 2^-24 and weights e^(+sigma d) without bound, a bias of orders of magnitude in
 //! large bodies; with 53 bits the same happens beyond optical depth 36.7.
 
