@@ -78,8 +78,9 @@ pub struct BssrdfRaysWords {
     #[serde(default = "one")]
     #[schemars(range(min = 1, max = 65536))]
     pub rays: usize,
-    /// How far under the exit the rays start, mm, at most half way to the opposite side; without it the reduced mean
-    /// free path.
+    /// How far under the exit the rays start, mm; without it the reduced mean free path.
+    ///
+    /// At most half way to the opposite side.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub depth_mm: Option<f64>,

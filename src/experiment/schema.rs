@@ -456,8 +456,9 @@ pub enum Sensor {
         #[schemars(range(min = 1, max = 1048576))]
         paths_per_pass: usize,
     },
-    /// Radiant exitance of the top face of a `half_space` or `slab` by the distance, along the face, between where
-    /// light comes in and where it leaves; W/mm^2. Observables `ring_i`, and `all` of every ring and beyond.
+    /// Radiant exitance of a `half_space` or `slab` by how far from the exit its light came in.
+    ///
+    /// Of the top face; the distance is taken along the face.
     Rings {
         /// Edges of the rings, mm, increasing from 0 or more.
         #[schemars(length(min = 2, max = 1025))]
