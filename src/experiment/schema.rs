@@ -458,7 +458,8 @@ pub enum Sensor {
     },
     /// Radiant exitance of a `half_space` or `slab` by how far from the exit its light came in.
     ///
-    /// Of the top face; the distance is taken along the face.
+    /// Of the top face, W/mm^2; the distance is taken along the face. Observables `ring_i`, and `all` of every ring and
+    /// beyond.
     Rings {
         /// Edges of the rings, mm, increasing from 0 or more.
         #[schemars(length(min = 2, max = 1025))]
