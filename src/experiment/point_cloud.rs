@@ -75,7 +75,7 @@ pub enum AcceptanceWords {
 
 impl Default for AcceptanceWords {
     fn default() -> Self {
-        AcceptanceWords::MeanOfExponentials {}
+        AcceptanceWords::Kernel {}
     }
 }
 
