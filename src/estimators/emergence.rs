@@ -13,6 +13,7 @@
 use std::sync::Arc;
 
 use super::choice::{choose_light, light_shares};
+use super::walk::unscattered_notes;
 use super::{Anomaly, Cost, Scores, TransportClass};
 use crate::error::{Error, Result};
 use crate::geometry::{FaceId, Hit, Ray, Side};
@@ -131,6 +132,7 @@ impl Skin {
                     light.name
                 )
             })
+            .chain(unscattered_notes(&self.scene))
             .collect()
     }
 
@@ -221,7 +223,12 @@ impl CameraPath<'_> {
     fn go_through(&mut self, scores: &mut Scores) -> Option<()> {
         scores.count(Cost::Rays);
         let shape = &self.skin.scene.shape;
-        let hit = shape.intersect(&self.ray, Side::Inside, self.from, f64::INFINITY)?;
+        let Some(hit) = shape.intersect(&self.ray, Side::Inside, self.from, f64::INFINITY) else {
+            if shape.bounds().is_some() {
+                scores.note(Anomaly::LostRay);
+            }
+            return None; // down a half-space for good
+        };
         scores.count(Cost::BoundaryEvents);
         let frame = Frame::about(hit.shading_normal);
         let wo = frame.to_local(-self.ray.dir);
