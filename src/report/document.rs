@@ -1,6 +1,7 @@
 //! A page as blocks: one content, written as Markdown here and as HTML in `html`.
 
 use super::table::Table;
+use super::viewer::Viewer;
 
 /// A page.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -22,12 +23,34 @@ pub enum Block {
     List(Vec<String>),
     /// Lines as they are: a command.
     Code(String),
-    /// A table.
-    Table(Table),
+    /// A table that can be taken elsewhere.
+    Table(TableBlock),
     /// Pictures that stand side by side.
     Figures(Vec<FigureBlock>),
     /// One picture over the width of the page.
     Wide(FigureBlock),
+    /// The pictures of a cell, to be compared.
+    Viewer(Viewer),
+    /// What is opened on demand: its title, and what it holds.
+    Folded(String, Vec<Block>),
+}
+
+/// A table with what it takes to stand elsewhere.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableBlock {
+    /// Unique on its page, and its files' stem under `tables/`: lower-case words joined by `-`.
+    pub name: String,
+    /// What it shows and how to read it, in one or two sentences.
+    pub caption: String,
+    /// Its fields.
+    pub table: Table,
+}
+
+impl TableBlock {
+    /// A named table with its caption.
+    pub fn new(name: impl Into<String>, caption: impl Into<String>, table: Table) -> TableBlock {
+        TableBlock { name: name.into(), caption: caption.into(), table }
+    }
 }
 
 /// The file of a picture.
@@ -66,10 +89,19 @@ fn markdown(block: &Block) -> String {
         Block::Text(text) => format!("{text}\n"),
         Block::List(items) => items.iter().map(|item| format!("- {item}\n")).collect(),
         Block::Code(code) => format!("```\n{code}\n```\n"),
-        Block::Table(table) => table.to_markdown(),
-        Block::Figures(figures) => figures.iter().map(figure).collect::<Vec<_>>().join("\n"),
+        Block::Table(t) => t.table.to_markdown(),
+        Block::Figures(figures) => each(figures),
         Block::Wide(f) => figure(f),
+        Block::Viewer(viewer) => each(&viewer.figures),
+        Block::Folded(title, blocks) => {
+            let blocks: Vec<String> = blocks.iter().map(markdown).collect();
+            format!("**{title}**\n\n{}", blocks.join("\n"))
+        }
     }
+}
+
+fn each(figures: &[FigureBlock]) -> String {
+    figures.iter().map(figure).collect::<Vec<_>>().join("\n")
 }
 
 fn figure(f: &FigureBlock) -> String {

@@ -27,15 +27,19 @@ fn block(block: &Block) -> String {
             format!("<ul>\n{items}</ul>\n")
         }
         Block::Code(code) => format!("<pre>{}</pre>\n", escape(code)),
-        Block::Table(t) => table(t),
-        Block::Wide(f) => format!("<div class=\"wide\">\n{}</div>\n", figure(f)),
-        Block::Figures(figures) => {
-            format!(
-                "<div class=\"figures\">\n{}</div>\n",
-                figures.iter().map(figure).collect::<String>()
-            )
+        Block::Table(t) => table(&t.table),
+        Block::Viewer(viewer) => figures(&viewer.figures),
+        Block::Folded(title, blocks) => {
+            let inner: String = blocks.iter().map(self::block).collect();
+            format!("<details>\n<summary>{}</summary>\n{inner}</details>\n", escape(title))
         }
+        Block::Wide(f) => format!("<div class=\"wide\">\n{}</div>\n", figure(f)),
+        Block::Figures(f) => figures(f),
     }
+}
+
+fn figures(figures: &[FigureBlock]) -> String {
+    format!("<div class=\"figures\">\n{}</div>\n", figures.iter().map(figure).collect::<String>())
 }
 
 fn table(table: &Table) -> String {

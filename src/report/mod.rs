@@ -38,6 +38,8 @@ pub mod table;
 pub mod terminal;
 /// How the tests were tested.
 mod trust;
+/// Pictures to be compared.
+pub mod viewer;
 
 /// Everything that a report is made from.
 pub struct Material {

@@ -2,11 +2,12 @@
 //! to make it again.
 
 use super::Material;
-use super::document::{Block, Document, FigureBlock, Picture};
+use super::document::{Block, Document, FigureBlock, Picture, TableBlock};
 use super::number::significant;
 use super::table::{
     Table, claim_table, comparison_table, measurement_table, model_error_table, verdict_table,
 };
+use super::viewer::Viewer;
 use crate::results::measurements::Measurement;
 use crate::verify::levels::FAMILY_LEVEL;
 use crate::verify::verdict::Outcome;
@@ -37,6 +38,10 @@ fn heading(text: &str) -> Block {
     Block::Heading(2, text.into())
 }
 
+fn named(name: &str, table: Table) -> Block {
+    Block::Table(TableBlock::new(name, "", table))
+}
+
 fn claims(material: &Material) -> Vec<Block> {
     let verdicts = &material.verdicts;
     if verdicts.is_empty() {
@@ -55,7 +60,7 @@ fn claims(material: &Material) -> Vec<Block> {
     let mut ordered = verdicts.clone();
     ordered.sort_by_key(|v| v.is_green());
     let (summary, verdicts) =
-        (Block::Table(claim_table(verdicts)), Block::Table(verdict_table(&ordered)));
+        (named("claims", claim_table(verdicts)), named("verdicts", verdict_table(&ordered)));
     vec![heading("Claims"), Block::Text(text), summary, heading("Verdicts"), verdicts]
 }
 
@@ -80,10 +85,10 @@ fn samplers(material: &Material) -> Vec<Block> {
     vec![
         heading("Samplers"),
         Block::Text(text.into()),
-        Block::Table(table),
+        named("samplers", table),
         heading("Expected masses"),
         Block::Text(quadrature.into()),
-        Block::Table(masses.without_empty_columns()),
+        named("masses", masses.without_empty_columns()),
     ]
 }
 
@@ -92,7 +97,7 @@ fn measured(material: &Material) -> Vec<Block> {
     let bands: Vec<String> = record.bands.iter().map(|band| band.name.clone()).collect();
     let text = "Means over passes; in brackets one standard error in units of the last digit.";
     let mut blocks = vec![heading("Measurements"), Block::Text(text.into())];
-    for cell in &record.cells {
+    for (index, cell) in record.cells.iter().enumerate() {
         if !cell.label.is_empty() {
             blocks.push(Block::Heading(3, cell.label.clone()));
         }
@@ -101,9 +106,9 @@ fn measured(material: &Material) -> Vec<Block> {
         let figures = material.figures.iter().filter(|figure| figure.cell == cell.label);
         let figures: Vec<FigureBlock> = figures.map(figure_block).collect();
         if !figures.is_empty() {
-            blocks.push(Block::Figures(figures));
+            blocks.push(Block::Viewer(Viewer { cell: cell.label.clone(), figures }));
         }
-        blocks.push(Block::Table(measurement_table(&rows, &bands)));
+        blocks.push(named(&format!("measurements-{index:03}"), measurement_table(&rows, &bands)));
     }
     blocks
 }
@@ -123,7 +128,7 @@ fn model_errors(material: &Material) -> Vec<Block> {
     }
     let text = "What a model's mean is off by, relative to light transport itself; in brackets the 95 % interval. A \
                 property of the model, not of an implementation: it is no claim and cannot fail.";
-    let table = Block::Table(model_error_table(&material.model_errors));
+    let table = named("model-errors", model_error_table(&material.model_errors));
     vec![heading("Model errors"), Block::Text(text.into()), table]
 }
 
@@ -136,7 +141,7 @@ fn efficiency(material: &Material) -> Vec<Block> {
                 every machine; by CPU time it is this machine's, and fair only where the two were timed side by side. \
                 A ratio is quoted where the two means agree; it is not resolved where more passes would still move \
                 it or a single pass may make it.";
-    let table = Block::Table(comparison_table(&material.comparisons));
+    let table = named("efficiency", comparison_table(&material.comparisons));
     let mut blocks = vec![heading("Efficiency"), Block::Text(text.into()), table];
     if let Some(drift) = weights::drift(&weights::timed(&material.stored)).filter(|d| *d > DRIFT_LIMIT) {
         blocks.push(Block::Text(format!(
@@ -181,7 +186,7 @@ fn cost(material: &Material) -> Vec<Block> {
     }
     let text = "Seconds are of this machine and this run, without an interval; counts of work are exactly \
                 reproducible. Paths are per CPU second.";
-    vec![heading("Cost"), Block::Text(text.into()), Block::Table(table.without_empty_columns())]
+    vec![heading("Cost"), Block::Text(text.into()), named("cost", table.without_empty_columns())]
 }
 
 fn notes(material: &Material) -> Vec<Block> {
@@ -220,5 +225,5 @@ fn origin(material: &Material) -> Vec<Block> {
         command = p.command.join(" ");
     }
     let again = Block::Text("The command that made it:".into());
-    vec![heading("Provenance"), Block::Table(table), again, Block::Code(command)]
+    vec![heading("Provenance"), named("provenance", table), again, Block::Code(command)]
 }

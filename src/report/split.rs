@@ -2,7 +2,7 @@
 //! both shown alike, beside the CPU time that each half took. That they took the same is stated where it is
 //! so, and where it is not, by how much they differ.
 
-use super::document::{self, Block, Document, FigureBlock};
+use super::document::{self, Block, Document, FigureBlock, TableBlock};
 use super::number::significant;
 use super::table::Table;
 use crate::error::Result;
@@ -88,13 +88,18 @@ impl SplitFigure {
             title: self.title.clone(),
             caption: self.caption.clone(),
         };
-        [Block::Wide(figure), Block::Table(self.table.clone())]
+        [Block::Wide(figure), self.times()]
+    }
+
+    fn times(&self) -> Block {
+        let name = self.stem.rsplit('/').next().unwrap_or_default();
+        Block::Table(TableBlock::new(name, "", self.table.clone()))
     }
 
     /// The caption as a page of its own, beside the picture.
     fn document(&self) -> Document {
         let text = Block::Text(self.caption.clone());
-        Document { title: self.title.clone(), blocks: vec![text, Block::Table(self.table.clone())] }
+        Document { title: self.title.clone(), blocks: vec![text, self.times()] }
     }
 }
 

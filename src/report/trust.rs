@@ -1,7 +1,7 @@
 //! How the tests themselves were tested, as published with the program: which planted defects they find,
 //! and that they hold their levels.
 
-use super::document::Block;
+use super::document::{Block, TableBlock};
 use super::table::Table;
 use crate::results::csv_text::rows;
 
@@ -24,9 +24,9 @@ pub(super) fn blocks() -> Vec<Block> {
     vec![
         Block::Heading(2, "How these tests were tested".into()),
         Block::Text(text),
-        Block::Table(matrix),
+        Block::Table(TableBlock::new("planted-defects", "", matrix)),
         Block::Text(levels.into()),
-        Block::Table(calibration(&rows(CALIBRATION))),
+        Block::Table(TableBlock::new("calibration", "", calibration(&rows(CALIBRATION)))),
     ]
 }
 
