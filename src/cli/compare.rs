@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use crate::error::{Error, Result};
 use crate::report::number::significant;
-use crate::report::table::{Table, verdict_table};
+use crate::report::table::Table;
+use crate::report::tables::verdict_table;
 use crate::results::store::RecordFolder;
 use crate::verify::difference::{Compared, Terms, Work, compare};
 use crate::verify::judge::FAMILY_LEVEL;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::report::number::{per_cent, significant};
-use crate::report::table::verdict_table;
+use crate::report::tables::verdict_table;
 use crate::results::exr_file::{Part, read_exr, write_parts};
 use crate::results::image::write_diverging_png;
 use crate::results::store::{RecordFolder, Stored};

@@ -6,7 +6,7 @@ use super::{Reading, Working, listen};
 use crate::error::{Error, Result};
 use crate::experiment::registry::Registry;
 use crate::experiment::{LoadOptions, Loaded, load_any};
-use crate::report::{self, table::verdict_table};
+use crate::report::{self, tables::verdict_table};
 use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::{atomic, provenance};

@@ -61,6 +61,7 @@ fn image(shape: &Shape, size: f64, height: f64) -> Sensor {
         right: DVec3::X * (0.25 * size),
         down: -DVec3::Y * (0.25 * size),
         view: -DVec3::Z,
+        has_tiles: true,
     };
     Sensor::Accepting(Acceptance::new(screen, height, shape.bounds().expect("a finite body")))
 }
@@ -370,6 +371,7 @@ fn sensors_without_extent_are_refused() {
         right: DVec3::X,
         down: -DVec3::Y,
         view: -DVec3::Z,
+        has_tiles: true,
     };
     let ray = Ray { origin: DVec3::Z * 3.0, dir: -DVec3::Z };
     for (shape, sensor) in [

@@ -247,7 +247,12 @@ fn build_shape(words: &schema::Shape, experiment: &Experiment) -> Result<Shape> 
 }
 
 fn sensor(words: &schema::Sensor, shape: &Shape) -> Result<Sensor> {
-    let screen = |resolution: &[usize; 2], origin: [f64; 3], view: DVec3, up: [f64; 3], pixel: f64| {
+    let screen = |resolution: &[usize; 2],
+                  origin: [f64; 3],
+                  view: DVec3,
+                  up: [f64; 3],
+                  pixel: f64,
+                  has_tiles: bool| {
         let right = view.cross(DVec3::from(up)).normalize();
         let down = view.cross(right);
         let [width, height] = *resolution;
@@ -258,12 +263,21 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Result<Sensor> {
             right: pixel * right,
             down: pixel * down,
             view,
+            has_tiles,
         }
     };
     Ok(match words {
-        schema::Sensor::Orthographic { resolution, center_mm, toward, up, width_mm, acceptance_sr } => {
+        schema::Sensor::Orthographic {
+            resolution,
+            center_mm,
+            toward,
+            up,
+            width_mm,
+            acceptance_sr,
+            tiles,
+        } => {
             let pixel = width_mm / resolution[0] as f64;
-            let screen = screen(resolution, *center_mm, toward.unit(), *up, pixel);
+            let screen = screen(resolution, *center_mm, toward.unit(), *up, pixel, *tiles);
             match (acceptance_sr, shape.bounds()) {
                 (None, _) => Sensor::Orthographic(before(shape, screen)),
                 (Some(solid_angle), Some(bounds)) => {
@@ -277,11 +291,11 @@ fn sensor(words: &schema::Sensor, shape: &Shape) -> Result<Sensor> {
                 }
             }
         }
-        schema::Sensor::Perspective { resolution, position_mm, look_at_mm, up, fov_deg } => {
+        schema::Sensor::Perspective { resolution, position_mm, look_at_mm, up, fov_deg, tiles } => {
             let view = (DVec3::from(*look_at_mm) - DVec3::from(*position_mm)).normalize();
             let half = crate::math::tan(0.5 * fov_deg.to_radians());
             let pixel = 2.0 * half / resolution[1] as f64;
-            Sensor::Perspective(screen(resolution, *position_mm, view, *up, pixel))
+            Sensor::Perspective(screen(resolution, *position_mm, view, *up, pixel, *tiles))
         }
         schema::Sensor::Vertex { point_mm, toward, paths_per_pass } => Sensor::Vertex {
             ray: Ray { origin: DVec3::from_array(*point_mm), dir: toward.unit() },

@@ -404,6 +404,9 @@ pub enum Sensor {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = std::f64::consts::TAU))]
         acceptance_sr: Option<f64>,
+        /// Whether the means of 4 by 4 tiles are observables too, for claims on parts of the image.
+        #[serde(default = "yes", skip_serializing_if = "is_true")]
+        tiles: bool,
     },
     /// A pinhole: radiance per pixel, box filter.
     Perspective {
@@ -419,6 +422,9 @@ pub enum Sensor {
         /// Vertical opening angle, degrees.
         #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 180))]
         fov_deg: f64,
+        /// Whether the means of 4 by 4 tiles are observables too, for claims on parts of the image.
+        #[serde(default = "yes", skip_serializing_if = "is_true")]
+        tiles: bool,
     },
     /// Radiance along one ray.
     Probe {
@@ -469,6 +475,14 @@ pub enum Sensor {
         #[schemars(range(min = 1, max = 1048576))]
         paths_per_pass: usize,
     },
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn is_true(value: &bool) -> bool {
+    *value
 }
 
 fn default_paths_per_pass() -> usize {

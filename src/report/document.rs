@@ -76,6 +76,22 @@ pub struct FigureBlock {
 }
 
 impl Document {
+    /// Every table that has a column, in the order of the page.
+    pub fn tables(&self) -> Vec<&TableBlock> {
+        fn inside<'a>(blocks: &'a [Block], tables: &mut Vec<&'a TableBlock>) {
+            for block in blocks {
+                match block {
+                    Block::Table(table) if !table.table.header.is_empty() => tables.push(table),
+                    Block::Folded(_, blocks) => inside(blocks, tables),
+                    _ => (),
+                }
+            }
+        }
+        let mut tables = Vec::new();
+        inside(&self.blocks, &mut tables);
+        tables
+    }
+
     /// The page as Markdown; pictures stand beside it.
     pub fn to_markdown(&self) -> String {
         let blocks: String = self.blocks.iter().map(|block| format!("\n{}", markdown(block))).collect();
@@ -89,7 +105,8 @@ fn markdown(block: &Block) -> String {
         Block::Text(text) => format!("{text}\n"),
         Block::List(items) => items.iter().map(|item| format!("- {item}\n")).collect(),
         Block::Code(code) => format!("```\n{code}\n```\n"),
-        Block::Table(t) => t.table.to_markdown(),
+        Block::Table(t) if t.caption.is_empty() => t.table.to_markdown(),
+        Block::Table(t) => format!("{}\n\n{}", t.caption, t.table.to_markdown()),
         Block::Figures(figures) => each(figures),
         Block::Wide(f) => figure(f),
         Block::Viewer(viewer) => each(&viewer.figures),

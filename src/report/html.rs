@@ -1,24 +1,51 @@
 //! The page as one HTML file: no network, pictures as data URIs, light and dark, readable on a phone.
 
 use super::base64;
-use super::document::{Block, Document, FigureBlock, Picture};
-use super::table::Table;
+use super::document::{Block, Document, FigureBlock, Picture, TableBlock};
+use super::latex::to_latex;
 
 const STYLE: &str = include_str!("style.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// Most rows of a table that carries its sources with it; longer ones have them in files beside the page.
+const CARRIED_ROWS: usize = 200;
 
 /// The page as a file of its own.
 pub fn to_html(page: &Document) -> String {
     let title = escape(&page.title);
     let body: String = page.blocks.iter().map(block).collect();
+    let contents = contents(page);
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{body}</body>\n</html>\n"
+         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{contents}{body}\
+         <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
     )
 }
 
-fn block(block: &Block) -> String {
-    match block {
+/// Links to the sections, where there are several.
+fn contents(page: &Document) -> String {
+    let headings = page.blocks.iter().filter_map(|block| match block {
+        Block::Heading(2, text) => Some(format!("<a href=\"#{}\">{}</a>\n", slug(text), escape(text))),
+        _ => None,
+    });
+    let links: Vec<String> = headings.collect();
+    match links.len() {
+        0 | 1 => String::new(),
+        _ => format!("<nav aria-label=\"Sections\">\n{}</nav>\n", links.concat()),
+    }
+}
+
+/// A heading as the name of a place: letters and digits, else `-`.
+fn slug(text: &str) -> String {
+    let letters =
+        text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
+    letters.collect()
+}
+
+fn block(of: &Block) -> String {
+    match of {
+        Block::Heading(2, text) => format!("<h2 id=\"{}\">{}</h2>\n", slug(text), escape(text)),
         Block::Heading(level, text) => format!("<h{level}>{}</h{level}>\n", escape(text)),
         Block::Text(text) => format!("<p>{}</p>\n", escape(text)),
         Block::List(items) => {
@@ -26,11 +53,11 @@ fn block(block: &Block) -> String {
                 items.iter().map(|item| format!("<li>{}</li>\n", escape(item))).collect();
             format!("<ul>\n{items}</ul>\n")
         }
-        Block::Code(code) => format!("<pre>{}</pre>\n", escape(code)),
-        Block::Table(t) => table(&t.table),
+        Block::Code(code) => format!("<pre tabindex=\"0\">{}</pre>\n", escape(code)),
+        Block::Table(t) => table(t),
         Block::Viewer(viewer) => figures(&viewer.figures),
         Block::Folded(title, blocks) => {
-            let inner: String = blocks.iter().map(self::block).collect();
+            let inner: String = blocks.iter().map(block).collect();
             format!("<details>\n<summary>{}</summary>\n{inner}</details>\n", escape(title))
         }
         Block::Wide(f) => format!("<div class=\"wide\">\n{}</div>\n", figure(f)),
@@ -42,19 +69,57 @@ fn figures(figures: &[FigureBlock]) -> String {
     format!("<div class=\"figures\">\n{}</div>\n", figures.iter().map(figure).collect::<String>())
 }
 
-fn table(table: &Table) -> String {
+/// A table with its caption, and what it takes to stand in a paper, a spreadsheet or a page.
+fn table(of: &TableBlock) -> String {
+    let TableBlock { name, caption, table } = of;
+    if table.header.is_empty() {
+        return String::new();
+    }
     let numeric: Vec<bool> = (0..table.header.len()).map(|column| table.is_numeric(column)).collect();
     let class = |column: usize| if numeric[column] { " class=\"number\"" } else { "" };
-    let head =
-        table.header.iter().enumerate().map(|(c, h)| format!("<th{}>{}</th>", class(c), escape(h)));
+    let head = table
+        .header
+        .iter()
+        .enumerate()
+        .map(|(c, h)| format!("<th scope=\"col\"{}>{}</th>", class(c), escape(h)));
     let row = |row: &Vec<String>| {
         let fields = row.iter().enumerate().map(|(c, f)| format!("<td{}>{}</td>", class(c), field(f)));
         format!("<tr>{}</tr>\n", fields.collect::<String>())
     };
+    let caption = match caption.is_empty() {
+        true => String::new(),
+        false => format!("<p class=\"caption\">{}</p>\n", escape(caption)),
+    };
     format!(
-        "<div class=\"scroll\"><table>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}</tbody>\n</table></div>\n",
+        "<section class=\"table\" id=\"table-{name}\">\n{caption}<div class=\"scroll\" tabindex=\"0\" role=\"region\" \
+         aria-label=\"{name}\"><table>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}</tbody>\n</table></div>\n{}</section>\n",
         head.collect::<String>(),
-        table.rows.iter().map(row).collect::<String>()
+        table.rows.iter().map(row).collect::<String>(),
+        sources(of)
+    )
+}
+
+/// The table as LaTeX, Markdown and CSV, to be copied.
+fn sources(of: &TableBlock) -> String {
+    let TableBlock { name, caption, table } = of;
+    let files = format!("tables/{name}.tex, .md, .csv");
+    if table.rows.len() > CARRIED_ROWS {
+        return format!("<p class=\"files\">{files}</p>\n");
+    }
+    let forms = [
+        ("LaTeX", to_latex(table, name, caption)),
+        ("Markdown", table.to_markdown()),
+        ("CSV", table.to_csv()),
+    ];
+    let form = |(form, text): &(&str, String)| {
+        format!(
+            "<details class=\"source\"><summary>{form}</summary><pre tabindex=\"0\">{}</pre></details>\n",
+            escape(text)
+        )
+    };
+    format!(
+        "<div class=\"sources\">\n{}<span class=\"files\">{files}</span></div>\n",
+        forms.iter().map(form).collect::<String>()
     )
 }
 
@@ -75,9 +140,43 @@ fn figure(f: &FigureBlock) -> String {
         Picture::Svg(svg) => svg.clone(),
     };
     let caption = escape(&f.caption);
-    format!("<figure>{picture}<figcaption><b>{title}</b><br>{caption}</figcaption></figure>\n")
+    format!("<figure>{picture}<figcaption><b>{title}</b> {caption}</figcaption></figure>\n")
 }
 
-fn escape(text: &str) -> String {
+/// Text as HTML shows it, in elements and in attributes.
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::table::Table;
+
+    fn page(rows: usize) -> String {
+        let mut table = Table::new(&["cell", "ratio"]);
+        (0..rows).for_each(|_| table.push(vec!["a&b".into(), "1.2 [1.1, 1.3]".into()]));
+        let blocks = vec![
+            Block::Heading(2, "How fast?".into()),
+            Block::Folded("More".into(), vec![Block::Table(TableBlock::new("speed", "Speed.", table))]),
+            Block::Heading(2, "Cost".into()),
+        ];
+        to_html(&Document { title: "x".into(), blocks })
+    }
+
+    #[test]
+    fn a_table_can_be_taken_elsewhere() {
+        let html = page(2);
+        for text in [
+            "<a href=\"#how-fast-\">",
+            "<h2 id=\"how-fast-\">",
+            "a\\&amp;b",
+            "\\toprule",
+            "a&amp;b,\"1.2 [1.1, 1.3]\"".replace('"', "&quot;").as_str(),
+        ] {
+            assert!(html.contains(text), "{text}\n{html}");
+        }
+        let long = page(CARRIED_ROWS + 1);
+        assert!(!long.contains("toprule") && long.contains("tables/speed.tex"));
+    }
 }

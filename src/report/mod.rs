@@ -22,18 +22,24 @@ mod base64;
 pub mod document;
 /// The same page as HTML.
 pub mod html;
+/// Tables for papers.
+pub mod latex;
 /// Numbers with their uncertainty.
 pub mod number;
 /// What the page says.
 mod page;
-/// Line plots.
+/// Plots as SVG.
 pub mod plot;
-/// Means as passes add up.
-mod running;
+/// The plots of a record.
+pub mod plots;
 /// Two estimators in one picture.
 pub mod split;
+/// The tables that a text quotes.
+pub mod summary;
 /// Aligned text, Markdown and CSV.
 pub mod table;
+/// The tables that everybody wants.
+pub mod tables;
 /// For the terminal.
 pub mod terminal;
 /// How the tests were tested.
@@ -61,8 +67,8 @@ pub struct Material {
     pub figures: Vec<Figure>,
     /// Grids of split pictures.
     pub splits: Vec<split::SplitFigure>,
-    /// Plots of means as passes add up.
-    pub running: Vec<document::FigureBlock>,
+    /// Plots.
+    pub plots: Vec<plots::Section>,
 }
 
 /// A picture of one run.
@@ -80,7 +86,7 @@ pub struct Figure {
 }
 
 /// Makes every derived view of a results folder: `measurements.csv`, `comparisons.csv`, `model_errors.csv` where there are
-/// models, `verdicts.csv`, `summary.json`, `images/`, `report.md` and `report.html`. The record is judged by itself, with the second look that a
+/// models, `verdicts.csv`, `summary.json`, `images/`, `plots/`, `tables/`, `report.md`, `report.tex` and `report.html`. The record is judged by itself, with the second look that a
 /// verification may have left beside it.
 pub fn write(folder: &RecordFolder) -> Result<Material> {
     let stored = folder.read()?;
@@ -97,11 +103,12 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     let figures = write_figures(folder, &stored)?;
     let stored = Stored { timing: timing.clone(), ..stored };
     let wanted = folder.read_pictures()?;
-    let (splits, running) = (&split::wanted(&wanted), &running::wanted(&wanted));
-    let splits = split::write_splits(folder, &stored, splits)?;
-    let running = running::write_running(folder, &stored, running)?;
+    let splits = split::write_splits(folder, &stored, &split::wanted(&wanted))?;
     let comparisons = comparisons::comparisons(&stored);
     let model_errors = model_errors(&stored);
+    let plots = plots::sections(&stored, &comparisons, &wanted);
+    folder.clear_views("plots")?;
+    plots.iter().try_for_each(|section| section.write(folder))?;
     let material = Material {
         stored,
         timing,
@@ -112,15 +119,17 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
         model_errors,
         figures,
         splits,
-        running,
+        plots,
     };
     let page = page::page(&material);
+    write_tables(folder, &page)?;
     let views = [
         ("measurements.csv", measurements::to_csv(&material.rows)),
         ("comparisons.csv", comparisons::to_csv(&material.comparisons)),
         ("verdicts.csv", verdict::to_csv(&material.verdicts)),
         ("summary.json", canonical(&summary(&material))),
         ("report.md", page.to_markdown()),
+        ("report.tex", latex::to_document(&page)),
         ("report.html", html::to_html(&page)),
     ];
     for (name, text) in views {
@@ -131,6 +140,23 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
             .write_view("model_errors.csv", model_errors::to_csv(&material.model_errors).as_bytes())?;
     }
     Ok(material)
+}
+
+/// Every table of the page as Markdown, CSV and LaTeX.
+fn write_tables(folder: &RecordFolder, page: &document::Document) -> Result<()> {
+    folder.clear_views("tables")?;
+    for block in page.tables() {
+        let document::TableBlock { name, caption, table } = block;
+        let forms = [
+            ("md", table.to_markdown()),
+            ("csv", table.to_csv()),
+            ("tex", latex::to_latex(table, name, caption)),
+        ];
+        for (extension, text) in forms {
+            folder.write_view(&format!("tables/{name}.{extension}"), text.as_bytes())?;
+        }
+    }
+    Ok(())
 }
 
 /// The numbers of a record for programs: what was measured and how many claims hold.

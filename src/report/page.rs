@@ -1,31 +1,44 @@
-//! What the page says: claims and verdicts first, then what was measured, then what it cost and how
-//! to make it again.
+//! What the page says: what was asked, claims and verdicts first, then efficiency, pictures and plots, what was measured, what
+//! it cost, and how to make it again.
 
 use super::Material;
 use super::document::{Block, Document, FigureBlock, Picture, TableBlock};
 use super::number::significant;
-use super::table::{
-    Table, claim_table, comparison_table, measurement_table, model_error_table, verdict_table,
+use super::plots::Section;
+use super::summary;
+use super::table::Table;
+use super::tables::{
+    claim_table, comparison_table, measurement_table, model_error_table, verdict_table,
 };
 use super::viewer::Viewer;
+use crate::results::json::canonical;
 use crate::results::measurements::Measurement;
+use crate::results::record::CostMeasure;
 use crate::verify::levels::FAMILY_LEVEL;
 use crate::verify::verdict::Outcome;
 use crate::verify::weights::{self, DRIFT_LIMIT};
 
+/// Most rows of a table that is open when a page is.
+const OPEN_ROWS: usize = 40;
+/// Most cells whose measurements are.
+const OPEN_CELLS: usize = 4;
+
 /// The page of one record.
 pub(super) fn page(material: &Material) -> Document {
-    let mut blocks = claims(material);
+    let mut blocks = asked(material);
+    blocks.extend(claims(material));
     if material.stored.record.samplers.is_empty() {
-        blocks.extend(measured(material));
-        blocks.extend(super::split::blocks(&material.splits));
-        blocks.extend(super::running::blocks(&material.running));
-        blocks.extend(model_errors(material));
         blocks.extend(efficiency(material));
+        blocks.extend(pictures(material));
+        blocks.extend(super::split::blocks(&material.splits));
+        blocks.extend(model_errors(material));
+        blocks.extend(material.plots.iter().flat_map(Section::blocks));
+        blocks.extend(measured(material));
         blocks.extend(cost(material));
         blocks.extend(notes(material));
     } else {
         blocks.extend(samplers(material));
+        blocks.extend(material.plots.iter().flat_map(Section::blocks));
     }
     if !material.verdicts.is_empty() {
         blocks.extend(super::trust::blocks());
@@ -34,12 +47,58 @@ pub(super) fn page(material: &Material) -> Document {
     Document { title: material.stored.record.experiment.clone(), blocks }
 }
 
+/// What the experiment says of itself, and its size.
+fn asked(material: &Material) -> Vec<Block> {
+    let record = &material.stored.record;
+    let description = record.resolved["description"].as_str().unwrap_or_default();
+    let mut blocks = Vec::new();
+    if !description.is_empty() {
+        blocks.push(Block::Text(description.split_whitespace().collect::<Vec<_>>().join(" ")));
+    }
+    if !record.samplers.is_empty() {
+        blocks.push(Block::Text(format!("{} samplers.", record.samplers.len())));
+        return blocks;
+    }
+    let bands: Vec<&str> = record.bands.iter().map(|band| band.name.as_str()).collect();
+    let bands = match &bands[..] {
+        [first, .., last] if bands.len() > 6 => format!("{} bands, {first} to {last}", bands.len()),
+        [one] => format!("band {one}"),
+        few => format!("bands {}", few.join(", ")),
+    };
+    let runs = || record.cells.iter().flat_map(|cell| &cell.runs);
+    let mut names: Vec<&str> = Vec::new();
+    for run in runs().filter(|run| run.control_of.is_none()) {
+        if !names.contains(&run.estimator.as_str()) {
+            names.push(&run.estimator);
+        }
+    }
+    let passes = |pick: fn(u64, u64) -> u64| runs().map(|run| run.passes).reduce(pick).unwrap_or(0);
+    let passes = match (passes(u64::min), passes(u64::max)) {
+        (least, most) if least == most => format!("{least}"),
+        (least, most) => format!("{least} to {most}"),
+    };
+    let cells = match record.cells.len() {
+        1 => "One cell".into(),
+        n => format!("{n} cells"),
+    };
+    blocks.push(Block::Text(format!(
+        "{cells}, {bands}; estimators {}; {passes} passes each.",
+        names.join(", ")
+    )));
+    blocks
+}
+
 fn heading(text: &str) -> Block {
     Block::Heading(2, text.into())
 }
 
 fn named(name: &str, table: Table) -> Block {
     Block::Table(TableBlock::new(name, "", table))
+}
+
+/// Blocks that are open where a reader wants them at once.
+fn folded_if(is_long: bool, title: &str, blocks: Vec<Block>) -> Vec<Block> {
+    if is_long { vec![Block::Folded(title.into(), blocks)] } else { blocks }
 }
 
 fn claims(material: &Material) -> Vec<Block> {
@@ -56,12 +115,20 @@ fn claims(material: &Material) -> Vec<Block> {
         verdicts.len(),
         verdicts.len() - green - failed,
     );
-    // What is not green comes first.
-    let mut ordered = verdicts.clone();
-    ordered.sort_by_key(|v| v.is_green());
-    let (summary, verdicts) =
-        (named("claims", claim_table(verdicts)), named("verdicts", verdict_table(&ordered)));
-    vec![heading("Claims"), Block::Text(text), summary, heading("Verdicts"), verdicts]
+    let (green_ones, others): (Vec<_>, Vec<_>) = verdicts.iter().cloned().partition(|v| v.is_green());
+    let mut blocks = vec![heading("Claims"), Block::Text(text), named("claims", claim_table(verdicts))];
+    if !others.is_empty() {
+        blocks.push(Block::Heading(3, "What is not green".into()));
+        blocks.push(named("verdicts-not-green", verdict_table(&others)));
+    }
+    if !green_ones.is_empty() {
+        let title = format!(
+            "The {} verdicts that are green, each with what it would have found",
+            green_ones.len()
+        );
+        blocks.push(Block::Folded(title, vec![named("verdicts-green", verdict_table(&green_ones))]));
+    }
+    blocks
 }
 
 /// What was drawn, and how exactly it is known what should have been.
@@ -92,23 +159,37 @@ fn samplers(material: &Material) -> Vec<Block> {
     ]
 }
 
+/// The pictures of every cell.
+fn pictures(material: &Material) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    for cell in &material.stored.record.cells {
+        let figures = material.figures.iter().filter(|figure| figure.cell == cell.label);
+        let figures: Vec<FigureBlock> = figures.map(figure_block).collect();
+        if !figures.is_empty() {
+            blocks.push(Block::Viewer(Viewer { cell: cell.label.clone(), figures }));
+        }
+    }
+    if !blocks.is_empty() {
+        blocks.insert(0, heading("Pictures"));
+    }
+    blocks
+}
+
 fn measured(material: &Material) -> Vec<Block> {
     let record = &material.stored.record;
     let bands: Vec<String> = record.bands.iter().map(|band| band.name.clone()).collect();
     let text = "Means over passes; in brackets one standard error in units of the last digit.";
     let mut blocks = vec![heading("Measurements"), Block::Text(text.into())];
     for (index, cell) in record.cells.iter().enumerate() {
-        if !cell.label.is_empty() {
-            blocks.push(Block::Heading(3, cell.label.clone()));
-        }
         let rows: Vec<&Measurement> =
             material.rows.iter().filter(|row| row.cell == cell.label).collect();
-        let figures = material.figures.iter().filter(|figure| figure.cell == cell.label);
-        let figures: Vec<FigureBlock> = figures.map(figure_block).collect();
-        if !figures.is_empty() {
-            blocks.push(Block::Viewer(Viewer { cell: cell.label.clone(), figures }));
+        let table = named(&format!("measurements-{index:03}"), measurement_table(&rows, &bands));
+        let is_long = record.cells.len() > OPEN_CELLS || rows.len() / bands.len().max(1) > OPEN_ROWS;
+        let title = if cell.label.is_empty() { "All measurements" } else { &cell.label };
+        if !is_long && !cell.label.is_empty() {
+            blocks.push(Block::Heading(3, cell.label.clone()));
         }
-        blocks.push(named(&format!("measurements-{index:03}"), measurement_table(&rows, &bands)));
+        blocks.extend(folded_if(is_long, title, vec![table]));
     }
     blocks
 }
@@ -129,7 +210,10 @@ fn model_errors(material: &Material) -> Vec<Block> {
     let text = "What a model's mean is off by, relative to light transport itself; in brackets the 95 % interval. A \
                 property of the model, not of an implementation: it is no claim and cannot fail.";
     let table = named("model-errors", model_error_table(&material.model_errors));
-    vec![heading("Model errors"), Block::Text(text.into()), table]
+    let mut blocks = vec![heading("Model errors"), Block::Text(text.into())];
+    blocks.extend(summary::model_errors(&material.stored, &material.model_errors).map(Block::Table));
+    blocks.push(Block::Folded("By class".into(), vec![table]));
+    blocks
 }
 
 fn efficiency(material: &Material) -> Vec<Block> {
@@ -141,8 +225,15 @@ fn efficiency(material: &Material) -> Vec<Block> {
                 every machine; by CPU time it is this machine's, and fair only where the two were timed side by side. \
                 A ratio is quoted where the two means agree; it is not resolved where more passes would still move \
                 it or a single pass may make it.";
-    let table = named("efficiency", comparison_table(&material.comparisons));
-    let mut blocks = vec![heading("Efficiency"), Block::Text(text.into()), table];
+    let table = named("efficiency-by-class", comparison_table(&material.comparisons));
+    let mut blocks = vec![heading("Efficiency")];
+    for cost in [CostMeasure::Cpu, CostMeasure::Counters] {
+        blocks.extend(
+            summary::efficiency(&material.stored, &material.comparisons, cost).map(Block::Table),
+        );
+    }
+    let title = "By transport class, by counted work and by CPU time, with reasons";
+    blocks.push(Block::Folded(title.into(), vec![Block::Text(text.into()), table]));
     if let Some(drift) = weights::drift(&weights::timed(&material.stored)).filter(|d| *d > DRIFT_LIMIT) {
         blocks.push(Block::Text(format!(
             "CPU times of these runs deviate by up to {:.0} % from what the counters' weights predict: measure the \
@@ -225,5 +316,7 @@ fn origin(material: &Material) -> Vec<Block> {
         command = p.command.join(" ");
     }
     let again = Block::Text("The command that made it:".into());
-    vec![heading("Provenance"), named("provenance", table), again, Block::Code(command)]
+    let resolved = Block::Code(canonical(&record.resolved));
+    let resolved = Block::Folded("The experiment as it was played, every value".into(), vec![resolved]);
+    vec![heading("Provenance"), named("provenance", table), again, Block::Code(command), resolved]
 }

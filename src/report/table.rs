@@ -1,12 +1,6 @@
-//! Tables as aligned text for a terminal, as Markdown and as CSV; and the two that everybody wants.
+//! Tables as aligned text for a terminal, as Markdown and as CSV; `latex` has them for papers.
 
-use super::number::{per_cent, significant, with_error};
 use crate::results::csv_text;
-use crate::results::measurements::Measurement;
-use crate::results::record::CostMeasure;
-use crate::verify::comparisons::{Row, measure_name};
-use crate::verify::model_errors::ModelError;
-use crate::verify::verdict::Verdict;
 
 /// A header and rows of text.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,11 +27,16 @@ impl Table {
     pub fn without_empty_columns(mut self) -> Table {
         for column in (0..self.header.len()).rev() {
             if self.rows.iter().all(|row| row[column].is_empty()) {
-                self.header.remove(column);
-                self.rows.iter_mut().for_each(|row| drop(row.remove(column)));
+                self.remove_column(column);
             }
         }
         self
+    }
+
+    /// Removes a column.
+    pub fn remove_column(&mut self, column: usize) {
+        self.header.remove(column);
+        self.rows.iter_mut().for_each(|row| drop(row.remove(column)));
     }
 
     /// Aligned plain text: columns two spaces apart, numbers to the right. Nothing of a table without
@@ -106,181 +105,9 @@ fn aligned(row: &[String], columns: &[Column]) -> Vec<String> {
     row.iter().zip(columns).map(pad).collect()
 }
 
-/// Verdicts, with what each test could have seen.
-pub fn verdict_table(verdicts: &[Verdict]) -> Table {
-    let mut table = Table::new(&[
-        "outcome",
-        "claim",
-        "cell",
-        "band",
-        "estimators",
-        "observable",
-        "class",
-        "measured",
-        "expected",
-        "test",
-        "statistic",
-        "adjusted p",
-        "detectable",
-        "note",
-    ]);
-    for v in verdicts {
-        let number = |value: f64, error: f64| {
-            match value.is_nan() {
-                true => String::new(),
-                // Exact, or without an error of its own.
-                false if error == 0.0 || error.is_nan() => significant(value, 6),
-                false => with_error(value, error),
-            }
-        };
-        // Relative to the expected value; absolute where that is 0.
-        let detectable =
-            if v.expected == 0.0 { significant(v.detectable, 2) } else { per_cent(v.detectable) };
-        table.push(vec![
-            v.outcome.to_string(),
-            v.claim.clone(),
-            v.cell.clone(),
-            v.band.clone(),
-            v.estimators.clone(),
-            v.observable.clone(),
-            v.class.clone(),
-            number(v.value, v.std_error),
-            number(v.expected, v.expected_error),
-            v.test.clone(),
-            significant(v.statistic, 3),
-            significant(v.adjusted_p, 2),
-            detectable,
-            v.note.clone(),
-        ]);
-    }
-    table.without_empty_columns()
-}
-
-/// Claims: how many of each one's comparisons came out how.
-pub fn claim_table(verdicts: &[Verdict]) -> Table {
-    let mut table = Table::new(&["claim", "comparisons", "pass", "fail", "underpowered", "invalid"]);
-    let mut labels: Vec<&str> = Vec::new();
-    for v in verdicts {
-        if !labels.contains(&v.claim.as_str()) {
-            labels.push(&v.claim);
-        }
-    }
-    for label in labels {
-        let own: Vec<String> =
-            verdicts.iter().filter(|v| v.claim == label).map(|v| v.outcome.to_string()).collect();
-        let count = |outcome: &str| own.iter().filter(|o| *o == outcome).count().to_string();
-        let counts = table.header[2..].iter().map(|outcome| count(outcome));
-        let row = [label.to_string(), own.len().to_string()].into_iter().chain(counts).collect();
-        table.push(row);
-    }
-    table
-}
-
-/// Model errors: a row for each model, observable, class and band.
-pub fn model_error_table(rows: &[ModelError]) -> Table {
-    let mut table = Table::new(&[
-        "cell",
-        "model of",
-        "band",
-        "observable",
-        "class",
-        "model",
-        "truth",
-        "model error",
-        "note",
-    ]);
-    for row in rows {
-        let (low, high) = row.interval();
-        let percent = |x: f64| format!("{:+.1}", 100.0 * x);
-        table.push(vec![
-            row.cell.clone(),
-            row.estimator.clone(),
-            row.band.clone(),
-            row.observable.name.clone(),
-            row.observable.class.clone(),
-            with_error(row.value.value, row.value.std_error),
-            with_error(row.expected.value, row.expected.std_error),
-            format!("{} [{}, {}] %", percent(row.relative.value), percent(low), percent(high)),
-            row.note.clone(),
-        ]);
-    }
-    table.without_empty_columns()
-}
-
-/// Efficiencies: a row for each pair, class and measure of cost.
-pub fn comparison_table(rows: &[Row]) -> Table {
-    let mut table = Table::new(&[
-        "cell",
-        "candidate",
-        "against",
-        "band",
-        "variance of",
-        "class",
-        "cost",
-        "efficiency",
-        "variance",
-        "kurtosis",
-        "note",
-    ]);
-    for row in rows {
-        let number = |x: f64| significant(x, 3);
-        let efficiency = match row.efficiency_ratio.is_nan() {
-            true => String::new(),
-            false => {
-                format!(
-                    "{} [{}, {}]",
-                    number(row.efficiency_ratio),
-                    number(row.ci_low),
-                    number(row.ci_high)
-                )
-            }
-        };
-        let cost = match (row.cost, row.side_by_side) {
-            (CostMeasure::Cpu, false) => "cpu, one after the other",
-            (cost, _) => measure_name(cost),
-        };
-        let kurtosis = match row.kurtosis_candidate.is_nan() {
-            true => String::new(),
-            false => format!("{}, {}", number(row.kurtosis_candidate), number(row.kurtosis_baseline)),
-        };
-        table.push(vec![
-            row.cell.clone(),
-            row.candidate.clone(),
-            row.baseline.clone(),
-            row.band.clone(),
-            row.metric.clone(),
-            row.class.clone(),
-            cost.into(),
-            efficiency,
-            number(row.variance_ratio),
-            kurtosis,
-            row.note.clone(),
-        ]);
-    }
-    table.without_empty_columns()
-}
-
-/// Measurements: a row for each estimator, observable and class, a column for each band.
-pub fn measurement_table(rows: &[&Measurement], bands: &[String]) -> Table {
-    let mut header = vec!["estimator", "observable", "class"];
-    header.extend(bands.iter().map(String::as_str));
-    let mut table = Table::new(&header);
-    // Rows come with the bands of one observable together.
-    for group in rows.chunks(bands.len().max(1)) {
-        let first = group[0];
-        let mut row = vec![first.estimator.clone(), first.observable.clone(), first.class.clone()];
-        row.extend(group.iter().map(|m| with_error(m.mean, m.std_error)));
-        table.push(row);
-    }
-    table
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::measurements::measurements;
-    use crate::results::sample;
-    use crate::verify::judge::judge_alone;
 
     fn small() -> Table {
         let mut table = Table::new(&["name", "value", "nothing"]);
@@ -295,30 +122,5 @@ mod tests {
         let markdown = "| name |  value |\n| ---- | -----: |\n| a\\|b | 1.0(2) |\n| c    |    -12 |\n";
         assert_eq!(small().to_markdown(), markdown);
         assert_eq!(small().to_csv(), "name,value\na|b,1.0(2)\nc,-12\n");
-    }
-
-    #[test]
-    fn measurements_have_a_column_a_band() {
-        let rows = measurements(&sample::stored(0.5), None);
-        let rows: Vec<&Measurement> = rows.iter().collect();
-        let table = measurement_table(&rows, &["R".into(), "G".into()]);
-        assert_eq!((table.rows.len(), table.header.len()), (4, 5));
-        assert!(table.rows[3][4].contains('('), "{:?}", table.rows);
-    }
-
-    #[test]
-    fn claims_are_counted() {
-        let verdicts = judge_alone(&sample::judged(&[("a", 1.0), ("b", 2.0), ("a", 2.0)]));
-        assert_eq!(
-            claim_table(&verdicts).rows,
-            [["a", "2", "1", "1", "0", "0"], ["b", "1", "0", "1", "0", "0"]]
-        );
-    }
-
-    #[test]
-    fn verdicts_show_what_they_could_see() {
-        let text = verdict_table(&judge_alone(&sample::judged(&[("holds", 1.0)]))).to_text();
-        assert!(text.contains("pass     holds  smooth  R     mis"), "{text}");
-        assert!(text.contains(" %"), "{text}");
     }
 }

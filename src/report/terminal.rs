@@ -2,7 +2,8 @@
 
 use super::Material;
 use super::number::{per_cent, significant, with_error};
-use super::table::{Table, comparison_table};
+use super::table::Table;
+use super::tables::comparison_table;
 use crate::results::measurements::Measurement;
 use crate::verify::comparisons::Row;
 

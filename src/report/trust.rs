@@ -21,12 +21,14 @@ pub(super) fn blocks() -> Vec<Block> {
     );
     let levels = "And it is seen to hold its level: runs with a true hypothesis, driven by another random generator, \
                   and the shares of p-values below 1e-2 and 1e-3.";
+    let matrix = Block::Table(TableBlock::new("planted-defects", "", matrix));
+    let calibration = Block::Table(TableBlock::new("calibration", "", calibration(&rows(CALIBRATION))));
     vec![
         Block::Heading(2, "How these tests were tested".into()),
         Block::Text(text),
-        Block::Table(TableBlock::new("planted-defects", "", matrix)),
+        Block::Folded("Planted defects, and what sees them".into(), vec![matrix]),
         Block::Text(levels.into()),
-        Block::Table(TableBlock::new("calibration", "", calibration(&rows(CALIBRATION)))),
+        Block::Folded("Levels, measured".into(), vec![calibration]),
     ]
 }
 

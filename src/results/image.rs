@@ -112,6 +112,11 @@ pub(super) fn show(rgb: [f64; 3], gain: f64) -> Shown {
     }
 }
 
+/// 8-bit sRGB of linear sRGB times `gain`, clipped to [0, 1].
+pub fn shown_bytes(rgb: [f64; 3], gain: f64) -> [u8; 3] {
+    show(rgb, gain).bytes
+}
+
 /// A PNG of 8-bit sRGB values, row by row from the top.
 pub(super) fn encoded(width: usize, height: usize, data: &[u8]) -> Result<Vec<u8>> {
     encode(width, height, data)

@@ -255,6 +255,17 @@ impl RecordFolder {
         atomic::write(&path, bytes, "write results")
     }
 
+    /// Removes a folder of views beside the record, so that none of an earlier record stays among those of this one.
+    pub fn clear_views(&self, name: &str) -> Result<()> {
+        let path = self.root.join(name);
+        match fs::remove_dir_all(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(Error::io(&path, "remove the views of an earlier record")(error))
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn read_json<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>> {
         let path = self.root.join(name);
         if !path.exists() {

@@ -69,6 +69,8 @@ pub struct Screen {
     pub down: DVec3,
     /// Unit vector of view.
     pub view: DVec3,
+    /// Whether the means of 4 by 4 tiles are observables too.
+    pub has_tiles: bool,
 }
 
 /// A perspective sensor: the screen's pixel vectors are taken at unit distance from the pinhole.
@@ -110,7 +112,7 @@ impl Acceptance {
     /// The pixel whose square the line of `out` crosses, if the cap holds its reversed direction.
     #[inline]
     fn pixel(&self, out: &Ray) -> Option<usize> {
-        let Screen { width, height, origin, right, down, view } = self.screen;
+        let Screen { width, height, origin, right, down, view, .. } = self.screen;
         let cos = -out.dir.dot(view);
         let across = out.dir + cos * view;
         if cos <= 0.0 || across.length_squared() >= self.sin2 {
@@ -343,8 +345,11 @@ impl Sensor {
     pub fn regions(&self) -> Vec<Region> {
         let named = |name: String, split: bool| Region { name, split };
         match self {
-            Sensor::Orthographic(_) | Sensor::Perspective(_) | Sensor::Accepting(_) => {
-                let tiles = (0..TILES * TILES).map(|k| format!("tile_{}_{}", k / TILES, k % TILES));
+            Sensor::Orthographic(screen)
+            | Sensor::Perspective(screen)
+            | Sensor::Accepting(Acceptance { screen, .. }) => {
+                let count = if screen.has_tiles { TILES * TILES } else { 0 };
+                let tiles = (0..count).map(|k| format!("tile_{}_{}", k / TILES, k % TILES));
                 std::iter::once(named("mean".into(), true))
                     .chain(tiles.map(|name| named(name, false)))
                     .collect()
@@ -373,8 +378,12 @@ impl Sensor {
             Sensor::Orthographic(screen)
             | Sensor::Perspective(screen)
             | Sensor::Accepting(Acceptance { screen, .. }) => {
+                let mean = (0, 1.0 / (screen.width * screen.height) as f64);
+                if !screen.has_tiles {
+                    return [mean, (0, 0.0)];
+                }
                 let (tile, pixels) = screen.tile(slot);
-                [(0, 1.0 / (screen.width * screen.height) as f64), (1 + tile, 1.0 / pixels as f64)]
+                [mean, (1 + tile, 1.0 / pixels as f64)]
             }
             Sensor::Probe { .. } | Sensor::Vertex { .. } => [(0, 1.0), (0, 0.0)],
             Sensor::FaceFlux { .. } | Sensor::BodyFlux { .. } => [(slot, 1.0), (slot, 0.0)],
@@ -422,7 +431,18 @@ mod tests {
             right: DVec3::X * 0.1,
             down: -DVec3::Y * 0.1,
             view: -DVec3::Z,
+            has_tiles: true,
         }
+    }
+
+    /// Without tiles an image has one region, and every pixel counts in it alone.
+    #[test]
+    fn tiles_can_be_left_out() {
+        let with = Sensor::Orthographic(screen(7, 5));
+        let without = Sensor::Orthographic(Screen { has_tiles: false, ..screen(7, 5) });
+        assert_eq!((with.regions().len(), without.regions().len()), (17, 1));
+        assert_eq!(with.regions_of(9)[0], without.regions_of(9)[0]);
+        assert_eq!(without.regions_of(9)[1].1, 0.0);
     }
 
     /// Every pixel lies in one tile, and a tile's factor is one over its pixels.
@@ -488,6 +508,7 @@ mod tests {
             right: 0.2 * right,
             down: 0.2 * view.cross(right),
             view,
+            has_tiles: true,
         };
         let bounds = BoundingSphere { center: DVec3::new(0.0, 0.5, 0.0), radius: 1.5 };
         Sensor::Accepting(Acceptance::new(screen, height, bounds))

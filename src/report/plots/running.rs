@@ -2,12 +2,11 @@
 //! value that a claim expects. An interval that is valid covers the expected value, now and later, in 19 of 20
 //! estimators; one whose scores have too heavy a tail sits beside it, and is narrow.
 
-use super::document::{Block, FigureBlock, Picture};
-use super::plot::{Axis, Plot, Point, Series};
-use crate::error::Result;
+use super::{Content, Drawn, Section};
+use crate::report::plot::{Axis, Plot, Point, Series, Size};
 use crate::results::pictures::{Running, Wanted};
 use crate::results::record::{Against, Cell, EstimatorRun, Observable, Quantity};
-use crate::results::store::{RecordFolder, Stored};
+use crate::results::store::Stored;
 use crate::stats::moments::Moments;
 use crate::stats::tails::critical_value;
 use crate::stats::tree::Merge;
@@ -15,50 +14,29 @@ use crate::stats::tree::Merge;
 /// Confidence of the bands.
 const CONFIDENCE: f64 = 0.95;
 
-/// The plots of this kind.
-pub(super) fn wanted(all: &[Wanted]) -> Vec<Running> {
-    let running = |wanted: &Wanted| match wanted {
-        Wanted::Running(running) => Some(running.clone()),
+/// A plot for each cell and each wish.
+pub(super) fn section(stored: &Stored, wanted: &[Wanted]) -> Section {
+    let running = wanted.iter().filter_map(|wanted| match wanted {
+        Wanted::Running(running) => Some(running),
         Wanted::Split(_) => None,
-    };
-    all.iter().filter_map(running).collect()
-}
-
-/// Draws every plot that is asked for into `images/`.
-pub(super) fn write_running(
-    folder: &RecordFolder,
-    stored: &Stored,
-    wanted: &[Running],
-) -> Result<Vec<FigureBlock>> {
-    let mut figures = Vec::new();
-    for (number, running) in wanted.iter().enumerate() {
+    });
+    let mut drawn = Vec::new();
+    for (number, running) in running.enumerate() {
         for (index, cell) in stored.record.cells.iter().enumerate() {
             let Some((plot, title)) = plot(stored, index, cell, running) else { continue };
-            let svg = plot.to_svg();
-            let path = format!("images/running-{}-{index:03}.svg", number + 1);
-            folder.write_view(&path, svg.as_bytes())?;
-            figures.push(FigureBlock {
-                path,
-                picture: Picture::Svg(svg),
+            drawn.push(Drawn {
+                name: format!("running-{}-{index:03}", number + 1),
                 title,
                 caption: CAPTION.into(),
+                content: Content::Plots(vec![plot]),
             });
         }
     }
-    Ok(figures)
+    Section { heading: "Means as passes add up".into(), text: String::new(), drawn, are_small: false }
 }
 
 const CAPTION: &str = "Mean over the first passes with the 95 % interval from their own variance; dashed: the value that is \
                        expected.";
-
-/// What the page says of them.
-pub(super) fn blocks(figures: &[FigureBlock]) -> Vec<Block> {
-    if figures.is_empty() {
-        return Vec::new();
-    }
-    let heading = Block::Heading(2, "Means as passes add up".into());
-    [heading].into_iter().chain(figures.iter().cloned().map(Block::Wide)).collect()
-}
 
 fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option<(Plot, String)> {
     let band = stored.record.bands.iter().position(|band| band.name == running.band)?;
@@ -76,7 +54,7 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
             let estimator = run.estimator.clone();
             let quantity = Quantity { cell: index, estimator, observable: observable.clone(), band };
             let points = means(&stored.batches(&quantity)?);
-            Some(Series { name: run.estimator.clone(), points })
+            Some(Series { name: run.estimator.clone(), points, ..Series::default() })
         })
         .collect();
     let expected = stored.record.comparisons.iter().find_map(|comparison| {
@@ -97,10 +75,11 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
         .collect::<Vec<_>>()
         .join(", ");
     let plot = Plot {
-        x: Axis { label: "passes".into(), is_log: true, range: None },
-        y: Axis { label: "mean".into(), is_log: false, range },
+        x: Axis::log("passes"),
+        y: Axis { range, ..Axis::linear("mean") },
         series,
         levels,
+        size: Size::Wide,
     };
     Some((plot, title))
 }
@@ -115,12 +94,7 @@ fn means(batches: &[Moments]) -> Vec<Point> {
             continue;
         }
         let reach = critical_value(1.0 - CONFIDENCE, all.n as f64 - 1.0) * all.std_error();
-        points.push(Point {
-            x: all.n as f64,
-            y: all.mean,
-            low: all.mean - reach,
-            high: all.mean + reach,
-        });
+        points.push(Point::new(all.n as f64, all.mean, [all.mean - reach, all.mean + reach]));
     }
     points
 }

@@ -1,0 +1,190 @@
+//! Tables for papers: LaTeX with booktabs, and longtable where a page may not hold them.
+
+use super::document::{Block, Document, FigureBlock, Picture};
+use super::table::Table;
+
+const PREAMBLE: &str = "% pdflatex report.tex, in the folder of its pictures. Plots are SVG: plots/ has them.\n\
+                        \\documentclass[a4paper]{article}\n\\usepackage[utf8]{inputenc}\n\\usepackage[T1]{fontenc}\n\
+                        \\usepackage[margin=2cm]{geometry}\n\\usepackage{booktabs,longtable,graphicx}\n\\begin{document}\n";
+
+/// The page as a LaTeX document.
+pub fn to_document(page: &Document) -> String {
+    let body: String = page.blocks.iter().map(block).collect();
+    format!(
+        "{PREAMBLE}\\title{{{}}}\n\\date{{}}\n\\maketitle\n{body}\\end{{document}}\n",
+        escaped(&page.title)
+    )
+}
+
+fn block(of: &Block) -> String {
+    match of {
+        Block::Heading(2, text) => format!("\n\\section*{{{}}}\n", escaped(text)),
+        Block::Heading(_, text) => format!("\n\\subsection*{{{}}}\n", escaped(text)),
+        Block::Text(text) => format!("{}\n\n", escaped(text)),
+        Block::List(items) => {
+            let items: String =
+                items.iter().map(|item| format!("  \\item {}\n", escaped(item))).collect();
+            format!("\\begin{{itemize}}\n{items}\\end{{itemize}}\n")
+        }
+        Block::Code(code) => format!("\\begin{{verbatim}}\n{code}\n\\end{{verbatim}}\n"),
+        Block::Table(t) => format!("{{\\small\n{}}}\n", to_latex(&t.table, &t.name, &t.caption)),
+        Block::Figures(figures) => figures.iter().map(figure).collect(),
+        Block::Wide(f) => figure(f),
+        Block::Viewer(viewer) => viewer.figures.iter().map(figure).collect(),
+        Block::Folded(title, blocks) => {
+            let blocks: String = blocks.iter().map(block).collect();
+            format!("\\paragraph{{{}}}\n{blocks}", escaped(title))
+        }
+    }
+}
+
+fn figure(f: &FigureBlock) -> String {
+    let words = format!("{}: {}", escaped(&f.title), escaped(&f.caption));
+    match f.picture {
+        Picture::Png(_) => {
+            format!(
+                "\\begin{{figure}}\n\\centering\n\\includegraphics[width=.5\\linewidth]{{{}}}\n\\caption{{{words}}}\n\\end{{figure}}\n",
+                f.path
+            )
+        }
+        Picture::Svg(_) => String::new(),
+    }
+}
+
+/// Most rows of a table that floats.
+const FLOATS: usize = 40;
+
+/// A table with its caption. Needs `\usepackage{booktabs}`, and `\usepackage{longtable}` where there are more than
+/// 40 rows.
+pub fn to_latex(table: &Table, name: &str, caption: &str) -> String {
+    if table.header.is_empty() {
+        return String::new();
+    }
+    let columns: String =
+        (0..table.header.len()).map(|column| if table.is_numeric(column) { 'r' } else { 'l' }).collect();
+    let row = |fields: &Vec<String>| {
+        let fields: Vec<String> = fields.iter().map(|f| escaped(f)).collect();
+        format!("  {} \\\\\n", fields.join(" & "))
+    };
+    let header = format!("  \\toprule\n{}  \\midrule\n", row(&table.header));
+    let rows: String = table.rows.iter().map(row).collect();
+    let label = format!("\\label{{tab:{name}}}");
+    let caption = escaped(caption);
+    if table.rows.len() > FLOATS {
+        return format!(
+            "\\begin{{longtable}}{{{columns}}}\n  \\caption{{{caption}}}{label} \\\\\n{header}  \\endhead\n{rows}  \
+             \\bottomrule\n\\end{{longtable}}\n"
+        );
+    }
+    format!(
+        "\\begin{{table}}\n\\centering\n\\caption{{{caption}}}{label}\n\\begin{{tabular}}{{{columns}}}\n{header}{rows}  \
+         \\bottomrule\n\\end{{tabular}}\n\\end{{table}}\n"
+    )
+}
+
+/// Text as LaTeX prints it; numbers with an exponent or a sign as mathematics.
+pub fn escaped(text: &str) -> String {
+    let mut latex = String::new();
+    let mut rest = text;
+    let mut before = ' ';
+    while let Some(first) = rest.chars().next() {
+        let is_word = before.is_alphanumeric() || "_-.".contains(before);
+        if let Some(length) = (!is_word).then(|| number_length(rest)).flatten() {
+            latex += &number(&rest[..length]);
+            before = '0';
+            rest = &rest[length..];
+            continue;
+        }
+        match first {
+            '&' | '%' | '$' | '#' | '_' | '{' | '}' => latex.extend(['\\', first]),
+            '\\' => latex += "\\textbackslash{}",
+            '~' => latex += "\\textasciitilde{}",
+            '^' => latex += "\\textasciicircum{}",
+            '<' | '>' | '|' => latex.extend(['$', first, '$']),
+            '±' => latex += "$\\pm$",
+            '×' => latex += "$\\times$",
+            '\n' => latex.push(' '),
+            other => latex.push(other),
+        }
+        before = first;
+        rest = &rest[first.len_utf8()..];
+    }
+    latex
+}
+
+/// The length of `-1.5(2)e-7` at the start of a text, where there is one that needs setting.
+fn number_length(text: &str) -> Option<usize> {
+    let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
+    let sign = usize::from(text.starts_with(['-', '+']));
+    let mut at = sign + digits(sign);
+    if at == sign {
+        return None;
+    }
+    if text[at..].starts_with('.') && digits(at + 1) > 0 {
+        at += 1 + digits(at + 1);
+    }
+    if text[at..].starts_with('(')
+        && digits(at + 1) > 0
+        && text[at + 1 + digits(at + 1)..].starts_with(')')
+    {
+        at += digits(at + 1) + 2;
+    }
+    let mut has_exponent = false;
+    if text[at..].starts_with('e') {
+        let from = at + 1 + usize::from(text[at + 1..].starts_with(['-', '+']));
+        has_exponent = digits(from) > 0;
+        at = if has_exponent { from + digits(from) } else { at };
+    }
+    let ends = !text[at..].starts_with(|c: char| c.is_alphanumeric());
+    (ends && (sign > 0 || has_exponent)).then_some(at)
+}
+
+fn number(text: &str) -> String {
+    match text.split_once('e') {
+        Some((mantissa, exponent)) => {
+            let exponent = exponent.trim_start_matches('+');
+            format!("${mantissa}\\times10^{{{exponent}}}$")
+        }
+        None => format!("${text}$"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_are_set_as_they_are_meant() {
+        for (text, latex) in [
+            ("1.234(5)", "1.234(5)"),
+            ("1.23(3)e3", "$1.23(3)\\times10^{3}$"),
+            ("-0.5(2)", "$-0.5(2)$"),
+            ("+1.7 [+1.4, -2.0] %", "$+1.7$ [$+1.4$, $-2.0$] \\%"),
+            ("1e-6", "$1\\times10^{-6}$"),
+            ("rough-0.2, b_1", "rough-0.2, b\\_1"),
+            ("a & b < c\\d", "a \\& b $<$ c\\textbackslash{}d"),
+            ("400-420nm", "400-420nm"),
+            ("0.25 ± 0", "0.25 $\\pm$ 0"),
+            ("e3 3e 2x", "e3 3e 2x"),
+        ] {
+            assert_eq!(escaped(text), latex, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_table_that_floats_and_one_that_does_not() {
+        let mut table = Table::new(&["cell", "ratio"]);
+        table.push(vec!["a_b".into(), "21.4 [20.1, 22.8]".into()]);
+        let latex = "\\begin{table}\n\\centering\n\\caption{How fast.}\\label{tab:x}\n\\begin{tabular}{lr}\n  \\toprule\n  \
+                     cell & ratio \\\\\n  \\midrule\n  a\\_b & 21.4 [20.1, 22.8] \\\\\n  \\bottomrule\n\\end{tabular}\n\\end{table}\n";
+        assert_eq!(to_latex(&table, "x", "How fast."), latex);
+        (0..40).for_each(|i| table.push(vec![i.to_string(), "1".into()]));
+        let long = to_latex(&table, "x", "How fast.");
+        assert!(
+            long.starts_with("\\begin{longtable}{lr}")
+                && long.contains("\\endhead")
+                && !long.contains("{table}")
+        );
+        assert_eq!(to_latex(&Table::default(), "x", ""), "");
+    }
+}

@@ -1,0 +1,80 @@
+//! Chi-square in pictures: what was drawn from a sampler, what its density expects, and by how much they differ.
+
+use super::{Content, Drawn, Section};
+use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
+use crate::results::sampler::SamplerRun;
+use crate::results::store::Stored;
+
+/// A picture a sampler.
+pub(super) fn section(stored: &Stored) -> Section {
+    let runs = stored.record.samplers.iter().enumerate();
+    Section {
+        heading: "Observed, expected, residual".into(),
+        text: "Coarse cells in the order of their partition, discrete outcomes last. Above: draws counted (points) and expected \
+               (line), per draw. Below: (observed - expected) / sqrt(expected), near normal where the sampler draws from \
+               its density; the chi-square statistic is the sum of their squares."
+            .into(),
+        drawn: runs.filter_map(|(index, run)| of_sampler(stored, index, run)).collect(),
+        are_small: true,
+    }
+}
+
+fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> {
+    let cells = stored.cells(&run.coarse)?;
+    let samples = run.samples as f64;
+    let expected = |mass: f64| mass * samples;
+    let places =
+        || cells.observed.iter().zip(cells.mass).enumerate().map(|(i, (o, m))| (i as f64, *o, *m));
+    let share = |(x, observed, _): (f64, f64, f64)| Point::bare(x, observed / samples);
+    let mass = |(x, _, mass): (f64, f64, f64)| Point::bare(x, mass);
+    let possible = || places().filter(|(_, _, mass)| *mass > 0.0);
+    let residual = |(x, observed, mass): (f64, f64, f64)| {
+        Point::bare(x, (observed - expected(mass)) / expected(mass).sqrt())
+    };
+    let residuals: Vec<Point> = possible().map(residual).collect();
+    let largest = residuals.iter().map(|p| p.y.abs()).fold(0.0, f64::max);
+    let impossible: f64 =
+        places().filter(|(_, _, mass)| *mass <= 0.0).map(|(_, observed, _)| observed).sum();
+    let last = cells.observed.len() as f64 - 0.5;
+    let x = |label: &str| Axis { range: Some([-0.5, last]), ..Axis::linear(label) };
+    let above = Plot {
+        x: x(""),
+        y: Axis::linear("share"),
+        series: vec![
+            Series { name: "expected".into(), points: places().map(mass).collect(), style: Style::Line },
+            Series {
+                name: "observed".into(),
+                points: places().map(share).collect(),
+                style: Style::Marks,
+            },
+        ],
+        size: Size::Small,
+        ..Plot::default()
+    };
+    let below = Plot {
+        x: x("cell"),
+        y: Axis::linear("residual"),
+        series: vec![
+            Series {
+                name: String::new(),
+                points: vec![Point::bare(-0.5, 0.0), Point::bare(last, 0.0)],
+                style: Style::Guide,
+            },
+            // As long a name as above, so that the cells stand below each other.
+            Series { name: "residual".into(), points: residuals, style: Style::Bars },
+        ],
+        size: Size::Flat,
+        ..Plot::default()
+    };
+    let mut caption =
+        format!("{} draws, {} cells; largest residual {largest:.2}.", run.samples, cells.observed.len());
+    if impossible > 0.0 {
+        caption += &format!(" {impossible} draws in cells without mass.");
+    }
+    Some(Drawn {
+        name: format!("goodness-{index:03}"),
+        title: run.sampler.clone(),
+        caption,
+        content: Content::Plots(vec![above, below]),
+    })
+}

@@ -1,0 +1,85 @@
+//! Exitance by distance from where the light came in: the rings of a sensor.
+
+use super::{Content, Drawn, Section, band_name, joined, runs, shown_bands};
+use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
+use crate::results::record::{Cell, EstimatorRun, Observable, Quantity};
+use crate::results::store::Stored;
+use crate::stats::hypothesis::Estimate;
+use crate::stats::tails::critical_value;
+
+/// A plot for each cell and band, where the sensor has rings.
+pub(super) fn section(stored: &Stored) -> Section {
+    let edges: Vec<f64> = stored.record.resolved["sensor"]["rings"]["edges_mm"]
+        .as_array()
+        .map(|edges| edges.iter().filter_map(|edge| edge.as_f64()).collect())
+        .unwrap_or_default();
+    let cells = stored.record.cells.iter().enumerate();
+    let bands = shown_bands(stored);
+    let of_cell = |(index, cell): (usize, &Cell)| {
+        let plots = bands.iter().map(|band| of_band(stored, (index, cell), *band, &edges));
+        plots.collect::<Vec<_>>()
+    };
+    Section {
+        heading: "Radial profiles".into(),
+        text: "Exitance by distance from the point where the light came in: the mean of each ring, at the ring's middle, \
+               with its 95 % interval."
+            .into(),
+        drawn: match edges.len() {
+            0 | 1 => Vec::new(),
+            _ => cells.flat_map(of_cell).collect(),
+        },
+        are_small: true,
+    }
+}
+
+fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &[f64]) -> Drawn {
+    let line = |run: &EstimatorRun| {
+        let point = |ring: usize| {
+            let observable = Observable { name: format!("ring_{ring}"), class: "all".into() };
+            let quantity = Quantity { cell: index, estimator: run.estimator.clone(), observable, band };
+            let mean = Estimate::of_batches(&stored.batches(&quantity)?);
+            let reach = critical_value(0.05, mean.dof) * mean.std_error;
+            let middle = 0.5 * (edges[ring] + edges[ring + 1]);
+            Some(Point::new(middle, mean.value, [mean.value - reach, mean.value + reach]))
+        };
+        let points: Vec<Point> = (0..edges.len() - 1).filter_map(point).filter(|p| p.y > 0.0).collect();
+        Series { name: run.estimator.clone(), points, style: Style::Line }
+    };
+    let plot = Plot {
+        x: Axis::log("distance / mm"),
+        y: Axis::log("exitance"),
+        series: runs(cell).map(line).collect(),
+        size: Size::Small,
+        ..Plot::default()
+    };
+    Drawn {
+        name: format!("profile-{index:03}-{}", band + 1),
+        title: joined(&[&cell.label, band_name(stored, band)]),
+        caption: "A ring whose mean is 0 has no point.".into(),
+        content: Content::Plots(vec![plot]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::sample;
+
+    #[test]
+    fn rings_make_a_profile() {
+        let mut stored = sample::stored(0.1);
+        assert!(section(&stored).drawn.is_empty());
+        stored.record.resolved["sensor"] = serde_json::json!({"rings": {"edges_mm": [0.0, 1.0, 3.0]}});
+        for run in &mut stored.record.cells[0].runs {
+            for (ring, observable) in run.observables.iter_mut().enumerate() {
+                *observable = Observable { name: format!("ring_{ring}"), class: "all".into() };
+            }
+        }
+        let section = section(&stored);
+        assert_eq!(section.drawn.len(), 2, "a plot a band");
+        let Content::Plots(plots) = &section.drawn[0].content else { panic!("plots") };
+        let points = &plots[0].series[0].points;
+        assert_eq!(points.iter().map(|p| p.x).collect::<Vec<_>>(), [0.5, 2.0]);
+        assert!(points.iter().all(|p| p.low < p.y && p.y < p.high && (p.y - 1.0).abs() < 0.1));
+    }
+}

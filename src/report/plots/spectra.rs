@@ -1,0 +1,132 @@
+//! Means by wavelength, and the colour that they give.
+
+use super::{Content, Drawn, Section, runs};
+use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
+use crate::results::image::{gain, shown_bytes};
+use crate::results::record::{Cell, EstimatorRun};
+use crate::results::store::Stored;
+use crate::stats::hypothesis::Estimate;
+use crate::stats::tails::critical_value;
+
+/// Fewest bands that make a spectrum.
+const FEWEST: usize = 4;
+
+/// A plot and a colour for each cell, where the bands have wavelengths.
+pub(super) fn section(stored: &Stored) -> Section {
+    let bands = &stored.record.bands;
+    let is_spectrum = bands.len() >= FEWEST && bands.iter().all(|band| band.range_nm.is_some());
+    let cells = stored.record.cells.iter().enumerate();
+    Section {
+        heading: "Spectra".into(),
+        text: "Mean of the sensor's first observable by band, with 95 % intervals, and the colour that it gives: the sum over \
+               the bands of mean times display colour (CIE 1931, linear sRGB), shown at the exposure of the pictures."
+            .into(),
+        drawn: match is_spectrum {
+            true => cells.flat_map(|(index, cell)| of_cell(stored, index, cell)).collect(),
+            false => Vec::new(),
+        },
+        are_small: true,
+    }
+}
+
+fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [Drawn; 2] {
+    let means = |run: &EstimatorRun| -> Vec<Estimate> {
+        let bands = 0..stored.record.bands.len();
+        bands.filter_map(|band| Some(Estimate::of_batches(&stored.gate(run, 0, band)?))).collect()
+    };
+    let runs: Vec<(&EstimatorRun, Vec<Estimate>)> = runs(cell).map(|run| (run, means(run))).collect();
+    let line = |(run, means): &(&EstimatorRun, Vec<Estimate>)| {
+        let points = means.iter().zip(&stored.record.bands).map(|(mean, band)| {
+            let [from, to] = band.range_nm.unwrap_or_default();
+            let reach = critical_value(0.05, mean.dof) * mean.std_error;
+            Point::new(0.5 * (from + to), mean.value, [mean.value - reach, mean.value + reach])
+        });
+        Series { name: run.estimator.clone(), points: points.collect(), style: Style::Line }
+    };
+    let plot = Plot {
+        x: Axis::linear("wavelength / nm"),
+        y: Axis::linear("mean"),
+        series: runs.iter().map(line).collect(),
+        size: Size::Small,
+        ..Plot::default()
+    };
+    let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
+    let colours: Vec<(String, [f64; 3])> =
+        runs.iter().map(|(run, means)| (run.estimator.clone(), colour(stored, means))).collect();
+    let rgb = |(name, rgb): &(String, [f64; 3])| {
+        let [r, g, b] = rgb.map(|c| format!("{c:.4}"));
+        format!("{name}: linear sRGB {r}, {g}, {b}.")
+    };
+    let caption = colours.iter().map(rgb).collect::<Vec<_>>().join(" ");
+    let swatches =
+        colours.into_iter().map(|(name, rgb)| (name, shown_bytes(rgb, gain(stops)))).collect();
+    [
+        Drawn {
+            name: format!("spectrum-{index:03}"),
+            title: cell.label.clone(),
+            caption: "Bands at their middle.".into(),
+            content: Content::Plots(vec![plot]),
+        },
+        Drawn {
+            name: format!("colour-{index:03}"),
+            title: cell.label.clone(),
+            caption: format!("{caption} Exposure {stops:+} stops."),
+            content: Content::Swatches(swatches),
+        },
+    ]
+}
+
+/// Linear sRGB of a spectrum of means.
+fn colour(stored: &Stored, means: &[Estimate]) -> [f64; 3] {
+    let bands = means.iter().zip(&stored.record.bands);
+    bands
+        .fold([0.0; 3], |rgb, (mean, band)| [0, 1, 2].map(|c| rgb[c] + mean.value * band.display_rgb[c]))
+}
+
+/// Colours with their names.
+pub(super) fn swatches(colours: &[(String, [u8; 3])]) -> String {
+    let height = 12.0 + 44.0 * colours.len() as f64;
+    let row = |(place, (name, [r, g, b])): (usize, &(String, [u8; 3]))| {
+        let top = 12.0 + 44.0 * place as f64;
+        let name = name.replace('&', "&amp;").replace('<', "&lt;");
+        format!(
+            "<rect x=\"12\" y=\"{top}\" width=\"120\" height=\"36\" rx=\"4\" fill=\"rgb({r},{g},{b})\" stroke=\"currentColor\" \
+             stroke-opacity=\"0.3\"/><text x=\"146\" y=\"{}\" fill=\"currentColor\">{name}, rgb({r}, {g}, {b})</text>\n",
+            top + 22.0
+        )
+    };
+    let rows: String = colours.iter().enumerate().map(row).collect();
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 480 {height}\" role=\"img\" font-family=\"system-ui, \
+         sans-serif\" font-size=\"12\" style=\"color: var(--ink, #1d2433)\">\n{rows}</svg>\n"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::record::Band;
+    use crate::results::sample;
+
+    #[test]
+    fn a_spectrum_needs_wavelengths() {
+        let mut stored = sample::stored(0.1);
+        assert!(section(&stored).drawn.is_empty());
+        let band = |k: usize| Band {
+            name: format!("b{k}"),
+            range_nm: Some([400.0 + 50.0 * k as f64, 450.0 + 50.0 * k as f64]),
+            display_rgb: [0.1, 0.2, 0.3],
+        };
+        stored.record.bands = (0..4).map(band).collect();
+        // The arrays of the sample have two bands: the others have no mean and no point.
+        let section = section(&stored);
+        assert_eq!(section.drawn.len(), 2);
+        let Content::Plots(plots) = &section.drawn[0].content else { panic!("plots") };
+        assert_eq!(plots[0].series[0].points.iter().map(|p| p.x).collect::<Vec<_>>(), [425.0, 475.0]);
+        let Content::Swatches(colours) = &section.drawn[1].content else { panic!("colours") };
+        // Means near 1 in two bands: linear 0.2, 0.4, 0.6 are 124, 170, 203 in sRGB.
+        let off = |[r, g, b]: [u8; 3]| [r.abs_diff(124), g.abs_diff(170), b.abs_diff(203)];
+        assert!(off(colours[0].1).iter().all(|d| *d <= 1), "{colours:?}");
+        assert!(swatches(colours).contains("rgb("));
+    }
+}

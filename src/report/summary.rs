@@ -1,0 +1,187 @@
+//! The tables that a text quotes: a row for each cell and band, a column for each estimator.
+
+use super::document::TableBlock;
+use super::number::significant;
+use super::table::Table;
+use crate::results::record::{Cell, CostMeasure, Observable, PIXELS};
+use crate::results::store::Stored;
+use crate::verify::comparisons::Row;
+use crate::verify::model_errors::ModelError;
+
+/// The rows by one measure of cost that stand for a pair of estimators: all classes together, and pixels rather than
+/// their mean. Second arms of one estimator are left out.
+pub fn chosen<'a>(stored: &Stored, rows: &'a [Row], cost: CostMeasure) -> Vec<&'a Row> {
+    let is_control = |row: &Row| {
+        let cell = stored.record.cells.iter().find(|cell| cell.label == row.cell);
+        let run = cell.and_then(|cell| cell.runs.iter().find(|run| run.estimator == row.candidate));
+        run.is_some_and(|run| run.control_of.is_some())
+    };
+    let has_pixels = rows.iter().any(|row| row.metric == PIXELS);
+    let is_chosen = |row: &&Row| {
+        row.cost == cost
+            && row.class == "all"
+            && (!has_pixels || row.metric == PIXELS)
+            && !is_control(row)
+    };
+    rows.iter().filter(is_chosen).collect()
+}
+
+/// What the variance is of.
+pub fn metric_words(row: &Row) -> String {
+    if row.metric == PIXELS {
+        "a pixel, averaged over the image".into()
+    } else {
+        format!("`{}`", row.metric)
+    }
+}
+
+/// Efficiencies by one measure of cost; nothing where there is no ratio.
+pub fn efficiency(stored: &Stored, rows: &[Row], cost: CostMeasure) -> Option<TableBlock> {
+    let rows = chosen(stored, rows, cost);
+    let quoted = rows.iter().find(|row| row.efficiency_ratio.is_finite())?;
+    let name = |row: &Row| format!("{} / {}", row.candidate, row.baseline);
+    let entries = rows.iter().map(|row| Entry {
+        row: [&row.cell, &row.band].map(String::from),
+        column: name(row),
+        text: ratio(row),
+    });
+    let table = pivot(stored, &["band"], entries.collect());
+    let what = metric_words(quoted);
+    let cost = match cost {
+        CostMeasure::Counters => "counted work, the same on every machine",
+        CostMeasure::Cpu
+            if rows.iter().all(|row| row.side_by_side || !row.efficiency_ratio.is_finite()) =>
+        {
+            "CPU time of this machine, timed side by side"
+        }
+        CostMeasure::Cpu => "CPU time of this machine, timed one after the other",
+    };
+    let mut caption = format!(
+        "Efficiency: variance of {what} times cost ({cost}), of the estimator behind the stroke over the one before it; above \
+         1 the one before it is the better. In brackets the 95 % interval."
+    );
+    if rows.iter().any(|row| row.efficiency_ratio.is_finite() && !row.resolved) {
+        caption += " An asterisk: not resolved, more passes may move the ratio out of its interval.";
+    }
+    if rows.iter().any(|row| row.efficiency_ratio.is_nan()) {
+        caption += " \"none\": no ratio, for the reason that comparisons.csv gives.";
+    }
+    let file = if quoted.cost == CostMeasure::Cpu { "efficiency" } else { "efficiency-counters" };
+    Some(TableBlock::new(file, caption, table))
+}
+
+fn ratio(row: &Row) -> String {
+    if row.efficiency_ratio.is_nan() {
+        return "none".into();
+    }
+    let number = |x: f64| significant(x, 3);
+    let star = if row.resolved { "" } else { "*" };
+    let [low, high] = [row.ci_low, row.ci_high].map(number);
+    format!("{}{star} [{low}, {high}]", number(row.efficiency_ratio))
+}
+
+/// Model errors of all classes together; nothing where there are no models.
+pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> {
+    let rows: Vec<&ModelError> = rows.iter().filter(|row| row.observable.class == "all").collect();
+    let truth = &rows.first()?.truth;
+    let entry = |row: &&ModelError| {
+        let (low, high) = row.interval();
+        let percent = |x: f64| format!("{:+.1}", 100.0 * x);
+        let star = if row.note.is_empty() { "" } else { "*" };
+        Entry {
+            row: [row.cell.clone(), format!("{}\n{}", row.band, named(&row.observable))],
+            column: row.estimator.clone(),
+            text: format!("{}{star} [{}, {}]", percent(row.relative.value), percent(low), percent(high)),
+        }
+    };
+    let table = pivot(stored, &["band", "observable"], rows.iter().map(entry).collect());
+    let mut caption = format!(
+        "What the mean of each model is off by, per cent of that of `{truth}`, which is light transport itself. In brackets \
+         the 95 % interval."
+    );
+    if rows.iter().any(|row| !row.note.is_empty()) {
+        caption += " An asterisk: the interval is not to be trusted, for the reason that model_errors.csv gives.";
+    }
+    Some(TableBlock::new("model-error", caption, table))
+}
+
+fn named(observable: &Observable) -> &str {
+    &observable.name
+}
+
+/// A field of a table: the label of its cell and what else names its row, separated by line breaks; its column; its text.
+struct Entry {
+    row: [String; 2],
+    column: String,
+    text: String,
+}
+
+/// A row for each cell and name, a column for each axis of the sweep, each part of the names, and each column of the
+/// entries, in the order in which they come. Columns that say the same in every row are left out.
+fn pivot(stored: &Stored, parts: &[&str], entries: Vec<Entry>) -> Table {
+    let axes: Vec<&String> =
+        stored.record.cells.first().map(|cell| cell.axes.keys().collect()).unwrap_or_default();
+    let (mut rows, mut columns): (Vec<&[String; 2]>, Vec<&String>) = (Vec::new(), Vec::new());
+    for entry in &entries {
+        if !rows.contains(&&entry.row) {
+            rows.push(&entry.row);
+        }
+        if !columns.contains(&&entry.column) {
+            columns.push(&entry.column);
+        }
+    }
+    let header: Vec<&str> = axes.iter().chain(&columns).map(|name| name.as_str()).collect::<Vec<_>>();
+    let (axis_names, column_names) = header.split_at(axes.len());
+    let mut table = Table::new(&[axis_names, parts, column_names].concat());
+    for row in rows {
+        let cell: Option<&Cell> = stored.record.cells.iter().find(|cell| cell.label == row[0]);
+        let label =
+            |axis: &&String| cell.and_then(|cell| cell.axes.get(*axis)).cloned().unwrap_or_default();
+        let mut fields: Vec<String> = axes.iter().map(label).collect();
+        fields.extend(row[1].split('\n').map(String::from));
+        fields.extend(columns.iter().map(|column| {
+            let own = entries.iter().find(|entry| entry.row == *row && entry.column == **column);
+            own.map(|entry| entry.text.clone()).unwrap_or_default()
+        }));
+        table.push(fields);
+    }
+    for column in (0..axes.len() + parts.len()).rev() {
+        if table.rows.iter().all(|row| row[column] == table.rows[0][column]) {
+            table.remove_column(column);
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::sample;
+    use crate::verify::comparisons::comparisons;
+
+    #[test]
+    fn a_row_a_band_and_a_column_a_pair() {
+        let stored = sample::stored(0.1);
+        let rows = comparisons(&stored);
+        let block = efficiency(&stored, &rows, CostMeasure::Counters).expect("a table");
+        assert_eq!(block.name, "efficiency-counters");
+        assert_eq!(block.table.header, ["band", "snee / mis"], "one cell has no column");
+        assert_eq!(block.table.rows.iter().map(|row| &*row[0]).collect::<Vec<_>>(), ["R", "G"]);
+        assert!(block.table.rows[0][1].ends_with(']'), "{:?}", block.table.rows);
+        assert!(block.caption.contains("a pixel") && block.caption.contains("counted work"));
+        assert!(efficiency(&stored, &rows, CostMeasure::Cpu).is_none(), "no time was measured");
+    }
+
+    #[test]
+    fn no_ratio_is_said_to_be_none() {
+        let mut stored = sample::stored(0.1);
+        sample::set_gates(&mut stored, "snee", |i, _, band| {
+            let off = if band == 0 { 0.3 } else { 0.0 };
+            1.0 + off + 0.05 * sample::uniform(i + 7000)
+        });
+        let rows = comparisons(&stored);
+        let block = efficiency(&stored, &rows, CostMeasure::Counters).expect("a table");
+        assert_eq!(block.table.rows[0][1], "none");
+        assert!(block.caption.contains("\"none\""));
+    }
+}
