@@ -8,16 +8,19 @@ use crate::report::number::significant;
 use crate::report::table::Table;
 use crate::report::tables::verdict_table;
 use crate::results::store::RecordFolder;
+use crate::verify::comparisons::Row;
 use crate::verify::difference::{Compared, Terms, Work, compare};
 use crate::verify::judge::FAMILY_LEVEL;
 use crate::verify::junit;
+use crate::verify::timing_ratios::{self, TimingRatio, timing_ratios};
 use crate::verify::verdict::Verdict;
 
 /// Compare two records of one experiment: what was changed, and whether a mean differs.
 ///
 /// Says what differs between the two experiments, then compares every observable that both records hold,
 /// per cell, estimator and band: `identical` where every bit is the same, else by a t test (paired pass
-/// by pass where both played the same random numbers), all of them as one family at --level.
+/// by pass where both played the same random numbers), all of them as one family at --level. Where both have
+/// efficiencies by CPU time it says whether these are compatible, which decides nothing: times are the machine's.
 ///
 /// Exit code 0: no mean differs. 1: a mean differs, or the work per pass grew by more than --max-slowdown.
 /// 2: bad usage. 3: nothing can be compared, or the first observable of an estimator cannot be judged.
@@ -54,8 +57,9 @@ pub struct Args {
 /// No record, a damaged one, nothing in common, I/O.
 pub fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
     let [before, after] = [&args.before, &args.after].map(|path| RecordFolder::new(path).read());
+    let (before, after) = (before?, after?);
     let terms = Terms { level: args.level, detect: args.detect, max_slowdown: args.max_slowdown };
-    let compared = compare(&before?, &after?, &terms).ok_or_else(|| {
+    let compared = compare(&before, &after, &terms).ok_or_else(|| {
         let words =
             "nothing can be compared: no cell, estimator, observable and band is in both records";
         Error::record(&args.after, words)
@@ -64,7 +68,13 @@ pub fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
         let xml = junit::to_junit(&compared.verdicts);
         crate::results::atomic::write(path, xml.as_bytes(), "write the JUnit file")?;
     }
-    tell(&compared, args, out).map_err(Error::io(&PathBuf::from("standard output"), "write"))?;
+    tell(&compared, args, out)
+        .and_then(|()| match before.record == after.record {
+            true => writeln!(out, "the records are byte-identical"),
+            false => writeln!(out, "the records are not byte-identical"),
+        })
+        .and_then(|()| tell_timing(&timing_ratios(&before, &after), out))
+        .map_err(Error::io(&PathBuf::from("standard output"), "write"))?;
     Ok(compared.exit_code())
 }
 
@@ -115,6 +125,48 @@ fn tell(compared: &Compared, args: &Args, out: &mut impl Write) -> std::io::Resu
         )?;
     }
     Ok(())
+}
+
+/// Whether efficiencies by CPU time came again; nothing where there are none.
+fn tell_timing(ratios: &[TimingRatio], out: &mut impl Write) -> std::io::Result<()> {
+    let size = |ratio: &&TimingRatio| ratio.change.max(1.0 / ratio.change);
+    let Some(largest) = ratios.iter().max_by(|a, b| size(a).total_cmp(&size(b))) else { return Ok(()) };
+    let others: Vec<&TimingRatio> = ratios.iter().filter(|ratio| !ratio.is_compatible()).collect();
+    let number = |x: f64| significant(x, 3);
+    let interval = |low: f64, high: f64| format!("[{}, {}]", number(low), number(high));
+    writeln!(
+        out,
+        "efficiency by CPU time: {} of {} ratios are compatible (Holm, family-wise level {:e}); the largest change is \
+         {} times {}",
+        ratios.len() - others.len(),
+        ratios.len(),
+        timing_ratios::LEVEL,
+        number(largest.change),
+        interval(largest.interval[0], largest.interval[1]),
+    )?;
+    if others.is_empty() {
+        return Ok(());
+    }
+    let header =
+        ["cell", "band", "class", "of", "candidate", "against", "before", "after", "adjusted p"];
+    let mut table = Table::new(&header);
+    for TimingRatio { before, after, adjusted_p, .. } in others {
+        let ratio = |row: &Row| {
+            format!("{} {}", number(row.efficiency_ratio), interval(row.ci_low, row.ci_high))
+        };
+        let names = [
+            &before.cell,
+            &before.band,
+            &before.class,
+            &before.metric,
+            &before.candidate,
+            &before.baseline,
+        ];
+        let mut row = names.map(String::clone).to_vec();
+        row.extend([ratio(before), ratio(after), significant(*adjusted_p, 2)]);
+        table.push(row);
+    }
+    writeln!(out, "{}", table.to_text())
 }
 
 /// The largest detectable of the runs' first observables.

@@ -20,6 +20,10 @@ pub struct Args {
     reading: Reading,
     #[command(flatten)]
     working: Working,
+    /// Play as many passes as the record in DIR/NAME has, instead of what the budget pays for: a record whose budget is in
+    /// seconds comes again bit for bit.
+    #[arg(long, value_name = "DIR")]
+    passes_of: Option<PathBuf>,
 }
 
 /// Runs the files one after the other.
@@ -28,7 +32,8 @@ pub struct Args {
 /// Bad input in any file (found before the first runs), I/O, interruption.
 pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     let interrupt = listen()?;
-    let options = args.working.options();
+    let mut options = args.working.options();
+    options.passes_of = args.passes_of.clone();
     let read = |file: &PathBuf| load_any(file, &args.reading.options(), registry);
     let experiments = args.files.iter().map(read).collect::<Result<Vec<_>>>()?;
     for experiment in &experiments {

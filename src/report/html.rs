@@ -47,10 +47,10 @@ fn block(of: &Block) -> String {
     match of {
         Block::Heading(2, text) => format!("<h2 id=\"{}\">{}</h2>\n", slug(text), escape(text)),
         Block::Heading(level, text) => format!("<h{level}>{}</h{level}>\n", escape(text)),
-        Block::Text(text) => format!("<p>{}</p>\n", escape(text)),
+        Block::Text(text) => format!("<p>{}</p>\n", inline(text)),
         Block::List(items) => {
             let items: String =
-                items.iter().map(|item| format!("<li>{}</li>\n", escape(item))).collect();
+                items.iter().map(|item| format!("<li>{}</li>\n", inline(item))).collect();
             format!("<ul>\n{items}</ul>\n")
         }
         Block::Code(code) => format!("<pre tabindex=\"0\">{}</pre>\n", escape(code)),
@@ -88,7 +88,7 @@ fn table(of: &TableBlock) -> String {
     };
     let caption = match caption.is_empty() {
         true => String::new(),
-        false => format!("<p class=\"caption\">{}</p>\n", escape(caption)),
+        false => format!("<p class=\"caption\">{}</p>\n", inline(caption)),
     };
     format!(
         "<section class=\"table\" id=\"table-{name}\">\n{caption}<div class=\"scroll\" tabindex=\"0\" role=\"region\" \
@@ -139,8 +139,18 @@ fn figure(f: &FigureBlock) -> String {
         }
         Picture::Svg(svg) => svg.clone(),
     };
-    let caption = escape(&f.caption);
+    let caption = inline(&f.caption);
     format!("<figure>{picture}<figcaption><b>{title}</b> {caption}</figcaption></figure>\n")
+}
+
+/// Text with its `code`.
+fn inline(text: &str) -> String {
+    let parts = text.split('`').enumerate();
+    let part = |(place, part): (usize, &str)| match place % 2 {
+        0 => escape(part),
+        _ => format!("<code>{}</code>", escape(part)),
+    };
+    parts.map(part).collect()
 }
 
 /// Text as HTML shows it, in elements and in attributes.

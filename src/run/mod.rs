@@ -51,13 +51,17 @@ pub struct Options {
     pub block_passes: Option<u64>,
     /// No progress bar.
     pub quiet: bool,
+    /// Folder that holds a results folder per experiment, whose records say how many passes are played; the budget does
+    /// without it. A budget in seconds gives another number of passes each time that it is measured anew: this is how
+    /// such a record comes again bit for bit.
+    pub passes_of: Option<PathBuf>,
 }
 
 impl Options {
     /// Into `out`, on all cores.
     pub fn new(out: impl Into<PathBuf>) -> Options {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Options { out: out.into(), threads, block_passes: None, quiet: false }
+        Options { out: out.into(), threads, block_passes: None, quiet: false, passes_of: None }
     }
 
     /// The folder of an experiment's results.
@@ -77,11 +81,32 @@ pub fn run(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<(RecordFolder, Stored)> {
-    let plan = plan(experiment, registry)?;
+    let mut plan = plan(experiment, registry)?;
+    if let Some(folder) = &options.passes_of {
+        take_passes(&mut plan, experiment, &RecordFolder::new(folder.join(&experiment.file.name)))?;
+    }
     let (folder, stored) =
         play(experiment, &plan, &options.folder(&experiment.file.name), options, interrupt)?;
     folder.write_pictures(&picture::wanted(&experiment.file.picture))?;
     Ok((folder, stored))
+}
+
+/// Has every measurement play as many passes as the record in `from` has of it.
+fn take_passes(plan: &mut Plan, experiment: &Experiment, from: &RecordFolder) -> Result<()> {
+    let record = from.read()?.record;
+    if record.experiment_hash != assemble::experiment_hash(experiment) {
+        let words = "the record there is of another experiment than the file";
+        let help = "`scatterproof compare` of the two results says what was changed; run without --passes-of to take the \
+                    passes from the budget";
+        return Err(Error::record(from.root(), format!("{words}; {help}")));
+    }
+    for job in &mut plan.jobs {
+        let mut runs = record.cells.get(job.cell).into_iter().flat_map(|cell| &cell.runs);
+        let run = runs.find(|run| run.estimator == job.name);
+        let missing = || Error::record(from.root(), format!("the record there holds no {}", job.label));
+        job.passes = Some(run.ok_or_else(missing)?.passes);
+    }
+    Ok(())
 }
 
 /// Runs an experiment of either sort.

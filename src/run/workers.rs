@@ -247,8 +247,9 @@ impl Pool<'_> {
         let origin = checkpoint::origin(&path, &job.identity);
         let budget = hash_json(&(self.budget, &job.targets));
         // A pilot that times itself would find another number each time.
-        let passes = match &origin {
-            Some(origin) if origin.budget == budget => origin.passes,
+        let passes = match (job.passes, &origin) {
+            (Some(passes), _) => passes,
+            (None, Some(origin)) if origin.budget == budget => origin.passes,
             _ => pilot::passes(job, self.budget, &|| self.settings.interrupt.raised())?,
         };
         // Where a state goes too far or too coarsely, its passes are played again; they were seen all the

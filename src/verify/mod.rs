@@ -21,6 +21,8 @@ pub mod comparisons;
 pub mod efficiency;
 /// What models are off by.
 pub mod model_errors;
+/// Efficiencies by CPU time, measured twice.
+pub mod timing_ratios;
 /// What counts of work cost.
 pub mod weights;
 

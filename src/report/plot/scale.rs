@@ -16,7 +16,7 @@ impl<'a> Scale<'a> {
         let usable = values.filter(|v| v.is_finite() && (!axis.is_log || *v > 0.0));
         let wide = usable.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
         let named = (!axis.names.is_empty()).then(|| [-0.5, axis.names.len() as f64 - 0.5]);
-        let mut range = axis.range.or(named).unwrap_or(wide);
+        let mut range = axis.range.or(named).unwrap_or_else(|| roomy(wide, axis.is_log));
         if !(range[0].is_finite() && range[1].is_finite()) {
             range = [0.1, 1.0];
         }
@@ -79,6 +79,19 @@ impl<'a> Scale<'a> {
         let first = (from / step).ceil() as i64;
         let last = (to / step).floor() as i64;
         (first..=last).map(|k| k as f64 * step).collect()
+    }
+}
+
+/// A little more than a range, so that what lies at its ends is seen whole.
+fn roomy([from, to]: [f64; 2], is_log: bool) -> [f64; 2] {
+    const ROOM: f64 = 0.04;
+    match is_log {
+        _ if !(from.is_finite() && to.is_finite() && from < to) => [from, to],
+        true => {
+            let factor = crate::math::pow(to / from, ROOM);
+            [from / factor, to * factor]
+        }
+        false => [from - ROOM * (to - from), to + ROOM * (to - from)],
     }
 }
 

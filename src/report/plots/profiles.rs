@@ -21,8 +21,8 @@ pub(super) fn section(stored: &Stored) -> Section {
     };
     Section {
         heading: "Radial profiles".into(),
-        text: "Exitance by distance from the point where the light came in: the mean of each ring, at the ring's middle, \
-               with its 95 % interval."
+        text: "Radial profile: light that leaves in a ring around the point where it came in, over the ring's area, at the \
+               middle of the ring, with its 95 % interval."
             .into(),
         drawn: match edges.len() {
             0 | 1 => Vec::new(),
@@ -39,15 +39,17 @@ fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &
             let quantity = Quantity { cell: index, estimator: run.estimator.clone(), observable, band };
             let mean = Estimate::of_batches(&stored.batches(&quantity)?);
             let reach = critical_value(0.05, mean.dof) * mean.std_error;
-            let middle = 0.5 * (edges[ring] + edges[ring + 1]);
-            Some(Point::new(middle, mean.value, [mean.value - reach, mean.value + reach]))
+            let [from, to] = [edges[ring], edges[ring + 1]];
+            let area = std::f64::consts::PI * (to - from) * (to + from);
+            let [y, low, high] = [0.0, -reach, reach].map(|away| (mean.value + away) / area);
+            Some(Point::new(0.5 * (from + to), y, [low, high]))
         };
         let points: Vec<Point> = (0..edges.len() - 1).filter_map(point).filter(|p| p.y > 0.0).collect();
         Series { name: run.estimator.clone(), points, style: Style::Line }
     };
     let plot = Plot {
         x: Axis::log("distance / mm"),
-        y: Axis::log("exitance"),
+        y: Axis::log("exitance / area, W/mm^4"),
         series: runs(cell).map(line).collect(),
         size: Size::Small,
         ..Plot::default()
@@ -80,6 +82,9 @@ mod tests {
         let Content::Plots(plots) = &section.drawn[0].content else { panic!("plots") };
         let points = &plots[0].series[0].points;
         assert_eq!(points.iter().map(|p| p.x).collect::<Vec<_>>(), [0.5, 2.0]);
-        assert!(points.iter().all(|p| p.low < p.y && p.y < p.high && (p.y - 1.0).abs() < 0.1));
+        assert!(points.iter().all(|p| p.low < p.y && p.y < p.high && p.low > 0.0));
+        // Both rings of the sample have a mean of 1.
+        let areas = [std::f64::consts::PI, 8.0 * std::f64::consts::PI];
+        assert!(points.iter().zip(areas).all(|(p, area)| (p.y * area - 1.0).abs() < 0.1), "{points:?}");
     }
 }

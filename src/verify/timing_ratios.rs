@@ -1,0 +1,120 @@
+//! Efficiencies by CPU time in two records: whether the second's ratios are those of the first.
+//!
+//! Times are never the same twice, their ratios should be: the log ratios of one pair of estimators in both records differ by
+//! chance within sqrt(s_a^2 + s_b^2), s the half width of the 95 % interval over 1.96. Where both records hold the same
+//! numbers the variances in the two ratios are the same as well, and only the costs differ by chance: the test is then
+//! wider than it need be. Another machine may truly have another ratio.
+
+use super::comparisons::{Row, comparisons};
+use crate::math;
+use crate::results::record::CostMeasure;
+use crate::results::store::Stored;
+use crate::stats::multiplicity::holm;
+use crate::stats::tails::normal_two_sided;
+
+/// The probability that any ratio of a comparison is called another although none is.
+pub const LEVEL: f64 = 1e-3;
+
+/// Standard errors in half a 95 % interval.
+const HALF_WIDTH: f64 = 1.96;
+
+/// One pair of estimators in both records.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimingRatio {
+    /// The first record's.
+    pub before: Row,
+    /// The second record's.
+    pub after: Row,
+    /// The second's ratio over the first's.
+    pub change: f64,
+    /// Its 95 % interval.
+    pub interval: [f64; 2],
+    /// p-value of no change, adjusted for all of the comparison (Holm).
+    pub adjusted_p: f64,
+}
+
+impl TimingRatio {
+    /// Are the two one ratio, for all that is known?
+    pub fn is_compatible(&self) -> bool {
+        self.adjusted_p >= LEVEL
+    }
+}
+
+/// Every efficiency by CPU time that both records quote.
+pub fn timing_ratios(before: &Stored, after: &Stored) -> Vec<TimingRatio> {
+    let rows = |stored: &Stored| {
+        let rows = comparisons(stored).into_iter();
+        rows.filter(|row| row.cost == CostMeasure::Cpu && row.efficiency_ratio.is_finite())
+            .collect::<Vec<_>>()
+    };
+    let (before, after) = (rows(before), rows(after));
+    let name = |row: &Row| {
+        [&row.cell, &row.band, &row.class, &row.metric, &row.baseline, &row.candidate].map(String::clone)
+    };
+    let pairs: Vec<(Row, Row)> = before
+        .into_iter()
+        .filter_map(|row| {
+            let twin = after.iter().find(|other| name(other) == name(&row))?.clone();
+            Some((row, twin))
+        })
+        .collect();
+    let changes: Vec<(f64, f64)> = pairs.iter().map(|(a, b)| log_change(a, b)).collect();
+    let p: Vec<f64> = changes.iter().map(|(change, error)| normal_two_sided(change / error)).collect();
+    let adjusted = holm(&p);
+    let ratio = |(((before, after), (change, error)), adjusted_p): (((Row, Row), (f64, f64)), f64)| {
+        TimingRatio {
+            before,
+            after,
+            change: math::exp(change),
+            interval: [-1.0, 1.0].map(|side| math::exp(change + side * HALF_WIDTH * error)),
+            adjusted_p,
+        }
+    };
+    pairs.into_iter().zip(changes).zip(adjusted).map(ratio).collect()
+}
+
+/// Logarithm of the second ratio over the first, and its standard error.
+fn log_change(a: &Row, b: &Row) -> (f64, f64) {
+    let error = |row: &Row| math::ln(row.ci_high / row.ci_low) / (2.0 * HALF_WIDTH);
+    let change = math::ln(b.efficiency_ratio / a.efficiency_ratio);
+    (change, (error(a) * error(a) + error(b) * error(b)).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::sample::{self, PASSES};
+    use crate::results::timing::{Batches, Cost, Timing};
+
+    /// The sample with times: `snee` takes `slower` times as long as `mis`, with some noise.
+    fn timed(slower: f64, seed: u64) -> Stored {
+        let mut stored = sample::stored(0.1);
+        let mut timing = Timing::default();
+        let batches = PASSES / 4;
+        for (name, factor) in [("mis", 1.0), ("snee", slower)] {
+            let seconds = |i: u64| factor * 0.01 * (1.0 + 0.05 * sample::uniform(seed + i));
+            let cpu_seconds: Vec<f64> = (0..batches).map(seconds).collect();
+            let all: f64 = cpu_seconds.iter().sum();
+            let cost = Cost { cpu_seconds: all, wall_seconds: all, passes: PASSES, paths: 1 };
+            timing.add("smooth", name, cost);
+            let settled = vec![true; cpu_seconds.len()];
+            timing.set_batches("smooth", name, Batches { processes: 1, cpu_seconds, settled });
+        }
+        stored.timing = Some(timing);
+        stored
+    }
+
+    #[test]
+    fn the_same_ratio_measured_twice_is_compatible() {
+        let ratios = timing_ratios(&timed(2.0, 0), &timed(2.0, 5000));
+        assert_eq!(ratios.len(), 6, "two classes and the pixels, in two bands");
+        assert!(ratios.iter().all(|r| r.is_compatible() && (r.change - 1.0).abs() < 0.05), "{ratios:?}");
+    }
+
+    #[test]
+    fn another_ratio_is_seen() {
+        let ratios = timing_ratios(&timed(2.0, 0), &timed(6.0, 5000));
+        assert!(ratios.iter().any(|r| !r.is_compatible() && r.change < 0.5), "{ratios:?}");
+        assert!(timing_ratios(&timed(2.0, 0), &sample::stored(0.1)).is_empty(), "no time, no ratio");
+    }
+}
