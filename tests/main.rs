@@ -10,6 +10,7 @@ mod judging;
 mod layering;
 mod looks;
 mod pictures;
+mod published;
 mod reproducibility;
 mod samplers;
 mod tokens;

@@ -41,8 +41,8 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
         let material = report::write(&folder)?;
         print!("{}", terminal::run_table(&material).to_text());
         print!("{}", terminal::sampler_table(&material).to_text());
-        if let Some(table) = terminal::efficiency_table(&material) {
-            println!("\nefficiency against the first estimator, 95 % interval:\n{}", table.to_text());
+        if let Some(block) = terminal::efficiency_table(&material) {
+            println!("\n{}\n\n{}", terminal::wrapped(&block.caption, 110), block.table.to_text());
         }
         for note in terminal::notes(&material) {
             println!("note: {note}");

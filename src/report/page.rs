@@ -178,15 +178,17 @@ fn pictures(material: &Material) -> Vec<Block> {
 fn measured(material: &Material) -> Vec<Block> {
     let record = &material.stored.record;
     let bands: Vec<String> = record.bands.iter().map(|band| band.name.clone()).collect();
-    let text = "Means over passes; in brackets one standard error in units of the last digit.";
-    let mut blocks = vec![heading("Measurements"), Block::Text(text.into())];
+    let text = "Every observable, by class: means over passes; in brackets one standard error in units of the last digit.";
+    let mut blocks = vec![heading("Measurements")];
+    blocks.extend(summary::means(&material.stored, &material.rows).map(Block::Table));
+    blocks.push(Block::Text(text.into()));
     for (index, cell) in record.cells.iter().enumerate() {
         let rows: Vec<&Measurement> =
             material.rows.iter().filter(|row| row.cell == cell.label).collect();
         let table = named(&format!("measurements-{index:03}"), measurement_table(&rows, &bands));
         let is_long = record.cells.len() > OPEN_CELLS || rows.len() / bands.len().max(1) > OPEN_ROWS;
-        let title = if cell.label.is_empty() { "All measurements" } else { &cell.label };
-        if !is_long && !cell.label.is_empty() {
+        let title = if record.cells.len() == 1 { "All measurements" } else { &cell.label };
+        if !is_long && record.cells.len() > 1 {
             blocks.push(Block::Heading(3, cell.label.clone()));
         }
         blocks.extend(folded_if(is_long, title, vec![table]));

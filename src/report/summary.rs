@@ -1,8 +1,9 @@
 //! The tables that a text quotes: a row for each cell and band, a column for each estimator.
 
 use super::document::TableBlock;
-use super::number::significant;
+use super::number::{significant, with_error};
 use super::table::Table;
+use crate::results::measurements::Measurement;
 use crate::results::record::{Cell, CostMeasure, Observable, PIXELS};
 use crate::results::store::Stored;
 use crate::verify::comparisons::Row;
@@ -78,6 +79,26 @@ fn ratio(row: &Row) -> String {
     let star = if row.resolved { "" } else { "*" };
     let [low, high] = [row.ci_low, row.ci_high].map(number);
     format!("{}{star} [{low}, {high}]", number(row.efficiency_ratio))
+}
+
+/// Means of the sensor's first observable, all classes together.
+pub fn means(stored: &Stored, rows: &[Measurement]) -> Option<TableBlock> {
+    let first = |row: &&Measurement| {
+        let run = stored.record.cells.iter().find(|cell| cell.label == row.cell)?.runs.first()?;
+        let observable = run.observables.first()?;
+        Some(row.observable == observable.name && row.class == observable.class)
+    };
+    let rows: Vec<&Measurement> = rows.iter().filter(|row| first(row) == Some(true)).collect();
+    let observable = &rows.first()?.observable;
+    let entry = |row: &&Measurement| Entry {
+        row: [row.cell.clone(), row.band.clone()],
+        column: row.estimator.clone(),
+        text: with_error(row.mean, row.std_error),
+    };
+    let caption = format!(
+        "Mean of `{observable}`, all transport classes together; in brackets one standard error in units of the last digit."
+    );
+    Some(TableBlock::new("means", caption, pivot(stored, &["band"], rows.iter().map(entry).collect())))
 }
 
 /// Model errors of all classes together; nothing where there are no models.
@@ -170,6 +191,15 @@ mod tests {
         assert!(block.table.rows[0][1].ends_with(']'), "{:?}", block.table.rows);
         assert!(block.caption.contains("a pixel") && block.caption.contains("counted work"));
         assert!(efficiency(&stored, &rows, CostMeasure::Cpu).is_none(), "no time was measured");
+    }
+
+    #[test]
+    fn means_stand_with_their_errors() {
+        let stored = sample::stored(0.1);
+        let rows = crate::results::measurements::measurements(&stored, None);
+        let block = means(&stored, &rows).expect("a table");
+        assert_eq!(block.table.header, ["band", "mis", "snee"]);
+        assert!(block.table.rows.iter().all(|row| row[1].contains('(') && row[2].contains('(')));
     }
 
     #[test]

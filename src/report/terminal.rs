@@ -1,11 +1,12 @@
 //! What `run` prints when it is done: a row per measurement, short enough for a terminal.
 
 use super::Material;
+use super::document::TableBlock;
 use super::number::{per_cent, significant, with_error};
+use super::summary;
 use super::table::Table;
-use super::tables::comparison_table;
 use crate::results::measurements::Measurement;
-use crate::verify::comparisons::Row;
+use crate::results::record::CostMeasure;
 
 /// One row per cell and estimator: the sensor's first observable in every band, passes, CPU time, speed.
 pub fn run_table(material: &Material) -> Table {
@@ -64,10 +65,28 @@ pub fn sampler_table(material: &Material) -> Table {
     if table.rows.is_empty() { Table::default() } else { table.without_empty_columns() }
 }
 
-/// Efficiencies of all classes together, where there are two estimators to compare.
-pub fn efficiency_table(material: &Material) -> Option<Table> {
-    let rows: Vec<Row> = material.comparisons.iter().filter(|row| row.class == "all").cloned().collect();
-    (!rows.is_empty()).then(|| comparison_table(&rows))
+/// Efficiencies that stand for the pairs of estimators: by CPU time where it was measured, else by counted work.
+pub fn efficiency_table(material: &Material) -> Option<TableBlock> {
+    let by = |cost| summary::efficiency(&material.stored, &material.comparisons, cost);
+    by(CostMeasure::Cpu).or_else(|| by(CostMeasure::Counters))
+}
+
+/// A text in lines of at most `width` letters, broken at blanks.
+pub fn wrapped(text: &str, width: usize) -> String {
+    let (mut lines, mut length) = (String::new(), 0);
+    for word in text.split_whitespace() {
+        let letters = word.chars().count();
+        if length > 0 && length + 1 + letters > width {
+            lines.push('\n');
+            length = 0;
+        } else if length > 0 {
+            lines.push(' ');
+            length += 1;
+        }
+        lines += word;
+        length += letters;
+    }
+    lines
 }
 
 /// Notes of estimators and counts of anomalies, each once with the cells that it concerns.
@@ -92,4 +111,18 @@ pub fn notes(material: &Material) -> Vec<String> {
         if cells.is_empty() { text } else { format!("{text} [{}]", cells.join("; ")) }
     };
     lines.into_iter().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_broken_at_blanks() {
+        assert_eq!(wrapped("one two  three\nfour", 9), "one two\nthree\nfour");
+        assert_eq!(
+            (wrapped("", 5), wrapped("longer-than-a-line x", 5)),
+            (String::new(), "longer-than-a-line\nx".into())
+        );
+    }
 }
