@@ -12,13 +12,17 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 12] = [
+const PAGES: [&str; 16] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "docs/bssrdf.md",
     "docs/comparing-records.md",
+    "docs/SUMMARY.md",
     "docs/experiment-file.md",
+    "docs/first-report.md",
+    "docs/index.md",
+    "docs/results.md",
     "docs/judging-other-renderers.md",
     "docs/limits.md",
     "docs/subdivision.md",

@@ -3,17 +3,20 @@
 use super::document::{Block, Document, FigureBlock, Picture};
 use super::table::Table;
 
-const PREAMBLE: &str = "% pdflatex report.tex, in the folder of its pictures. Plots are SVG: plots/ has them.\n\
-                        \\documentclass[a4paper]{article}\n\\usepackage[utf8]{inputenc}\n\\usepackage[T1]{fontenc}\n\
-                        \\usepackage[margin=2cm]{geometry}\n\\usepackage{booktabs,longtable,graphicx}\n\\begin{document}\n";
+const PREAMBLE: &str = "% pdflatex report.tex, in its own folder. Plots are SVG, and what the page folds away is long: both stand in files.
+\\documentclass[a4paper,landscape]{article}
+\\usepackage[utf8]{inputenc}
+\\usepackage[T1]{fontenc}
+\\usepackage[margin=1.5cm]{geometry}
+\\usepackage{booktabs,longtable,graphicx}
+\\begin{document}
+";
 
-/// The page as a LaTeX document.
+/// The page as a LaTeX document: what is open on the page, nothing of it afloat.
 pub fn to_document(page: &Document) -> String {
     let body: String = page.blocks.iter().map(block).collect();
-    format!(
-        "{PREAMBLE}\\title{{{}}}\n\\date{{}}\n\\maketitle\n{body}\\end{{document}}\n",
-        escaped(&page.title)
-    )
+    let title = escaped(&page.title);
+    format!("{PREAMBLE}\\begin{{center}}\\Large {title}\\end{{center}}\n{body}\\end{{document}}\n")
 }
 
 fn block(of: &Block) -> String {
@@ -22,29 +25,26 @@ fn block(of: &Block) -> String {
         Block::Heading(_, text) => format!("\n\\subsection*{{{}}}\n", escaped(text)),
         Block::Text(text) => format!("{}\n\n", escaped(text)),
         Block::List(items) => {
-            let items: String =
-                items.iter().map(|item| format!("  \\item {}\n", escaped(item))).collect();
+            let item = |item: &String| format!("  \\item {}\n", escaped(item));
+            let items: String = items.iter().map(item).collect();
             format!("\\begin{{itemize}}\n{items}\\end{{itemize}}\n")
         }
         Block::Code(code) => format!("\\begin{{verbatim}}\n{code}\n\\end{{verbatim}}\n"),
-        Block::Table(t) => format!("{{\\small\n{}}}\n", to_latex(&t.table, &t.name, &t.caption)),
+        Block::Table(t) => format!("{{\\scriptsize\n{}}}\n", long(&t.table, &t.name, &t.caption)),
         Block::Figures(figures) => figures.iter().map(figure).collect(),
         Block::Wide(f) => figure(f),
         Block::Viewer(viewer) => viewer.figures.iter().map(figure).collect(),
-        Block::Folded(title, blocks) => {
-            let blocks: String = blocks.iter().map(block).collect();
-            format!("\\paragraph{{{}}}\n{blocks}", escaped(title))
-        }
+        Block::Folded(title, _) => format!("{} is not printed here.\n\n", escaped(title)),
     }
 }
 
 fn figure(f: &FigureBlock) -> String {
-    let words = format!("{}: {}", escaped(&f.title), escaped(&f.caption));
+    let words = format!("\\textbf{{{}}} {}", escaped(&f.title), escaped(&f.caption));
     match f.picture {
         Picture::Png(_) => {
+            let picture = format!("\\includegraphics[width=\\linewidth]{{{}}}", f.path);
             format!(
-                "\\begin{{figure}}\n\\centering\n\\includegraphics[width=.5\\linewidth]{{{}}}\n\\caption{{{words}}}\n\\end{{figure}}\n",
-                f.path
+                "\\begin{{minipage}}{{.3\\linewidth}}\\small\n{picture}\\\\\n{words}\n\\end{{minipage}}\\hfill\n"
             )
         }
         Picture::Svg(_) => String::new(),
@@ -57,29 +57,56 @@ const FLOATS: usize = 40;
 /// A table with its caption. Needs `\usepackage{booktabs}`, and `\usepackage{longtable}` where there are more than
 /// 40 rows.
 pub fn to_latex(table: &Table, name: &str, caption: &str) -> String {
-    if table.header.is_empty() {
-        return String::new();
+    if table.rows.len() > FLOATS {
+        return long(table, name, caption);
     }
-    let columns: String =
-        (0..table.header.len()).map(|column| if table.is_numeric(column) { 'r' } else { 'l' }).collect();
+    let Some(Parts { columns, header, rows, caption }) = parts(table, name, caption) else {
+        return String::new();
+    };
+    format!(
+        "\\begin{{table}}\n\\centering\n{caption}\\begin{{tabular}}{{{columns}}}\n{header}{rows}  \
+         \\bottomrule\n\\end{{tabular}}\n\\end{{table}}\n"
+    )
+}
+
+/// A table that may run over pages.
+fn long(table: &Table, name: &str, caption: &str) -> String {
+    let Some(Parts { columns, header, rows, caption }) = parts(table, name, caption) else {
+        return String::new();
+    };
+    let caption = if caption.is_empty() { caption } else { format!("  {} \\\\\n", caption.trim_end()) };
+    format!(
+        "\\begin{{longtable}}{{{columns}}}\n{caption}{header}  \\endhead\n{rows}  \\bottomrule\n\\end{{longtable}}\n"
+    )
+}
+
+/// What both kinds of table are made of.
+struct Parts {
+    columns: String,
+    header: String,
+    rows: String,
+    caption: String,
+}
+
+/// Nothing of a table without columns.
+fn parts(table: &Table, name: &str, caption: &str) -> Option<Parts> {
+    if table.header.is_empty() {
+        return None;
+    }
     let row = |fields: &Vec<String>| {
         let fields: Vec<String> = fields.iter().map(|f| escaped(f)).collect();
         format!("  {} \\\\\n", fields.join(" & "))
     };
-    let header = format!("  \\toprule\n{}  \\midrule\n", row(&table.header));
-    let rows: String = table.rows.iter().map(row).collect();
-    let label = format!("\\label{{tab:{name}}}");
-    let caption = escaped(caption);
-    if table.rows.len() > FLOATS {
-        return format!(
-            "\\begin{{longtable}}{{{columns}}}\n  \\caption{{{caption}}}{label} \\\\\n{header}  \\endhead\n{rows}  \
-             \\bottomrule\n\\end{{longtable}}\n"
-        );
-    }
-    format!(
-        "\\begin{{table}}\n\\centering\n\\caption{{{caption}}}{label}\n\\begin{{tabular}}{{{columns}}}\n{header}{rows}  \
-         \\bottomrule\n\\end{{tabular}}\n\\end{{table}}\n"
-    )
+    let columns = (0..table.header.len()).map(|column| if table.is_numeric(column) { 'r' } else { 'l' });
+    Some(Parts {
+        columns: columns.collect(),
+        header: format!("  \\toprule\n{}  \\midrule\n", row(&table.header)),
+        rows: table.rows.iter().map(row).collect(),
+        caption: match caption {
+            "" => String::new(),
+            text => format!("\\caption{{{}}}\\label{{tab:{name}}}\n", escaped(text)),
+        },
+    })
 }
 
 /// Text as LaTeX prints it; numbers with an exponent or a sign as mathematics.
@@ -103,7 +130,7 @@ pub fn escaped(text: &str) -> String {
             '<' | '>' | '|' => latex.extend(['$', first, '$']),
             '±' => latex += "$\\pm$",
             '×' => latex += "$\\times$",
-            '\n' => latex.push(' '),
+            '`' | '\n' => latex.push(if first == '`' { '\'' } else { ' ' }),
             other => latex.push(other),
         }
         before = first;
