@@ -137,7 +137,8 @@ fn figure(f: &FigureBlock) -> String {
         Picture::Png(png) => {
             format!("<img alt=\"{title}\" src=\"data:image/png;base64,{}\">", base64::encode(png))
         }
-        Picture::Svg(svg) => svg.clone(),
+        // In a page the name space goes without saying.
+        Picture::Svg(svg) => svg.replace(" xmlns=\"http://www.w3.org/2000/svg\"", ""),
     };
     let caption = inline(&f.caption);
     format!("<figure>{picture}<figcaption><b>{title}</b> {caption}</figcaption></figure>\n")
