@@ -3,6 +3,7 @@
 use super::base64;
 use super::document::{Block, Document, FigureBlock, Picture};
 use super::table::Table;
+use super::viewer;
 
 const STYLE: &str = include_str!("style.css");
 
@@ -10,10 +11,11 @@ const STYLE: &str = include_str!("style.css");
 pub fn to_html(page: &Document) -> String {
     let title = escape(&page.title);
     let body: String = page.blocks.iter().map(block).collect();
+    let (style, script) = viewer::parts(&page.blocks);
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{body}</body>\n</html>\n"
+         <title>{title}</title>\n<style>\n{STYLE}{style}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{body}{script}</body>\n</html>\n"
     )
 }
 
@@ -28,7 +30,7 @@ fn block(block: &Block) -> String {
         }
         Block::Code(code) => format!("<pre>{}</pre>\n", escape(code)),
         Block::Table(t) => table(&t.table),
-        Block::Viewer(viewer) => figures(&viewer.figures),
+        Block::Viewer(viewer) => viewer::to_html(viewer),
         Block::Folded(title, blocks) => {
             let inner: String = blocks.iter().map(self::block).collect();
             format!("<details>\n<summary>{}</summary>\n{inner}</details>\n", escape(title))
@@ -78,6 +80,7 @@ fn figure(f: &FigureBlock) -> String {
     format!("<figure>{picture}<figcaption><b>{title}</b><br>{caption}</figcaption></figure>\n")
 }
 
-fn escape(text: &str) -> String {
+/// Text that stands between tags or in an attribute.
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -59,6 +59,8 @@ pub struct Material {
     pub model_errors: Vec<ModelError>,
     /// The pictures, in the order of cells and estimators.
     pub figures: Vec<Figure>,
+    /// The same by cell, to be compared.
+    pub viewers: Vec<viewer::Viewer>,
     /// Grids of split pictures.
     pub splits: Vec<split::SplitFigure>,
     /// Plots of means as passes add up.
@@ -95,6 +97,7 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     let (timing, provenance) = (folder.read_timing()?, folder.read_provenance()?);
     let rows = measurements(&stored, timing.as_ref());
     let figures = write_figures(folder, &stored)?;
+    let viewers = viewer::viewers(&stored, &figures)?;
     let stored = Stored { timing: timing.clone(), ..stored };
     let wanted = folder.read_pictures()?;
     let (splits, running) = (&split::wanted(&wanted), &running::wanted(&wanted));
@@ -111,6 +114,7 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
         comparisons,
         model_errors,
         figures,
+        viewers,
         splits,
         running,
     };
@@ -228,7 +232,8 @@ mod tests {
             "does &lt;not&gt;",
             "wrong_side",
             "cannot sample x",
-            "data:image/png;base64,iVBOR",
+            "\"linear\":\"iVBOR",
+            "src=\"images/000-mis.png\"",
             "class=\"fail\"",
         ];
         wanted.iter().for_each(|w| assert!(html.contains(w), "{w}"));

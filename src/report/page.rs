@@ -2,12 +2,11 @@
 //! to make it again.
 
 use super::Material;
-use super::document::{Block, Document, FigureBlock, Picture, TableBlock};
+use super::document::{Block, Document, TableBlock};
 use super::number::significant;
 use super::table::{
     Table, claim_table, comparison_table, measurement_table, model_error_table, verdict_table,
 };
-use super::viewer::Viewer;
 use crate::results::measurements::Measurement;
 use crate::verify::levels::FAMILY_LEVEL;
 use crate::verify::verdict::Outcome;
@@ -103,23 +102,11 @@ fn measured(material: &Material) -> Vec<Block> {
         }
         let rows: Vec<&Measurement> =
             material.rows.iter().filter(|row| row.cell == cell.label).collect();
-        let figures = material.figures.iter().filter(|figure| figure.cell == cell.label);
-        let figures: Vec<FigureBlock> = figures.map(figure_block).collect();
-        if !figures.is_empty() {
-            blocks.push(Block::Viewer(Viewer { cell: cell.label.clone(), figures }));
-        }
+        let viewer = material.viewers.iter().find(|viewer| viewer.cell == cell.label);
+        blocks.extend(viewer.cloned().map(Block::Viewer));
         blocks.push(named(&format!("measurements-{index:03}"), measurement_table(&rows, &bands)));
     }
     blocks
-}
-
-fn figure_block(figure: &super::Figure) -> FigureBlock {
-    FigureBlock {
-        path: format!("{}.png", figure.stem),
-        picture: Picture::Png(figure.png.clone()),
-        title: figure.estimator.clone(),
-        caption: figure.caption.clone(),
-    }
 }
 
 fn model_errors(material: &Material) -> Vec<Block> {
