@@ -165,7 +165,9 @@ fn expected(root: &Path) -> Value {
             .flat_map(|band| a.mean(band).zip(b.mean(band)).map(|(a, b)| ((a - b) / b).abs()));
         let mut sizes: Vec<f64> = relative.filter(|x| !x.is_nan()).collect();
         sizes.sort_by(f64::total_cmp);
-        let most = sizes[(0.95 * sizes.len() as f64).ceil() as usize - 1];
+        // None where nothing is lit.
+        let most = sizes.get(((0.95 * sizes.len() as f64).ceil() as usize).saturating_sub(1));
+        let most = most.copied().unwrap_or(0.0);
         limits.push([0.01, 0.03, 0.1, 0.3].into_iter().find(|limit| most <= *limit).unwrap_or(1.0));
     }
     let names: Vec<&str> = stored.record.bands.iter().map(|band| band.name.as_str()).collect();

@@ -68,7 +68,7 @@ fn maps_of_a_cell() {
     assert_eq!(data["limit"], 1.0, "one of eleven pixels differs by a half");
     assert_eq!(map(&snee["difference"]["maps"][0]), [65, 128, 128, 128, 128, 128]);
     let note = snee["z"]["notes"][0].as_str().expect("a note");
-    assert!(note.starts_with("0 of 6 pixels are beyond ±4; by chance it would be at most 0.0005"), "{note}");
+    assert!(note.starts_with("0 of 6 pixels are beyond ±4; by chance it would be at most 5.0e-4"), "{note}");
 }
 
 #[test]

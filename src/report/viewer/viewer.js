@@ -5,7 +5,7 @@
   const LAYERS = { image: "Image", noise: "Noise", difference: "Difference", z: "z-score of the difference" };
   const MODES = { side: "Side by side", flip: "Flip", split: "Split" };
   const REACH = 10; // stops by which the exposure can be moved either way
-  const LARGEST = 64; // CSS pixels that a pixel of the picture may take
+  const LARGEST = 64; // CSS pixels that a pixel of the picture may take, or more in a picture of few
   const TAP = 4; // CSS pixels that a finger may slip and still tap
   let viewers = 0;
 
@@ -251,7 +251,7 @@
       const cursor = atCursor && state.cursor ? { x: state.cursor.x + 0.5, y: state.cursor.y + 0.5 } : null;
       const fixed = at ?? cursor ?? { x: state.x, y: state.y };
       const before = state.zoom;
-      state.zoom = clamp(before * factor, 1, Math.max(1, LARGEST / this.fit()));
+      state.zoom = clamp(before * factor, 1, Math.max(8, LARGEST / this.fit()));
       for (const axis of ["x", "y"]) state[axis] = fixed[axis] + ((state[axis] - fixed[axis]) * before) / state.zoom;
       this.settle();
       this.draw();
@@ -316,13 +316,13 @@
         pointer.slipped += Math.hypot(event.clientX - pointer.x, event.clientY - pointer.y);
         Object.assign(pointer, { x: event.clientX, y: event.clientY });
         const after = middle();
+        if (before.spread > 0 && after.spread > 0) {
+          const at = this.place({ target: event.target, clientX: before.x, clientY: before.y });
+          this.zoom(after.spread / before.spread, false, at);
+        }
         const isSeam = this.state.mode === "split" && this.pointers.size === 1 && !event.shiftKey;
         if (isSeam) this.drag(event);
         else this.pan(after.x - before.x, after.y - before.y);
-        if (before.spread > 0 && after.spread > 0) {
-          const at = this.place({ target: event.target, clientX: after.x, clientY: after.y });
-          this.zoom(after.spread / before.spread, false, at);
-        }
       }
       this.read(event);
     }
