@@ -5,7 +5,13 @@ use super::super::html::escape;
 use super::{Viewer, maps};
 
 const STYLE: &str = include_str!("viewer.css");
-const SCRIPT: &str = include_str!("viewer.js");
+/// In the order in which each uses the ones before it.
+const SCRIPTS: [&str; 4] = [
+    include_str!("values.js"),
+    include_str!("canvases.js"),
+    include_str!("controls.js"),
+    include_str!("viewer.js"),
+];
 
 /// A viewer's place on the page.
 pub fn to_html(viewer: &Viewer) -> String {
@@ -33,9 +39,11 @@ pub fn parts(blocks: &[Block]) -> (String, String) {
         return Default::default();
     }
     let [noise, signed] = maps::palettes();
+    let scripts = SCRIPTS.join("\n");
+    // One function around all, so that nothing of it is global.
     let script = format!(
         "<script type=\"application/json\" id=\"viewer-palettes\">{{\"noise\":\"{noise}\",\"signed\":\"{signed}\"}}\
-         </script>\n<script>\n{SCRIPT}</script>\n"
+         </script>\n<script>\n\"use strict\";\n(() => {{\n{scripts}}})();\n</script>\n"
     );
     (STYLE.into(), script)
 }
