@@ -47,8 +47,18 @@ impl Open {
         let profile = tempfile::tempdir().expect("a folder");
         let scheme = format!("--blink-settings=preferredColorScheme={}", u8::from(!is_dark));
         let mut command = Command::new(browser());
-        command.args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"]);
-        command.args(["--disable-background-networking", "--disable-component-update", "--disable-sync"]);
+        command.args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+        ]);
+        command.args([
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+        ]);
         command.args(["--enable-logging=stderr", "--window-size=1200,900", &scheme]);
         command.arg(format!("--user-data-dir={}", profile.path().display()));
         command.arg(format!("file://{}", page.display()));
@@ -161,8 +171,8 @@ fn expected(root: &Path) -> Value {
         });
         cells.push(json!(pictures.collect::<Vec<_>>()));
         let [a, b] = [1, 0].map(|run| Picture::of(&stored, &cell.runs[run]).expect("an image"));
-        let relative = (0..bands)
-            .flat_map(|band| a.mean(band).zip(b.mean(band)).map(|(a, b)| ((a - b) / b).abs()));
+        let relative =
+            (0..bands).flat_map(|band| a.mean(band).zip(b.mean(band)).map(|(a, b)| ((a - b) / b).abs()));
         let mut sizes: Vec<f64> = relative.filter(|x| !x.is_nan()).collect();
         sizes.sort_by(f64::total_cmp);
         // None where nothing is lit.
@@ -225,6 +235,7 @@ fn browser_opens_nine_cells_at_once() {
         .map(|_| {
             let outcome = sound(Open::page(&page, false).outcome());
             assert_eq!(outcome["viewers"], 9, "{outcome}");
+            assert!(outcome["late"].as_u64() >= Some(4), "those out of sight wait: {outcome}");
             outcome["drawn"].as_f64().expect("milliseconds")
         })
         .collect();

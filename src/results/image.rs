@@ -292,8 +292,7 @@ mod tests {
     fn linear_png_holds_bytes_by_plane() {
         let stored = sample::stored(0.5);
         let picture = Picture::of(&stored, &stored.record.cells[0].runs[0]).expect("a picture");
-        let (is_srgb, (width, height, data)) =
-            decoded_plane(&to_linear_png(&picture).expect("a PNG"));
+        let (is_srgb, (width, height, data)) = decoded_plane(&to_linear_png(&picture).expect("a PNG"));
         assert_eq!((is_srgb, width, height), (false, 3, 4));
         for (index, rgb) in picture.rgb().enumerate() {
             for (channel, value) in rgb.iter().enumerate() {

@@ -20,7 +20,10 @@ class Controls extends Canvases {
       return make("label", { class: "viewer-choice" }, input, name);
     });
     this.modes = make("fieldset", { "aria-label": "Arrangement" }, ...modes);
-    this.layer = select(LAYERS);
+    // A picture alone differs from nothing.
+    const layers = Object.entries(LAYERS).filter(([layer]) => pictures.length > 1 || !["difference", "z"].includes(layer));
+    this.layers = layers.map(([layer]) => layer);
+    this.layer = select(Object.fromEntries(layers));
     this.band = select(Object.fromEntries(data.bands.map((name, i) => [i, name])));
     this.pair = [select(names), select(names)];
     this.exposure = make("input", { type: "range", min: -REACH, max: REACH, step: 0.25 });
@@ -121,7 +124,9 @@ class Controls extends Canvases {
         if (picture.bright > 0) about += `; pixels too bright: ${picture.bright}`;
         if (picture.outside > 0) about += `; outside the gamut or not finite: ${picture.outside}`;
       } else if (layer !== "noise") {
-        about = picture[layer] ? `compared with ${picture[layer].of}` : `its image; no map: ${picture.alone}`;
+        const isBasis = this.pictures.some((other) => other[layer]?.of === picture.name);
+        const why = isBasis ? "others are compared with it" : `no map: ${picture.alone}`;
+        about = picture[layer] ? `compared with ${picture[layer].of}` : `its image; ${why}`;
       }
       return about;
     };

@@ -59,7 +59,8 @@ fn has_viewer(block: &Block) -> bool {
 /// A picture by its file: the page holds its values already.
 fn figure(f: &FigureBlock) -> String {
     let (title, caption) = (escape(&f.title), escape(&f.caption));
-    let path = escape(&f.path.replace('%', "%25").replace(' ', "%20").replace('#', "%23").replace('?', "%3f"));
+    let path =
+        escape(&f.path.replace('%', "%25").replace(' ', "%20").replace('#', "%23").replace('?', "%3f"));
     format!(
         "<figure><img alt=\"{title}\" loading=\"lazy\" src=\"{path}\"><figcaption><b>{title}</b><br>{caption}\
          </figcaption></figure>\n"

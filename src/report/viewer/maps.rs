@@ -113,9 +113,8 @@ mod tests {
     #[test]
     fn values_of_pixels() {
         let band = band();
-        let array = |mean: [f64; 4], error: [f64; 4]| {
-            Array::new(vec![2, 2, 2, 1], [mean, error].concat())
-        };
+        let array =
+            |mean: [f64; 4], error: [f64; 4]| Array::new(vec![2, 2, 2, 1], [mean, error].concat());
         let a = array([2.0, 0.0, 1.0, 3.0], [0.3, 0.0, 0.5, 0.0]);
         let b = array([1.0, 0.0, 0.0, 4.0], [0.4, 0.0, 0.0, 0.0]);
         let (a, b) = (Picture::new(&band, &a), Picture::new(&band, &b));
@@ -134,8 +133,14 @@ mod tests {
         assert_eq!(errors.map(noise_index), [1, 1, 86, 170, 255, 255, 0]);
         let [noise, signed] = palettes();
         let colour = |palette: &str, index: usize| palette[6 * index..6 * index + 6].to_string();
-        assert_eq!([0, 1, 128, 255].map(|i| colour(&signed, i)), ["808080", "053061", "f7f7f7", "67001f"]);
-        assert_eq!([0, 1, 128, 255].map(|i| colour(&noise, i)), ["808080", "440154", "21918c", "fde725"]);
+        assert_eq!(
+            [0, 1, 128, 255].map(|i| colour(&signed, i)),
+            ["808080", "053061", "f7f7f7", "67001f"]
+        );
+        assert_eq!(
+            [0, 1, 128, 255].map(|i| colour(&noise, i)),
+            ["808080", "440154", "21918c", "fde725"]
+        );
         assert_eq!((noise.len(), signed.len()), (1536, 1536));
     }
 
@@ -143,7 +148,9 @@ mod tests {
     fn noise_is_ordered_by_lightness() {
         let lightness = |i: i32| {
             let [r, g, b] = sequential(f64::from(i) / 254.0).map(f64::from);
-            0.2126 * (r / 255.0).powf(2.2) + 0.7152 * (g / 255.0).powf(2.2) + 0.0722 * (b / 255.0).powf(2.2)
+            0.2126 * (r / 255.0).powf(2.2)
+                + 0.7152 * (g / 255.0).powf(2.2)
+                + 0.0722 * (b / 255.0).powf(2.2)
         };
         assert!((0..254).all(|i| lightness(i + 1) >= lightness(i) - 1e-3));
         assert!(lightness(254) > 30.0 * lightness(0));

@@ -60,7 +60,7 @@ struct PictureData<'a> {
     noise: Vec<String>,
     difference: Option<Maps<'a>>,
     z: Option<Maps<'a>>,
-    /// Why there is no z-score.
+    /// Why no other is of the same integral.
     alone: String,
 }
 
@@ -216,28 +216,24 @@ fn about(run: &EstimatorRun) -> String {
     format!("{} passes{model}", run.passes)
 }
 
-/// Why a picture is compared with no other.
+/// Why there is no z-score of a picture, nor one of another against it; empty where there is one.
 fn alone(shots: &[Shot], index: usize) -> String {
-    let run = shots[index].run;
-    let of_model = |shot: &&Shot| shot.run.model == run.model;
-    if same_integral(shots, index).is_some() {
-        String::new()
-    } else if shots.iter().filter(of_model).count() > 1 {
-        "the others of the same integral are compared with it".into()
-    } else if shots.len() == 1 {
-        "it is the only picture here".into()
-    } else {
-        "no other estimator here has the same integral: another model's mean differs by more than noise, and a z-score \
-         would say nothing"
-            .into()
+    let of_model = |shot: &&Shot| shot.run.model == shots[index].run.model;
+    if shots.iter().filter(of_model).count() > 1 {
+        return String::new();
     }
+    "no other estimator here has the same integral, and another model's mean differs by more than noise"
+        .into()
 }
 
 fn model_note(run: &EstimatorRun, other: &EstimatorRun) -> String {
     if run.model == other.model {
         return String::new();
     }
-    format!(" {} estimates a model, {} light transport itself: the model's error shows too.", run.estimator, other.estimator)
+    format!(
+        " {} estimates a model, {} light transport itself: the model's error shows too.",
+        run.estimator, other.estimator
+    )
 }
 
 /// How many scores are beyond the scale, and how many chance would put there.

@@ -61,7 +61,7 @@ class Viewer extends Controls {
     const next = (list, item) => list[(list.indexOf(item) + 1) % list.length];
     const acts = {
       f: () => this.toggle(), " ": () => this.toggle(),
-      l: () => this.set({ layer: next(Object.keys(LAYERS), state.layer) }),
+      l: () => this.set({ layer: next(this.layers, state.layer) }),
       n: () => this.set({ band: (state.band + 1) % data.bands.length }),
       b: () => this.set({ exposure: Math.min(REACH, state.exposure + 0.5) }),
       d: () => this.set({ exposure: Math.max(-REACH, state.exposure - 0.5) }),
