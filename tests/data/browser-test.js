@@ -56,7 +56,7 @@
     await settle();
   };
   const leave = async (viewer) => {
-    viewer.stage.dispatchEvent(new PointerEvent("pointerleave", { pointerId: 1 }));
+    viewer.stage.dispatchEvent(new PointerEvent("pointerleave", { pointerId: 1, pointerType: "mouse" }));
     await settle();
   };
   const pixels = (canvas) => canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);

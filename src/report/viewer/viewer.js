@@ -27,7 +27,8 @@ class Viewer extends Controls {
     on(stage, "pointerdown", (event) => this.press(event));
     on(stage, "pointermove", (event) => this.move(event));
     for (const type of ["pointerup", "pointercancel"]) on(stage, type, (event) => this.release(event));
-    on(stage, "pointerleave", () => this.pointers.size === 0 && this.point(null));
+    // A finger leaves its pixel to be read.
+    on(stage, "pointerleave", (event) => event.pointerType === "mouse" && this.pointers.size === 0 && this.point(null));
     new ResizeObserver(() => this.draw()).observe(stage);
   }
 
