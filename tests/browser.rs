@@ -124,7 +124,10 @@ impl Report {
         let text = replaced(IMAGE, "passes = 100", "passes = 24");
         let sweep = "[[sweep]]\nname = \"g\"\nkeys = [\"object.medium.coefficients.g\"]\n\
                      rows = [{ label = '</script><b>\"&', values = [0.0] }, { label = \"0.6\", values = [0.6] }]\n";
-        Report::of(&(text + sweep), "x")
+        let split = "[[picture]]\nsplit = { left = \"mis\", right = \"analog\", columns = \"g\" }\n";
+        let mut report = Report::of(&(text + sweep + split), "x");
+        report.expected["grid"] = json!(grid(&report.work.path("results/x/images/split-1.png")));
+        report
     }
 
     /// The page with the script at its end.
@@ -182,6 +185,22 @@ fn expected(root: &Path) -> Value {
     }
     let names: Vec<&str> = stored.record.bands.iter().map(|band| band.name.as_str()).collect();
     json!({ "width": size.0, "height": size.1, "cells": cells, "limits": limits, "bands": names })
+}
+
+/// A pixel each of the split picture of two tiles of 12 x 12 pixels: they stand there as squares of 16 x 16, with a seam of
+/// one pixel and a gap of six.
+fn grid(path: &Path) -> Vec<u8> {
+    let (sheet, mut pixels) = (png(path), Vec::new());
+    let width = 2 * (12 * 16 + 1) + 6;
+    for y in 0..12 {
+        for x in 0..24 {
+            let (tile, column) = (x / 12, x % 12);
+            let left = tile * (12 * 16 + 1 + 6) + column * 16 + 8 + usize::from(column >= 6);
+            let at = 3 * ((16 * y + 8) * width + left);
+            pixels.extend(&sheet[at..at + 3]);
+        }
+    }
+    pixels
 }
 
 fn png(path: &Path) -> Vec<u8> {

@@ -101,7 +101,8 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     let stored = Stored { timing: timing.clone(), ..stored };
     let wanted = folder.read_pictures()?;
     let (splits, running) = (&split::wanted(&wanted), &running::wanted(&wanted));
-    let splits = split::write_splits(folder, &stored, splits)?;
+    let mut splits = split::write_splits(folder, &stored, splits)?;
+    viewer::keep_room(&viewers, splits.iter_mut().map(|split| &mut split.viewer));
     let running = running::write_running(folder, &stored, running)?;
     let comparisons = comparisons::comparisons(&stored);
     let model_errors = model_errors(&stored);

@@ -151,20 +151,20 @@ pub fn diverging(x: f64) -> [u8; 3] {
     [0, 1, 2].map(|c| (from[c] + part * (to[c] - from[c])).round() as u8)
 }
 
-/// The linear sRGB of a picture as data for a script, not to be looked at: a PNG of twice its height, without a colour
+/// Linear sRGB, row by row from the top, as data for a script, not to be looked at: a PNG of twice its height, without a colour
 /// profile and without row filters. A value is the upper half of its 32-bit float (sign, 8 bits of exponent, 7 of
 /// mantissa): relative error at most 2^-8, not finite where the value is not, any exposure. The upper rows hold
 /// the first bytes, the lower rows the second ones. An exponent of its own for every channel: one that
 /// three channels share loses the dark ones of saturated colours by several levels of a display.
-pub fn to_linear_png(picture: &Picture) -> Result<Vec<u8>> {
-    let pixels: Vec<[u16; 3]> = picture.rgb().map(|rgb| rgb.map(upper_half)).collect();
+pub fn to_linear_png(width: usize, rgb: impl Iterator<Item = [f64; 3]>) -> Result<Vec<u8>> {
+    let pixels: Vec<[u16; 3]> = rgb.map(|rgb| rgb.map(upper_half)).collect();
     let is_grey = pixels.iter().all(|[r, g, b]| r == g && g == b);
     let (colour, channels) =
         if is_grey { (png::ColorType::Grayscale, 1) } else { (png::ColorType::Rgb, 3) };
     let values = || pixels.iter().flat_map(|pixel| &pixel[..channels]);
     let bytes = |byte: usize| values().map(move |value| value.to_be_bytes()[byte]);
     let data: Vec<u8> = bytes(0).chain(bytes(1)).collect();
-    plane_png(picture.width, 2 * picture.height, colour, &data)
+    plane_png(width, 2 * (pixels.len() / width.max(1)), colour, &data)
 }
 
 /// One byte a pixel, row by row from the top, as data for a script: see [`to_linear_png`].
@@ -292,7 +292,8 @@ mod tests {
     fn linear_png_holds_bytes_by_plane() {
         let stored = sample::stored(0.5);
         let picture = Picture::of(&stored, &stored.record.cells[0].runs[0]).expect("a picture");
-        let (is_srgb, (width, height, data)) = decoded_plane(&to_linear_png(&picture).expect("a PNG"));
+        let (is_srgb, (width, height, data)) =
+            decoded_plane(&to_linear_png(3, picture.rgb()).expect("a PNG"));
         assert_eq!((is_srgb, width, height), (false, 3, 4));
         for (index, rgb) in picture.rgb().enumerate() {
             for (channel, value) in rgb.iter().enumerate() {

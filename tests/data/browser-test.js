@@ -347,8 +347,44 @@
     await key(viewers[0], "0");
   }
 
+  // The grid of both cells: a seam in every tile.
+  async function grids(root) {
+    check(root.querySelector("canvas") === null, "folded, and not built");
+    root.closest("details").open = true;
+    await drawn(root);
+    const viewer = parts(root);
+    check(viewer.mode("split").checked && viewer.canvases().length === 1, "it begins split");
+    const canvas = viewer.canvases()[0];
+    const columns = 2 * width;
+    const shows = (expected, levels, what) => {
+      const image = pixels(canvas);
+      for (let i = 0; i < columns * height; i++) {
+        const [x, y] = [i % columns, Math.floor(i / columns)];
+        const seen = at(image, Math.floor(((x + 0.5) / columns) * image.width), Math.floor(((y + 0.5) / height) * image.height));
+        check(near(seen, expected(i, x), levels), what, { x, y, seen, expected: expected(i, x) });
+      }
+    };
+    shows((i) => TEST.grid.slice(3 * i, 3 * i + 3), 1, "seams in the middle are the picture");
+    const whole = [];
+    for (const flipped of [0, 1]) {
+      viewer.mode("flip").click();
+      await settle();
+      if (flipped) await key(viewer, "f");
+      const image = pixels(canvas);
+      whole.push(Array.from({ length: columns * height }, (_, i) =>
+        at(image, Math.floor((((i % columns) + 0.5) / columns) * image.width),
+          Math.floor(((Math.floor(i / columns) + 0.5) / height) * image.height))));
+    }
+    await key(viewer, "3");
+    pointer(canvas, "pointerdown", 0.5 + 0.25 / 2, 0.5);
+    pointer(canvas, "pointerup", 0.5 + 0.25 / 2, 0.5);
+    await leave(viewer);
+    shows((i, x) => whole[x % width < width / 4 ? 0 : 1][i], 0, "one drag moves every seam");
+  }
+
   async function behaviour() {
     const cells = TEST.cells.map((cell, index) => Object.assign(cell, { index }));
+    const grid = roots.pop();
     for (const root of roots) await drawn(root);
     const viewers = roots.map(parts);
     check(viewers.length === cells.length && cells.length === 2, "a viewer a cell", viewers.length);
@@ -359,6 +395,7 @@
     for (const test of [zooms, pinches, layers, reads, keyboard]) await test(viewers[0], cells[0]);
     await layers(viewers[1], cells[1]);
     await independent(viewers, cells);
+    await grids(grid);
   }
 
   // ---- Looks ----

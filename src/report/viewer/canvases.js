@@ -9,7 +9,7 @@ class Canvases {
     this.data = JSON.parse(root.querySelector("script").textContent);
     this.pictures = this.data.pictures.map((picture) => ({ ...picture, sheet: document.createElement("canvas") }));
     this.cache = new Map();
-    this.state = { mode: "side", layer: "image", band: 0, pair: [0, Math.min(1, this.pictures.length - 1)], isFlipped: false };
+    this.state = { mode: this.data.bands.length === 0 ? "split" : "side", layer: "image", band: 0, pair: [0, Math.min(1, this.pictures.length - 1)], isFlipped: false };
     this.home();
   }
 
@@ -98,16 +98,20 @@ class Canvases {
       context.imageSmoothingEnabled = scale < 1; // a pixel is a square
       const sheet = (index) => context.drawImage(this.pictures[index].sheet, left, top, data.width * scale, data.height * scale);
       if (state.mode === "split" && shown.length > 1) {
-        const seam = Math.round(state.seam * width);
-        [[0, seam], [seam, width - seam]].forEach(([from, length], half) => {
+        // One seam in the view; in a grid one in every tile, which zoom and pan with it.
+        const tile = data.columns > 1 ? { left, width: (data.width * scale) / data.columns } : { left: 0, width };
+        const starts = Array.from({ length: data.columns }, (_, i) => tile.left + i * tile.width);
+        const seams = starts.map((start) => Math.round(start + state.seam * tile.width));
+        shown.forEach((index, half) => {
           context.save();
           context.beginPath();
-          context.rect(from, 0, length, height);
+          starts.forEach((start, i) => half === 0 ? context.rect(start, 0, seams[i] - start, height)
+            : context.rect(seams[i], 0, start + tile.width - seams[i], height));
           context.clip();
-          sheet(shown[half]);
+          sheet(index);
           context.restore();
         });
-        this.line(context, seam, height, ratio);
+        seams.forEach((seam) => this.line(context, seam, height, ratio));
       } else {
         sheet(shown[panel]);
       }

@@ -21,7 +21,8 @@ class Controls extends Canvases {
     });
     this.modes = make("fieldset", { "aria-label": "Arrangement" }, ...modes);
     // A picture alone differs from nothing.
-    const layers = Object.entries(LAYERS).filter(([layer]) => pictures.length > 1 || !["difference", "z"].includes(layer));
+    const layers = Object.entries(LAYERS).filter(([layer]) => layer === "image" || (data.bands.length > 0 &&
+      (pictures.length > 1 || layer === "noise")));
     this.layers = layers.map(([layer]) => layer);
     this.layer = select(Object.fromEntries(layers));
     this.band = select(Object.fromEntries(data.bands.map((name, i) => [i, name])));
@@ -39,6 +40,8 @@ class Controls extends Canvases {
       button("Reset zoom, exposure and seam", "Reset", () => this.reset()));
     this.flip = button("Show the other picture", "Flip", () => this.toggle());
     const labelled = (text, ...parts) => make("label", {}, text, ...parts);
+    this.layerLabel = labelled("Layer", this.layer);
+    this.layerLabel.hidden = layers.length < 2;
     this.bandLabel = labelled("Band", this.band);
     this.pairLabels = [labelled("A", this.pair[0]), labelled("B", this.pair[1])];
     this.exposureLabel = labelled("Exposure", this.exposure, this.stops);
@@ -52,7 +55,7 @@ class Controls extends Canvases {
     this.scale = make("div", { class: "viewer-scale" });
     this.notes = make("div", { class: "viewer-notes" });
     this.root.append(
-      make("div", { class: "viewer-bar" }, this.modes, labelled("Layer", this.layer), this.bandLabel),
+      make("div", { class: "viewer-bar" }, this.modes, this.layerLabel, this.bandLabel),
       make("div", { class: "viewer-bar" }, ...this.pairLabels, this.flip, this.exposureLabel, zoom),
       make("div", { class: "viewer-body" }, make("div", { class: "viewer-panels" }, this.stage, this.seamLabel),
         make("div", { class: "viewer-words" }, this.scale, this.readout, this.notes)),
@@ -192,7 +195,8 @@ class Controls extends Canvases {
       const map = !picture.indices ? "" : this.mapped(picture.indices[at]);
       return make("tr", {}, make("th", { scope: "row" }, picture.name), make("td", {}, cells), make("td", {}, map));
     });
-    const place = make("div", {}, `Pixel x ${cursor.x}, y ${cursor.y}; linear sRGB:`);
+    const isGrid = this.data.bands.length === 0;
+    const place = make("div", {}, `Pixel x ${cursor.x}, y ${cursor.y}; linear sRGB${isGrid ? " over white" : ""}:`);
     this.readout.replaceChildren(place, make("table", {}, ...rows));
   }
 

@@ -22,6 +22,12 @@ pub fn to_html(viewer: &Viewer) -> String {
         cell => format!("Pictures of {}", escape(cell)),
     };
     match &viewer.data {
+        Some(data) if viewer.figures.is_empty() => format!(
+            "<details>\n<summary>The same with seams to move</summary>\n\
+             <div class=\"viewer\" role=\"group\" aria-label=\"{label}\">\n\
+             <script type=\"application/json\">{data}</script>\n<noscript>This needs a script.</noscript>\n</div>\n\
+             </details>\n"
+        ),
         Some(data) => format!(
             "<div class=\"viewer\" role=\"group\" aria-label=\"{label}\">\n\
              <script type=\"application/json\">{data}</script>\n<noscript>{figures}</noscript>\n</div>\n"

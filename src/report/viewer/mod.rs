@@ -29,7 +29,7 @@ const MAPPED: usize = 3;
 pub struct Viewer {
     /// The cell's label; empty without a sweep.
     pub cell: String,
-    /// One tone-mapped PNG an estimator.
+    /// One tone-mapped PNG an estimator; none where the page shows them above.
     pub figures: Vec<FigureBlock>,
     /// What the page's script reads, as JSON; none where the page has no more room.
     pub data: Option<String>,
@@ -40,6 +40,8 @@ struct Data<'a> {
     cell: &'a str,
     width: usize,
     height: usize,
+    /// Tiles a row: each has a seam of its own.
+    columns: usize,
     /// The exposure of the PNG files.
     stops: f64,
     /// Names of the bands that have maps.
@@ -52,7 +54,7 @@ struct Data<'a> {
     pictures: Vec<PictureData<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct PictureData<'a> {
     name: &'a str,
     about: String,
@@ -131,6 +133,7 @@ fn json(stored: &Stored, cell: &Cell) -> Result<String> {
         cell: &cell.label,
         width: first.map_or(0, |p| p.width),
         height: first.map_or(0, |p| p.height),
+        columns: 1,
         stops: stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0),
         bands: bands.iter().map(|band| stored.record.bands[*band].name.as_str()).collect(),
         bands_note,
@@ -139,8 +142,66 @@ fn json(stored: &Stored, cell: &Cell) -> Result<String> {
         noise_range: maps::NOISE_RANGE,
         pictures: pictures?,
     };
-    // A name may hold `</script>`; in JSON `<` may as well be written by its number.
-    Ok(serde_json::to_string(&data).unwrap_or_default().replace('<', "\\u003c"))
+    Ok(data.to_text())
+}
+
+impl Data<'_> {
+    /// A name may hold `</script>`; in JSON `<` may as well be written by its number.
+    fn to_text(&self) -> String {
+        serde_json::to_string(self).unwrap_or_default().replace('<', "\\u003c")
+    }
+}
+
+/// Pictures in a grid, tile beside tile without a gap, as one estimator shows them.
+pub(super) struct Sheet<'a> {
+    /// The estimator.
+    pub name: &'a str,
+    /// Linear sRGB over what is shown as white, row by row from the top.
+    pub rgb: Vec<[f64; 3]>,
+}
+
+/// The viewer of a grid whose pictures stand on the page already: two sheets of one size, so many tiles a row.
+///
+/// # Errors
+/// Sheets without pixels.
+pub(super) fn grid(title: &str, sheets: [Sheet; 2], width: usize, columns: usize) -> Result<Viewer> {
+    let height = sheets[0].rgb.len() / width.max(1);
+    let picture =
+        |sheet: &Sheet<'_>| Ok(base64::encode(&to_linear_png(width, sheet.rgb.iter().copied())?));
+    let [a, b] = &sheets;
+    let linear = [picture(a)?, picture(b)?];
+    let pictures = [a, b].into_iter().zip(linear).map(|(sheet, linear)| PictureData {
+        name: sheet.name,
+        about: "exposed as in the picture above".into(),
+        linear,
+        ..PictureData::default()
+    });
+    let data = Data {
+        cell: title,
+        width,
+        height,
+        columns,
+        stops: 0.0,
+        bands: Vec::new(),
+        bands_note: String::new(),
+        limit: 1.0,
+        z_limit: maps::Z_LIMIT,
+        noise_range: maps::NOISE_RANGE,
+        pictures: pictures.collect(),
+    };
+    Ok(Viewer { cell: title.into(), figures: Vec::new(), data: Some(data.to_text()) })
+}
+
+/// Takes the data off viewers that come when the page's room is spent.
+pub(super) fn keep_room<'a>(first: &[Viewer], more: impl Iterator<Item = &'a mut Viewer>) {
+    let size = |viewer: &Viewer| viewer.data.as_ref().map_or(0, String::len);
+    let mut used: usize = first.iter().map(size).sum();
+    for viewer in more {
+        used += size(viewer);
+        if used > ROOM {
+            viewer.data = None;
+        }
+    }
 }
 
 /// The bands that have maps, and a note where that is not all of them.
@@ -203,7 +264,7 @@ fn picture<'a>(
     Ok(PictureData {
         name: &run.estimator,
         about: about(run),
-        linear: base64::encode(&to_linear_png(&picture)?),
+        linear: base64::encode(&to_linear_png(picture.width, picture.rgb())?),
         noise: bands.iter().map(noise).collect::<Result<_>>()?,
         difference: other(shots, index).map_or(Ok(None), difference)?,
         z: same_integral(shots, index).map_or(Ok(None), z)?,

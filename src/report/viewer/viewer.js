@@ -63,7 +63,7 @@ class Viewer extends Controls {
     const acts = {
       f: () => this.toggle(), " ": () => this.toggle(),
       l: () => this.set({ layer: next(this.layers, state.layer) }),
-      n: () => this.set({ band: (state.band + 1) % data.bands.length }),
+      n: () => this.set({ band: (state.band + 1) % Math.max(1, data.bands.length) }),
       b: () => this.set({ exposure: Math.min(REACH, state.exposure + 0.5) }),
       d: () => this.set({ exposure: Math.max(-REACH, state.exposure - 0.5) }),
       "+": () => this.zoom(2, true), "=": () => this.zoom(2, true), "-": () => this.zoom(0.5, true),
@@ -153,8 +153,10 @@ class Viewer extends Controls {
 
   drag(event) {
     if (this.state.mode !== "split" || this.pointers.size > 1 || event.shiftKey) return;
+    const { width, columns } = this.data;
     const box = event.target.getBoundingClientRect();
-    this.slide((event.clientX - box.left) / box.width);
+    const tile = (this.place(event).x / width) * columns;
+    this.slide(columns > 1 ? tile - Math.floor(tile) : (event.clientX - box.left) / box.width);
   }
 
   read(event) {
