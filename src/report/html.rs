@@ -3,6 +3,7 @@
 use super::base64;
 use super::document::{Block, Document, FigureBlock, Picture, TableBlock};
 use super::latex::to_latex;
+use super::viewer;
 
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -15,11 +16,12 @@ pub fn to_html(page: &Document) -> String {
     let title = escape(&page.title);
     let body: String = page.blocks.iter().map(block).collect();
     let contents = contents(page);
+    let (style, script) = viewer::parts(&page.blocks);
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{contents}{body}\
-         <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
+         <title>{title}</title>\n<style>\n{STYLE}{style}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{contents}{body}\
+         <script>\n{SCRIPT}</script>\n{script}</body>\n</html>\n"
     )
 }
 
@@ -55,7 +57,7 @@ fn block(of: &Block) -> String {
         }
         Block::Code(code) => format!("<pre tabindex=\"0\">{}</pre>\n", escape(code)),
         Block::Table(t) => table(t),
-        Block::Viewer(viewer) => figures(&viewer.figures),
+        Block::Viewer(viewer) => viewer::to_html(viewer),
         Block::Folded(title, blocks) => {
             let inner: String = blocks.iter().map(block).collect();
             format!("<details>\n<summary>{}</summary>\n{inner}</details>\n", escape(title))

@@ -65,6 +65,8 @@ pub struct Material {
     pub model_errors: Vec<ModelError>,
     /// The pictures, in the order of cells and estimators.
     pub figures: Vec<Figure>,
+    /// The same by cell, to be compared.
+    pub viewers: Vec<viewer::Viewer>,
     /// Grids of split pictures.
     pub splits: Vec<split::SplitFigure>,
     /// Plots.
@@ -101,9 +103,11 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     let (timing, provenance) = (folder.read_timing()?, folder.read_provenance()?);
     let rows = measurements(&stored, timing.as_ref());
     let figures = write_figures(folder, &stored)?;
+    let viewers = viewer::viewers(&stored, &figures)?;
     let stored = Stored { timing: timing.clone(), ..stored };
     let wanted = folder.read_pictures()?;
-    let splits = split::write_splits(folder, &stored, &split::wanted(&wanted))?;
+    let mut splits = split::write_splits(folder, &stored, &split::wanted(&wanted))?;
+    viewer::keep_room(&viewers, splits.iter_mut().map(|split| &mut split.viewer));
     let comparisons = comparisons::comparisons(&stored);
     let model_errors = model_errors(&stored);
     let plots = plots::sections(&stored, &comparisons, &wanted);
@@ -118,6 +122,7 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
         comparisons,
         model_errors,
         figures,
+        viewers,
         splits,
         plots,
     };
@@ -254,7 +259,8 @@ mod tests {
             "does &lt;not&gt;",
             "wrong_side",
             "cannot sample x",
-            "data:image/png;base64,iVBOR",
+            "\"linear\":\"iVBOR",
+            "src=\"images/000-mis.png\"",
             "class=\"fail\"",
         ];
         wanted.iter().for_each(|w| assert!(html.contains(w), "{w}"));

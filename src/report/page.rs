@@ -2,7 +2,7 @@
 //! it cost, and how to make it again.
 
 use super::Material;
-use super::document::{Block, Document, FigureBlock, Picture, TableBlock};
+use super::document::{Block, Document, TableBlock};
 use super::number::significant;
 use super::plots::Section;
 use super::summary;
@@ -10,7 +10,6 @@ use super::table::Table;
 use super::tables::{
     claim_table, comparison_table, measurement_table, model_error_table, verdict_table,
 };
-use super::viewer::Viewer;
 use crate::results::json::canonical;
 use crate::results::measurements::Measurement;
 use crate::results::record::CostMeasure;
@@ -161,14 +160,8 @@ fn samplers(material: &Material) -> Vec<Block> {
 
 /// The pictures of every cell.
 fn pictures(material: &Material) -> Vec<Block> {
-    let mut blocks = Vec::new();
-    for cell in &material.stored.record.cells {
-        let figures = material.figures.iter().filter(|figure| figure.cell == cell.label);
-        let figures: Vec<FigureBlock> = figures.map(figure_block).collect();
-        if !figures.is_empty() {
-            blocks.push(Block::Viewer(Viewer { cell: cell.label.clone(), figures }));
-        }
-    }
+    let viewers = material.viewers.iter().cloned().map(Block::Viewer);
+    let mut blocks: Vec<Block> = viewers.collect();
     if !blocks.is_empty() {
         blocks.insert(0, heading("Pictures"));
     }
@@ -194,15 +187,6 @@ fn measured(material: &Material) -> Vec<Block> {
         blocks.extend(folded_if(is_long, title, vec![table]));
     }
     blocks
-}
-
-fn figure_block(figure: &super::Figure) -> FigureBlock {
-    FigureBlock {
-        path: format!("{}.png", figure.stem),
-        picture: Picture::Png(figure.png.clone()),
-        title: figure.estimator.clone(),
-        caption: figure.caption.clone(),
-    }
 }
 
 fn model_errors(material: &Material) -> Vec<Block> {

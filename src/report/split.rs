@@ -5,6 +5,7 @@
 use super::document::{self, Block, Document, FigureBlock, TableBlock};
 use super::number::significant;
 use super::table::Table;
+use super::viewer::{self, Viewer};
 use crate::error::Result;
 use crate::results::canvas::{Canvas, Unshown};
 use crate::results::image::{Picture, gain};
@@ -37,6 +38,8 @@ pub struct SplitFigure {
     pub caption: String,
     /// A row for each cell.
     pub table: Table,
+    /// The whole pictures of both, with seams to move.
+    pub viewer: Viewer,
 }
 
 /// The grids that are asked for.
@@ -81,14 +84,14 @@ pub(super) fn blocks(figures: &[SplitFigure]) -> Vec<Block> {
 }
 
 impl SplitFigure {
-    fn blocks(&self) -> [Block; 2] {
+    fn blocks(&self) -> [Block; 3] {
         let figure = FigureBlock {
             path: format!("{}.png", self.stem),
             picture: document::Picture::Png(self.png.clone()),
             title: self.title.clone(),
             caption: self.caption.clone(),
         };
-        [Block::Wide(figure), self.times()]
+        [Block::Wide(figure), Block::Viewer(self.viewer.clone()), self.times()]
     }
 
     fn times(&self) -> Block {
@@ -210,7 +213,31 @@ impl<'a> Grid<'a> {
             title += &format!(", {others}");
         }
         let (caption, table) = (self.caption(), self.table(&unshown));
-        Ok(SplitFigure { stem: stem.into(), title, png, caption, table })
+        let viewer = self.viewer(&title)?;
+        Ok(SplitFigure { stem: stem.into(), title, png, caption, table, viewer })
+    }
+
+    fn viewer(&self, title: &str) -> Result<Viewer> {
+        let columns = self.columns.len();
+        let sheets = [(0, &self.split.left), (1, &self.split.right)];
+        let sheets = sheets.map(|(half, name)| viewer::Sheet { name, rgb: self.sheet(half) });
+        viewer::grid(title, sheets, columns * self.size.0, columns)
+    }
+
+    /// The whole pictures of one side, over their whites, tile beside tile; black where there is none.
+    fn sheet(&self, half: usize) -> Vec<[f64; 3]> {
+        let (width, height) = self.size;
+        let row_length = self.columns.len() * width;
+        let mut rgb = vec![[0.0; 3]; row_length * self.rows.len() * height];
+        for pair in &self.pairs {
+            let Some(picture) = pair.halves[half].picture else { continue };
+            let first = pair.at.0 * height * row_length + pair.at.1 * width;
+            for (index, pixel) in picture.rgb().enumerate() {
+                let at = first + index / picture.width * row_length + index % picture.width;
+                rgb[at] = pixel.map(|c| c / pair.white);
+            }
+        }
+        rgb
     }
 
     /// The left columns of the left half's estimator, the right ones of the other's.

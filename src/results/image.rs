@@ -141,7 +141,7 @@ pub fn write_diverging_png(path: &Path, width: usize, values: &[f64], limit: f64
 
 /// From -1 (blue) over 0 (white) to 1 (red), sRGB values: linear between the end and middle colours of
 /// C. Brewer's scheme RdBu.
-fn diverging(x: f64) -> [u8; 3] {
+pub fn diverging(x: f64) -> [u8; 3] {
     if x.is_nan() {
         return [128; 3];
     }
@@ -154,6 +154,51 @@ fn diverging(x: f64) -> [u8; 3] {
     let at = 2.0 * x.abs().min(1.0);
     let (from, to, part) = if at < 1.0 { (WHITE, half, at) } else { (half, end, at - 1.0) };
     [0, 1, 2].map(|c| (from[c] + part * (to[c] - from[c])).round() as u8)
+}
+
+/// Linear sRGB, row by row from the top, as data for a script, not to be looked at: a PNG of twice its height, without a colour
+/// profile and without row filters. A value is the upper half of its 32-bit float (sign, 8 bits of exponent, 7 of
+/// mantissa): relative error at most 2^-8, not finite where the value is not, any exposure. The upper rows hold
+/// the first bytes, the lower rows the second ones. An exponent of its own for every channel: one that
+/// three channels share loses the dark ones of saturated colours by several levels of a display.
+pub fn to_linear_png(width: usize, rgb: impl Iterator<Item = [f64; 3]>) -> Result<Vec<u8>> {
+    let pixels: Vec<[u16; 3]> = rgb.map(|rgb| rgb.map(upper_half)).collect();
+    let is_grey = pixels.iter().all(|[r, g, b]| r == g && g == b);
+    let (colour, channels) =
+        if is_grey { (png::ColorType::Grayscale, 1) } else { (png::ColorType::Rgb, 3) };
+    let values = || pixels.iter().flat_map(|pixel| &pixel[..channels]);
+    let bytes = |byte: usize| values().map(move |value| value.to_be_bytes()[byte]);
+    let data: Vec<u8> = bytes(0).chain(bytes(1)).collect();
+    plane_png(width, 2 * (pixels.len() / width.max(1)), colour, &data)
+}
+
+/// One byte a pixel, row by row from the top, as data for a script: see [`to_linear_png`].
+pub fn to_byte_png(width: usize, bytes: &[u8]) -> Result<Vec<u8>> {
+    plane_png(width, bytes.len() / width.max(1), png::ColorType::Grayscale, bytes)
+}
+
+/// The upper 16 bits of the nearest 32-bit float, rounded.
+fn upper_half(x: f64) -> u16 {
+    let bits = (x as f32).to_bits();
+    if x.is_nan() { 0x7fc0 } else { ((bits + 0x7fff + (bits >> 16 & 1)) >> 16) as u16 }
+}
+
+fn plane_png(width: usize, height: usize, colour: png::ColorType, data: &[u8]) -> Result<Vec<u8>> {
+    let encoded = || {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
+        encoder.set_color(colour);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::Balanced);
+        encoder.set_filter(png::Filter::NoFilter);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(data)?;
+        writer.finish()?;
+        Ok(bytes)
+    };
+    encoded().map_err(|e: png::EncodingError| {
+        Error::input(format!("data of an image of {width}x{height} pixels: {e}"))
+    })
 }
 
 fn encode(width: usize, height: usize, data: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
@@ -176,12 +221,20 @@ fn srgb_transfer(x: f64) -> f64 {
 /// Width, height and values of a PNG file, which says that they are sRGB.
 #[cfg(test)]
 pub(crate) fn decoded(bytes: &[u8]) -> (usize, usize, Vec<u8>) {
+    let (is_srgb, decoded) = decoded_plane(bytes);
+    assert!(is_srgb);
+    decoded
+}
+
+/// The same of any PNG file, and whether it says that they are sRGB.
+#[cfg(test)]
+pub(crate) fn decoded_plane(bytes: &[u8]) -> (bool, (usize, usize, Vec<u8>)) {
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().expect("a PNG");
-    assert!(reader.info().srgb.is_some());
+    let is_srgb = reader.info().srgb.is_some();
     let (width, height) = reader.info().size();
     let mut data = vec![0; reader.output_buffer_size().expect("a size")];
     reader.next_frame(&mut data).expect("a frame");
-    (width as usize, height as usize, data)
+    (is_srgb, (width as usize, height as usize, data))
 }
 
 #[cfg(test)]
@@ -223,5 +276,48 @@ mod tests {
         let png = to_png(&picture, 1.0).expect("a PNG");
         assert_eq!((png.clipped, png.out_of_gamut), (3, 1));
         assert_eq!(decoded(&png.bytes).2[..6], [188, 118, 0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn linear_values_come_back() {
+        let mut x = 1e-30;
+        while x < 1e30 {
+            for value in [x, -x] {
+                let back = f64::from(f32::from_bits(u32::from(upper_half(value)) << 16));
+                assert!((back / value - 1.0).abs() <= 1.0 / 256.0, "{value} {back}");
+            }
+            x *= 1.001;
+        }
+        let values = [0.0, 1.0, 2.0, -1.5, f64::INFINITY, f64::NAN, 1e300];
+        let halves = [0, 0x3f80, 0x4000, 0xbfc0, 0x7f80, 0x7fc0, 0x7f80];
+        assert_eq!(values.map(upper_half), halves);
+    }
+
+    #[test]
+    fn linear_png_holds_bytes_by_plane() {
+        let stored = sample::stored(0.5);
+        let picture = Picture::of(&stored, &stored.record.cells[0].runs[0]).expect("a picture");
+        let (is_srgb, (width, height, data)) =
+            decoded_plane(&to_linear_png(3, picture.rgb()).expect("a PNG"));
+        assert_eq!((is_srgb, width, height), (false, 3, 4));
+        for (index, rgb) in picture.rgb().enumerate() {
+            for (channel, value) in rgb.iter().enumerate() {
+                let at = 3 * index + channel;
+                assert_eq!([data[at], data[18 + at]], upper_half(*value).to_be_bytes());
+            }
+        }
+        let bytes = [3, 1, 4, 1, 5, 9];
+        assert_eq!(decoded_plane(&to_byte_png(3, &bytes).expect("a PNG")).1, (3, 2, bytes.to_vec()));
+    }
+
+    #[test]
+    fn default_exposure_is_the_picture_to_a_level() {
+        let mut x = 1e-5;
+        while x < 1.5 {
+            let back = f64::from(f32::from_bits(u32::from(upper_half(x)) << 16));
+            let [a, b] = [x, back].map(|x| i32::from(show([x; 3], 1.0).bytes[0]));
+            assert!((a - b).abs() <= 1, "{x}: {a} {b}");
+            x *= 1.0007;
+        }
     }
 }

@@ -1,0 +1,74 @@
+//! The viewer in HTML: data for the script, and the pictures beside the page for a reader without it.
+
+use super::super::document::{Block, FigureBlock};
+use super::super::html::escape;
+use super::{Viewer, maps};
+
+const STYLE: &str = include_str!("viewer.css");
+/// In the order in which each uses the ones before it.
+const SCRIPTS: [&str; 4] = [
+    include_str!("values.js"),
+    include_str!("canvases.js"),
+    include_str!("controls.js"),
+    include_str!("viewer.js"),
+];
+
+/// A viewer's place on the page.
+pub fn to_html(viewer: &Viewer) -> String {
+    let figures: String = viewer.figures.iter().map(figure).collect();
+    let figures = format!("<div class=\"figures\">\n{figures}</div>");
+    let label = match viewer.cell.as_str() {
+        "" => "Pictures".to_string(),
+        cell => format!("Pictures of {}", escape(cell)),
+    };
+    match &viewer.data {
+        Some(data) if viewer.figures.is_empty() => format!(
+            "<details>\n<summary>The same with seams to move</summary>\n\
+             <div class=\"viewer\" role=\"group\" aria-label=\"{label}\">\n\
+             <script type=\"application/json\">{data}</script>\n<noscript>This needs a script.</noscript>\n</div>\n\
+             </details>\n"
+        ),
+        Some(data) => format!(
+            "<div class=\"viewer\" role=\"group\" aria-label=\"{label}\">\n\
+             <script type=\"application/json\">{data}</script>\n<noscript>{figures}</noscript>\n</div>\n"
+        ),
+        None => format!(
+            "<p class=\"viewer-left-out\">The page has no room for more pictures that a script can compare. These \
+             stand beside it, with EXR files of all values.</p>\n{figures}\n"
+        ),
+    }
+}
+
+/// What a page with viewers needs once: a style for its head, and a script for its end.
+pub fn parts(blocks: &[Block]) -> (String, String) {
+    if !blocks.iter().any(has_viewer) {
+        return Default::default();
+    }
+    let [noise, signed] = maps::palettes();
+    let scripts = SCRIPTS.join("\n");
+    // One function around all, so that nothing of it is global.
+    let script = format!(
+        "<script type=\"application/json\" id=\"viewer-palettes\">{{\"noise\":\"{noise}\",\"signed\":\"{signed}\"}}\
+         </script>\n<script>\n\"use strict\";\n(() => {{\n{scripts}}})();\n</script>\n"
+    );
+    (STYLE.into(), script)
+}
+
+fn has_viewer(block: &Block) -> bool {
+    match block {
+        Block::Viewer(_) => true,
+        Block::Folded(_, blocks) => blocks.iter().any(has_viewer),
+        _ => false,
+    }
+}
+
+/// A picture by its file: the page holds its values already.
+fn figure(f: &FigureBlock) -> String {
+    let (title, caption) = (escape(&f.title), escape(&f.caption));
+    let path =
+        escape(&f.path.replace('%', "%25").replace(' ', "%20").replace('#', "%23").replace('?', "%3f"));
+    format!(
+        "<figure><img alt=\"{title}\" loading=\"lazy\" src=\"{path}\"><figcaption><b>{title}</b><br>{caption}\
+         </figcaption></figure>\n"
+    )
+}
