@@ -213,10 +213,14 @@ fn efficiency(material: &Material) -> Vec<Block> {
                 it or a single pass may make it.";
     let table = named("efficiency-by-class", comparison_table(&material.comparisons));
     let mut blocks = vec![heading("Efficiency")];
-    for cost in [CostMeasure::Cpu, CostMeasure::Counters] {
-        blocks.extend(
-            summary::efficiency(&material.stored, &material.comparisons, cost).map(Block::Table),
-        );
+    let by = |cost| summary::efficiency(&material.stored, &material.comparisons, cost).map(Block::Table);
+    match (by(CostMeasure::Cpu), by(CostMeasure::Counters)) {
+        (Some(cpu), counters) => {
+            blocks.push(cpu);
+            let folded = |table| Block::Folded("The same by counted work".into(), vec![table]);
+            blocks.extend(counters.map(folded));
+        }
+        (None, counters) => blocks.extend(counters),
     }
     let title = "By transport class, by counted work and by CPU time, with reasons";
     blocks.push(Block::Folded(title.into(), vec![Block::Text(text.into()), table]));

@@ -65,7 +65,7 @@ pub fn efficiency(stored: &Stored, rows: &[Row], cost: CostMeasure) -> Option<Ta
         caption += " An asterisk: not resolved, more passes may move the ratio out of its interval.";
     }
     if rows.iter().any(|row| row.efficiency_ratio.is_nan()) {
-        caption += " \"none\": no ratio, for the reason that comparisons.csv gives.";
+        caption += " Where there is none, comparisons.csv has the whole reason.";
     }
     let file = if quoted.cost == CostMeasure::Cpu { "efficiency" } else { "efficiency-counters" };
     Some(TableBlock::new(file, caption, table))
@@ -73,7 +73,8 @@ pub fn efficiency(stored: &Stored, rows: &[Row], cost: CostMeasure) -> Option<Ta
 
 fn ratio(row: &Row) -> String {
     if row.efficiency_ratio.is_nan() {
-        return "none".into();
+        let reason = row.note.strip_prefix("no mean test: ").unwrap_or(&row.note);
+        return format!("none: {}", reason.split([':', ',']).next().unwrap_or_default());
     }
     let number = |x: f64| significant(x, 3);
     let star = if row.resolved { "" } else { "*" };
@@ -211,7 +212,7 @@ mod tests {
         });
         let rows = comparisons(&stored);
         let block = efficiency(&stored, &rows, CostMeasure::Counters).expect("a table");
-        assert_eq!(block.table.rows[0][1], "none");
-        assert!(block.caption.contains("\"none\""));
+        assert_eq!(block.table.rows[0][1], "none: the means differ");
+        assert!(block.caption.contains("whole reason"));
     }
 }
