@@ -12,5 +12,6 @@ mod looks;
 mod pictures;
 mod reproducibility;
 mod samplers;
+mod tev;
 mod tokens;
 mod work;

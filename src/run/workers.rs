@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 use super::checkpoint;
 use super::interrupt::Interrupt;
 use super::job::{Block, Finished, Job, Origin};
+use super::live::Show;
 use super::pilot;
 use super::progress::Progress;
 use crate::error::{Error, Result};
@@ -36,6 +37,8 @@ pub struct Settings<'a> {
     pub root: &'a Path,
     /// Shows how far it is.
     pub progress: &'a Progress,
+    /// Shows images as they are made.
+    pub show: Option<Show<'a>>,
 }
 
 /// Wall time that a block should take, seconds.
@@ -272,6 +275,8 @@ struct Collector<'a> {
     settings: &'a Settings<'a>,
     finished: BTreeMap<usize, Finished>,
     running: BTreeMap<usize, Running>,
+    /// Jobs whose last image found no place on its way to the viewer.
+    owed: Vec<usize>,
 }
 
 struct Running {
@@ -286,7 +291,8 @@ struct Running {
 
 impl<'a> Collector<'a> {
     fn new(jobs: &'a [Job], settings: &'a Settings<'a>) -> Collector<'a> {
-        Collector { jobs, settings, finished: BTreeMap::new(), running: BTreeMap::new() }
+        let (finished, running, owed) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
+        Collector { jobs, settings, finished, running, owed }
     }
 
     fn collect(mut self, receiver: mpsc::Receiver<Message>) -> Result<Vec<Finished>> {
@@ -301,14 +307,21 @@ impl<'a> Collector<'a> {
                 }
                 Message::Played { job, block } => {
                     self.take(job, *block)?;
+                    if let (Some(show), Some(running)) = (self.settings.show, self.running.get(&job)) {
+                        show.under_way(job, &running.done);
+                    }
                     job
                 }
             };
             self.close_if_done(job)?;
-            self.show(job);
+            self.progress(job);
         }
         if self.finished.len() == self.jobs.len() {
-            return Ok(self.finished.into_values().collect());
+            let finished: Vec<Finished> = self.finished.into_values().collect();
+            let slow = self.settings.show.and_then(|show| show.close(&self.owed, &finished));
+            let gone = self.settings.show.and_then(|show| show.live.complaint());
+            slow.iter().chain(&gone).for_each(|what| self.settings.progress.say(what));
+            return Ok(finished);
         }
         for (&job, running) in &self.running {
             self.save(job, &running.done)?;
@@ -343,7 +356,11 @@ impl<'a> Collector<'a> {
             if running.done.next_pass() > running.on_disk {
                 self.save(job, &running.done)?;
             }
-            self.finished.insert(job, running.done.finish());
+            let finished = running.done.finish();
+            if self.settings.show.is_some_and(|show| !show.done(job, &finished)) {
+                self.owed.push(job);
+            }
+            self.finished.insert(job, finished);
         }
         Ok(())
     }
@@ -353,7 +370,10 @@ impl<'a> Collector<'a> {
         checkpoint::save(&checkpoint::path(self.settings.root, identity), identity, block)
     }
 
-    fn show(&self, job: usize) {
+    fn progress(&self, job: usize) {
+        if let Some(gone) = self.settings.show.and_then(|show| show.live.complaint()) {
+            self.settings.progress.say(&gone);
+        }
         let share = |r: &Running| r.done.next_pass() as f64 / r.passes as f64;
         let under_way: f64 = self.running.values().map(share).sum();
         let message = match self.running.get(&job) {
