@@ -12,7 +12,7 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 12] = [
+const PAGES: [&str; 13] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
@@ -21,6 +21,7 @@ const PAGES: [&str; 12] = [
     "docs/experiment-file.md",
     "docs/judging-other-renderers.md",
     "docs/limits.md",
+    "docs/live-view.md",
     "docs/subdivision.md",
     "examples/ci-gate/README.md",
     "results/README.md",
