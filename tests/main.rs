@@ -9,6 +9,7 @@ mod interruption;
 mod judging;
 mod layering;
 mod looks;
+mod own_estimator;
 mod pictures;
 mod reproducibility;
 mod samplers;
