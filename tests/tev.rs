@@ -265,7 +265,7 @@ fn images_change_while_they_are_made() {
     assert!(rows[0] != rows[1] && rows[1] != rows[2], "{rows:?}");
     assert!(rows.iter().flatten().all(|x| x.is_finite()));
     assert!(rows.len() as f64 <= 3.0 + 2.0 * seconds, "{} images in {seconds} s", rows.len());
-    // Half of the work was resumed: the fresh viewer sees it grow, too.
+    // Going on from the state that was kept, it is shown from there on.
     let viewer = Viewer::start();
     let mut started = work.start(&format!("run x.toml -q --tev {}", viewer.address));
     started.wait_until("an image was seen", || viewer.shown().images.contains_key("x/base/mis"));
@@ -307,7 +307,7 @@ fn nobody_there_costs_nothing() {
 
 /// An image of more bytes than the system keeps for a connection, quickly made.
 fn large() -> String {
-    let text = edit(SENSOR, &SENSOR.replace("[12, 12]", "[700, 600]"));
+    let text = edit(SENSOR, &SENSOR.replace("[12, 12]", "[600, 500]"));
     let text = replaced(&text, "albedo = [0.9, 0.8, 0.7]", "albedo = 0.1");
     replaced(&text, "budget.passes = 100", "budget.passes = 2")
 }

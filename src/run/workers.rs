@@ -306,8 +306,9 @@ impl<'a> Collector<'a> {
                     job
                 }
                 Message::Played { job, block } => {
-                    self.take(job, *block)?;
-                    if let (Some(show), Some(running)) = (self.settings.show, self.running.get(&job)) {
+                    let has_grown = self.take(job, *block)?;
+                    let running = self.running.get(&job).filter(|_| has_grown);
+                    if let (Some(show), Some(running)) = (self.settings.show, running) {
                         show.under_way(job, &running.done);
                     }
                     job
@@ -335,18 +336,21 @@ impl<'a> Collector<'a> {
         )))
     }
 
-    fn take(&mut self, job: usize, block: Block) -> Result<()> {
-        let Some(running) = self.running.get_mut(&job) else { return Ok(()) };
+    /// Takes a block; whether passes were appended, of this or of earlier ones that waited for it.
+    fn take(&mut self, job: usize, block: Block) -> Result<bool> {
+        let Some(running) = self.running.get_mut(&job) else { return Ok(false) };
+        let before = running.done.next_pass();
         running.early.insert(block.gates.start(), block);
         while let Some(next) = running.early.remove(&running.done.next_pass()) {
             running.done.append(next);
         }
+        let has_grown = running.done.next_pass() > before;
         if running.saved.elapsed() > CHECKPOINT_EVERY {
             running.saved = Instant::now();
             let running = &self.running[&job];
             self.save(job, &running.done)?;
         }
-        Ok(())
+        Ok(has_grown)
     }
 
     fn close_if_done(&mut self, job: usize) -> Result<()> {
