@@ -38,10 +38,7 @@ mod tests {
             run(&Args { shell }, command.clone(), "own-program", &mut out).expect("it prints");
             let script = String::from_utf8(out).expect("it is text");
             assert!(script.contains("check") && script.contains("setting"), "{shell}");
-            assert!(
-                script.contains("own-program") && !script.contains("scatterproof"),
-                "{shell}: {script}"
-            );
+            assert!(script.contains("own-program"), "{shell}: {script}");
         }
     }
 }
