@@ -1,7 +1,7 @@
 //! The pages for people: what they show is accepted, what they claim holds, what they point at exists.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use scatterproof::results::exr_file::write_exr;
 use scatterproof::results::image::Picture;
@@ -12,7 +12,7 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 16] = [
+const PAGES: [&str; 19] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
@@ -25,31 +25,34 @@ const PAGES: [&str; 16] = [
     "docs/results.md",
     "docs/judging-other-renderers.md",
     "docs/limits.md",
+    "docs/live-view.md",
+    "docs/own-estimator.md",
     "docs/subdivision.md",
     "examples/ci-gate/README.md",
+    "examples/own-estimator/README.md",
     "results/README.md",
     "scripts/README.md",
 ];
 
-fn package() -> &'static Path {
+pub fn package() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn text(path: &str) -> String {
+pub fn text(path: &str) -> String {
     fs::read_to_string(package().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
 /// A fenced block of a page.
 #[derive(Debug)]
-struct Block<'a> {
+pub struct Block<'a> {
     /// What stands behind the opening fence.
-    tag: &'a str,
+    pub tag: &'a str,
     /// The lines between the fences, numbered as in the page.
-    lines: Vec<(usize, &'a str)>,
+    pub lines: Vec<(usize, &'a str)>,
 }
 
 impl Block<'_> {
-    fn text(&self) -> String {
+    pub fn text(&self) -> String {
         self.lines.iter().map(|(_, line)| format!("{line}\n")).collect()
     }
 
@@ -75,7 +78,7 @@ fn split(page: &str) -> (Vec<Block<'_>>, String) {
 }
 
 /// The blocks of a language.
-fn blocks<'a>(page: &'a str, language: &str) -> Vec<Block<'a>> {
+pub fn blocks<'a>(page: &'a str, language: &str) -> Vec<Block<'a>> {
     split(page).0.into_iter().filter(|block| block.is(language)).collect()
 }
 
@@ -176,7 +179,7 @@ fn every_snippet_is_accepted() {
     let (_, errors) = refused(&text("docs/bssrdf.md"));
     assert!(errors.is_empty(), "snippets of docs/bssrdf.md, by their line: {errors}");
     let with_toml = PAGES.into_iter().filter(|page| !blocks(&text(page), "toml").is_empty());
-    let judged = ["README.md", "CONTRIBUTING.md", "docs/bssrdf.md", "docs/experiment-file.md"];
+    let judged = ["README.md", "docs/bssrdf.md", "docs/experiment-file.md", "docs/own-estimator.md"];
     assert_eq!(with_toml.collect::<Vec<_>>(), judged, "each page with TOML needs a test of it");
 }
 
@@ -255,7 +258,7 @@ fn every_relative_link_points_to_a_file() {
 }
 
 /// The commands of a page, from code in its prose and from blocks: line and what follows `scatterproof`.
-fn commands(page: &str) -> Vec<(usize, String)> {
+pub fn commands(page: &str) -> Vec<(usize, String)> {
     let (blocks, prose) = split(page);
     let spans = pieces(&prose).into_iter().skip(1).step_by(2);
     let spans = spans.map(|(line, span)| (line, span.replace('\n', " ")));
@@ -264,7 +267,8 @@ fn commands(page: &str) -> Vec<(usize, String)> {
     let mut found = Vec::new();
     for (line, code) in spans.chain(in_blocks) {
         let code = code.trim_start_matches([' ', '#']);
-        let own = code.strip_prefix("scatterproof ");
+        // A dependency in a Cargo.toml is none.
+        let own = code.strip_prefix("scatterproof ").filter(|rest| !rest.starts_with('='));
         let cargo = || code.strip_prefix("cargo run ")?.split_once("-- ").map(|(_, rest)| rest);
         let comment = code.find("# scatterproof ").map(|at| &code[at + "# scatterproof ".len()..]);
         let Some(command) = own.or_else(cargo).or(comment) else { continue };
@@ -302,7 +306,7 @@ fn wrong(work: &Work, command: &str) -> Option<String> {
     if !folder.join(file).is_file() {
         return Some(format!("no file {file}"));
     }
-    // Of the ballistic example the program at hand knows nothing.
+    // Of the estimator of one's own the program at hand knows nothing.
     let overrides_only = rest.iter().filter(is_flag).all(|flag| ["--set", "--setting"].contains(flag));
     if !overrides_only || file.starts_with("examples/") {
         return None;
@@ -368,43 +372,4 @@ fn every_command_exists() {
         assert!(found.contains(words), "not found: {words}\n{found}");
     }
     assert_eq!(found.lines().count(), 6, "{found}");
-}
-
-/// The program of `examples/ballistic.rs`, which `cargo test` builds beside the tests where it is asked
-/// for no test by name.
-fn ballistic() -> PathBuf {
-    let test = std::env::current_exe().expect("the test's own path");
-    let profile = test.ancestors().nth(2).expect("the profile's folder");
-    let program = profile.join("examples").join(format!("ballistic{}", std::env::consts::EXE_SUFFIX));
-    let changed = |path: &Path| fs::metadata(path).and_then(|about| about.modified()).ok();
-    let is_built = changed(&program) > changed(&package().join("examples/ballistic.rs"));
-    let help = "build it as the tests are, `cargo build --release --example ballistic`";
-    assert!(is_built, "{} is not there, or older than its source: {help}", program.display());
-    program
-}
-
-#[test]
-fn the_example_estimator_is_quoted_and_works() {
-    let page = text("CONTRIBUTING.md");
-    let source = text("examples/ballistic.rs");
-    let quoted = blocks(&page, "rust");
-    assert!(quoted.len() >= 2, "the estimator and its registry entry");
-    for block in quoted {
-        let line = block.lines[0].0;
-        assert!(source.contains(&block.text()), "CONTRIBUTING.md:{line}: not in examples/ballistic.rs");
-    }
-    let experiment = only_block(&page, "toml");
-    assert_eq!(experiment, text("examples/ballistic.toml"), "CONTRIBUTING.md, examples/ballistic.toml");
-
-    let work = Work::new();
-    work.write("ballistic.toml", &experiment);
-    let run = |arguments: &str| work.run_program(&ballistic(), arguments);
-    let ran = run("list estimators");
-    ran.exits(0).says("\nballistic  light straight through a matched body").says("path  ");
-    run("verify ballistic.toml -q").exits(0).says("1 of 1 verdicts are green");
-    let ran = run("check ballistic.toml --set estimator.1.ballistic.x=1");
-    ran.exits(2).complains("unknown key `x`");
-    let ran = run("plan ballistic.toml --dry --set object.boundary={smooth={eta=1.3}}");
-    ran.exits(2).complains("ballistic needs a matched boundary");
-    work.run("check ballistic.toml").exits(2).complains("unknown k").complains("`ballistic`");
 }

@@ -14,13 +14,12 @@ pub struct Args {
     pub shell: Shell,
 }
 
-/// Prints the script for `command`, the whole command line.
+/// Prints the script for `command`, the whole command line, of the program that is called `name`.
 ///
 /// # Errors
 /// The output cannot be written.
-pub fn run(args: &Args, mut command: clap::Command, out: &mut dyn Write) -> Result<()> {
+pub fn run(args: &Args, mut command: clap::Command, name: &str, out: &mut dyn Write) -> Result<()> {
     let mut script = Vec::new();
-    let name = command.get_name().to_string();
     clap_complete::generate(args.shell, &mut command, name, &mut script);
     out.write_all(&script).map_err(Error::io(Path::new("stdout"), "print"))
 }
@@ -36,9 +35,10 @@ mod tests {
         let command = clap::Command::new("scatterproof").subcommand(check);
         for shell in [Shell::Bash, Shell::Zsh, Shell::Fish] {
             let mut out = Vec::new();
-            run(&Args { shell }, command.clone(), &mut out).expect("it prints");
+            run(&Args { shell }, command.clone(), "own-program", &mut out).expect("it prints");
             let script = String::from_utf8(out).expect("it is text");
             assert!(script.contains("check") && script.contains("setting"), "{shell}");
+            assert!(script.contains("own-program"), "{shell}: {script}");
         }
     }
 }

@@ -13,7 +13,7 @@ pub mod schema;
 pub mod verify;
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -105,6 +105,9 @@ pub fn main(registry: &Registry) -> ExitCode {
 
 /// [`main`] with these arguments, the first of them the program's name.
 pub fn main_with(registry: &Registry, arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let program = arguments.first().and_then(|path| Path::new(path).file_stem()?.to_str());
+    let program = program.unwrap_or("scatterproof").to_string();
     let command = Command::parse_from(arguments); // usage errors exit with 2
     let out = &mut std::io::stdout();
     let outcome = match &command.action {
@@ -118,7 +121,9 @@ pub fn main_with(registry: &Registry, arguments: impl IntoIterator<Item = OsStri
         Action::Init(args) => init::run(args, out).map(|()| 0),
         Action::List(args) => list::run(args, registry, out).map(|()| 0),
         Action::Schema(args) => schema::run(args, registry, out).map(|()| 0),
-        Action::Completions(args) => completions::run(args, Command::command(), out).map(|()| 0),
+        Action::Completions(args) => {
+            completions::run(args, Command::command(), &program, out).map(|()| 0)
+        }
     };
     match outcome {
         Ok(code) => ExitCode::from(code),

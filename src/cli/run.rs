@@ -1,12 +1,15 @@
 //! `scatterproof run`.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::{Reading, Working, listen};
 use crate::error::Result;
 use crate::experiment::load_any;
 use crate::experiment::registry::Registry;
 use crate::report::{self, terminal};
+use crate::run::live::Live;
+use crate::run::tev::Address;
 
 /// Run experiments: progress on a terminal, then a table and the place of the report.
 ///
@@ -24,6 +27,10 @@ pub struct Args {
     /// seconds comes again bit for bit.
     #[arg(long, value_name = "DIR")]
     passes_of: Option<PathBuf>,
+    /// Show images in tev, a viewer that is running, while they are made; it listens at 127.0.0.1:14158 unless
+    /// told otherwise. Results do not depend on it.
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = Address::USUAL)]
+    tev: Option<Address>,
 }
 
 /// Runs the files one after the other.
@@ -36,6 +43,12 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     options.passes_of = args.passes_of.clone();
     let read = |file: &PathBuf| load_any(file, &args.reading.options(), registry);
     let experiments = args.files.iter().map(read).collect::<Result<Vec<_>>>()?;
+    if let Some(address) = &args.tev {
+        match Live::connect(address) {
+            Ok(live) => options.live = Some(Arc::new(live)),
+            Err(what) => eprintln!("{what}"),
+        }
+    }
     for experiment in &experiments {
         let (folder, _) = crate::run::run_any(experiment, registry, &options, &interrupt)?;
         let material = report::write(&folder)?;

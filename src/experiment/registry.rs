@@ -11,6 +11,10 @@ use crate::estimators::Estimator;
 use crate::samplers::Sampler;
 use crate::scene::Scene;
 
+/// What an estimator of one's own derives its options with: these very versions, under
+/// `#[serde(crate = "scatterproof::experiment::registry::serde")]`.
+pub use {schemars, serde, serde_json};
+
 /// How a registered estimator is built from its options and a scene.
 pub type Build = fn(&Json, Arc<Scene>) -> Result<Box<dyn Estimator>>;
 

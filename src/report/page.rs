@@ -160,8 +160,13 @@ fn samplers(material: &Material) -> Vec<Block> {
 
 /// The pictures of every cell.
 fn pictures(material: &Material) -> Vec<Block> {
-    let viewers = material.viewers.iter().cloned().map(Block::Viewer);
-    let mut blocks: Vec<Block> = viewers.collect();
+    let mut blocks = Vec::new();
+    for viewer in &material.viewers {
+        if material.viewers.len() > 1 {
+            blocks.push(Block::Heading(3, viewer.cell.clone()));
+        }
+        blocks.push(Block::Viewer(viewer.clone()));
+    }
     if !blocks.is_empty() {
         blocks.insert(0, heading("Pictures"));
     }

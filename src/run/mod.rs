@@ -11,11 +11,13 @@ pub mod count;
 pub mod interrupt;
 pub mod job;
 pub mod keys;
+pub mod live;
 pub mod masses;
 pub mod memory;
 pub mod pilot;
 pub mod progress;
 pub mod samplers;
+pub mod tev;
 pub mod workers;
 
 mod assemble;
@@ -24,6 +26,7 @@ mod replay;
 mod retest;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::experiment::picture;
@@ -34,6 +37,7 @@ use crate::results::record::Replay;
 use crate::results::store::{RecordFolder, Stored};
 use interrupt::Interrupt;
 use job::{Finished, Job};
+use live::{Live, Show};
 use progress::Progress;
 
 pub use jobs::{Plan, plan};
@@ -55,13 +59,22 @@ pub struct Options {
     /// without it. A budget in seconds gives another number of passes each time that it is measured anew: this is how
     /// such a record comes again bit for bit.
     pub passes_of: Option<PathBuf>,
+    /// A viewer that shows images while they are made.
+    pub live: Option<Arc<Live>>,
 }
 
 impl Options {
     /// Into `out`, on all cores.
     pub fn new(out: impl Into<PathBuf>) -> Options {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Options { out: out.into(), threads, block_passes: None, quiet: false, passes_of: None }
+        Options {
+            out: out.into(),
+            threads,
+            block_passes: None,
+            quiet: false,
+            passes_of: None,
+            live: None,
+        }
     }
 
     /// The folder of an experiment's results.
@@ -121,8 +134,17 @@ pub fn run_any(
 ) -> Result<(RecordFolder, Stored)> {
     match loaded {
         Loaded::Scene(experiment) => run(experiment, registry, options, interrupt),
-        Loaded::Samplers(experiment) => samplers::run(experiment, registry, options, interrupt),
+        Loaded::Samplers(experiment) => {
+            if options.live.is_some() {
+                eprintln!("{}", nothing_to_show(loaded.name()));
+            }
+            samplers::run(experiment, registry, options, interrupt)
+        }
     }
+}
+
+fn nothing_to_show(experiment: &str) -> String {
+    format!("note: `{experiment}` has no image: tev has nothing to show of it")
 }
 
 /// Whether the folder holds a record of exactly this experiment, its claims included, by this build.
@@ -144,12 +166,20 @@ fn play(
     plan.memory(options.threads).check(memory::available())?;
     crate::results::atomic::create_folder(&root.join("state"), "create the results folder")?;
     let progress = Progress::new(plan.jobs.len(), options.quiet);
+    let show = options.live.as_deref().map(|live| {
+        let experiment = experiment.file.name.as_str();
+        Show { live, experiment, bands: &plan.bands, jobs: &plan.jobs }
+    });
+    if show.is_some_and(|show| !show.has_images()) {
+        progress.say(&nothing_to_show(&experiment.file.name));
+    }
     let settings = workers::Settings {
         threads: options.threads.max(1),
         block_passes: options.block_passes,
         interrupt,
         root,
         progress: &progress,
+        show,
     };
     let played = workers::play_all(&plan.jobs, &experiment.file.budget, &settings);
     progress.finish();

@@ -33,6 +33,11 @@ impl Progress {
         self.bar.set_position((jobs_done * STEPS as f64) as u64);
     }
 
+    /// Tells something on standard error, bar or not.
+    pub fn say(&self, what: &str) {
+        self.bar.suspend(|| eprintln!("{what}"));
+    }
+
     /// Removes the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();

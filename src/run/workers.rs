@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 use super::checkpoint;
 use super::interrupt::Interrupt;
 use super::job::{Block, Finished, Job, Origin};
+use super::live::Show;
 use super::pilot;
 use super::progress::Progress;
 use crate::error::{Error, Result};
@@ -36,6 +37,8 @@ pub struct Settings<'a> {
     pub root: &'a Path,
     /// Shows how far it is.
     pub progress: &'a Progress,
+    /// Shows images as they are made.
+    pub show: Option<Show<'a>>,
 }
 
 /// Wall time that a block should take, seconds.
@@ -273,6 +276,8 @@ struct Collector<'a> {
     settings: &'a Settings<'a>,
     finished: BTreeMap<usize, Finished>,
     running: BTreeMap<usize, Running>,
+    /// Jobs whose last image found no place on its way to the viewer.
+    owed: Vec<usize>,
 }
 
 struct Running {
@@ -287,7 +292,8 @@ struct Running {
 
 impl<'a> Collector<'a> {
     fn new(jobs: &'a [Job], settings: &'a Settings<'a>) -> Collector<'a> {
-        Collector { jobs, settings, finished: BTreeMap::new(), running: BTreeMap::new() }
+        let (finished, running, owed) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
+        Collector { jobs, settings, finished, running, owed }
     }
 
     fn collect(mut self, receiver: mpsc::Receiver<Message>) -> Result<Vec<Finished>> {
@@ -301,15 +307,23 @@ impl<'a> Collector<'a> {
                     job
                 }
                 Message::Played { job, block } => {
-                    self.take(job, *block)?;
+                    let has_grown = self.take(job, *block)?;
+                    let running = self.running.get(&job).filter(|_| has_grown);
+                    if let (Some(show), Some(running)) = (self.settings.show, running) {
+                        show.under_way(job, &running.done);
+                    }
                     job
                 }
             };
             self.close_if_done(job)?;
-            self.show(job);
+            self.progress(job);
         }
         if self.finished.len() == self.jobs.len() {
-            return Ok(self.finished.into_values().collect());
+            let finished: Vec<Finished> = self.finished.into_values().collect();
+            let slow = self.settings.show.and_then(|show| show.close(&self.owed, &finished));
+            let gone = self.settings.show.and_then(|show| show.live.complaint());
+            slow.iter().chain(&gone).for_each(|what| self.settings.progress.say(what));
+            return Ok(finished);
         }
         for (&job, running) in &self.running {
             self.save(job, &running.done)?;
@@ -323,18 +337,21 @@ impl<'a> Collector<'a> {
         )))
     }
 
-    fn take(&mut self, job: usize, block: Block) -> Result<()> {
-        let Some(running) = self.running.get_mut(&job) else { return Ok(()) };
+    /// Takes a block; whether passes were appended, of this or of earlier ones that waited for it.
+    fn take(&mut self, job: usize, block: Block) -> Result<bool> {
+        let Some(running) = self.running.get_mut(&job) else { return Ok(false) };
+        let before = running.done.next_pass();
         running.early.insert(block.gates.start(), block);
         while let Some(next) = running.early.remove(&running.done.next_pass()) {
             running.done.append(next);
         }
+        let has_grown = running.done.next_pass() > before;
         if running.saved.elapsed() > CHECKPOINT_EVERY {
             running.saved = Instant::now();
             let running = &self.running[&job];
             self.save(job, &running.done)?;
         }
-        Ok(())
+        Ok(has_grown)
     }
 
     fn close_if_done(&mut self, job: usize) -> Result<()> {
@@ -344,7 +361,11 @@ impl<'a> Collector<'a> {
             if running.done.next_pass() > running.on_disk {
                 self.save(job, &running.done)?;
             }
-            self.finished.insert(job, running.done.finish());
+            let finished = running.done.finish();
+            if self.settings.show.is_some_and(|show| !show.done(job, &finished)) {
+                self.owed.push(job);
+            }
+            self.finished.insert(job, finished);
         }
         Ok(())
     }
@@ -354,7 +375,10 @@ impl<'a> Collector<'a> {
         checkpoint::save(&checkpoint::path(self.settings.root, identity), identity, block)
     }
 
-    fn show(&self, job: usize) {
+    fn progress(&self, job: usize) {
+        if let Some(gone) = self.settings.show.and_then(|show| show.live.complaint()) {
+            self.settings.progress.say(&gone);
+        }
         let share = |r: &Running| r.done.next_pass() as f64 / r.passes as f64;
         let under_way: f64 = self.running.values().map(share).sum();
         let message = match self.running.get(&job) {

@@ -117,13 +117,21 @@ impl<T: Merge> Counter<T> {
         let partial = self.nodes.iter().position(|node| node.level < self.keep_level);
         let tail = self.nodes.split_off(partial.unwrap_or(self.nodes.len()));
         let mut batches: Vec<T> = self.nodes.into_iter().map(|node| node.value).collect();
-        batches.extend(fold_back(tail));
+        batches.extend(fold_back(tail.into_iter().map(|node| node.value)));
         batches
     }
 
     /// One value for the whole range, folded from the smallest (latest) node to the largest.
     pub fn finish(self) -> Option<T> {
-        fold_back(self.nodes)
+        fold_back(self.nodes.into_iter().map(|node| node.value))
+    }
+
+    /// What [`Counter::finish`] would give now, from a copy.
+    pub fn so_far(&self) -> Option<T>
+    where
+        T: Clone,
+    {
+        fold_back(self.nodes.iter().map(|node| node.value.clone()))
     }
 
     /// Does the node of `level` that ends at the next pass begin at a multiple of its own size, so
@@ -133,8 +141,8 @@ impl<T: Merge> Counter<T> {
     }
 }
 
-fn fold_back<T: Merge>(nodes: Vec<Node<T>>) -> Option<T> {
-    nodes.into_iter().rev().map(|node| node.value).reduce(|later, earlier| earlier.merge(later))
+fn fold_back<T: Merge>(values: impl DoubleEndedIterator<Item = T>) -> Option<T> {
+    values.rev().reduce(|later, earlier| earlier.merge(later))
 }
 
 /// The total of a record's batches: from the first to the last.
@@ -213,6 +221,7 @@ mod tests {
             tail.append(range(at, passes, 64));
             let mut joined = range(0, start, 64);
             joined.append(tail);
+            prop_assert_eq!(joined.so_far(), range(0, passes, 64).finish());
             prop_assert_eq!(joined.finish(), range(0, passes, 64).finish());
         }
 

@@ -1,0 +1,106 @@
+//! Light that goes straight through a matched body: transmittance times radiance.
+//!
+//! Radiance along a ray that meets no particle falls by exp(-sigma_t d) over a length d inside (Beer, Lambert). A
+//! matched boundary neither bends the ray nor takes anything from it, so that what a sensor's ray receives unscattered
+//! is the light's own radiance in the ray's direction times that.
+
+use std::sync::Arc;
+
+use scatterproof::error::{Error, Result};
+use scatterproof::estimators::{BandUse, Bias, Cost, Estimator, Scores, TransportClass};
+use scatterproof::experiment::estimators::read;
+use scatterproof::experiment::registry::{RegistryEntry, schemars, serde};
+use scatterproof::geometry::{Ray, Side};
+use scatterproof::optics::boundary::Boundary;
+use scatterproof::sampling::distance::transmittance;
+use scatterproof::sampling::stream::{PassKey, Purpose};
+use scatterproof::scene::Scene;
+
+/// Under which name an experiment file asks for it, and with which options.
+pub const BALLISTIC: RegistryEntry = RegistryEntry {
+    kind: "ballistic",
+    doc: "light straight through a matched body; unbiased in the class surface, and scores no other",
+    options_schema: || schemars::schema_for!(BallisticOptions),
+    build: |options, scene| {
+        let options: BallisticOptions = read(options)?;
+        Ok(Box::new(Ballistic::new(options, scene)?))
+    },
+};
+
+/// Options of `ballistic`.
+#[derive(Clone, Debug, Default, PartialEq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, crate = "scatterproof::experiment::registry::serde")]
+struct BallisticOptions {
+    /// Straight rays whose mean is one score; 1 without it.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 1024))]
+    rays: Option<u32>,
+}
+
+/// The estimator, for one scene.
+struct Ballistic {
+    rays: u32,
+    scene: Arc<Scene>,
+}
+
+impl Ballistic {
+    /// For a scene whose boundary is matched.
+    fn new(options: BallisticOptions, scene: Arc<Scene>) -> Result<Ballistic> {
+        if scene.boundary.iter().any(|b| *b != Boundary::Matched) {
+            let help = "use object.boundary.matched, or leave the estimator out";
+            return Err(Error::input_help("ballistic needs a matched boundary", help));
+        }
+        Ok(Ballistic { rays: options.rays.unwrap_or(1), scene })
+    }
+
+    /// Length inside the body; `None` where the ray misses it or never leaves.
+    fn length_inside(&self, mut ray: Ray) -> Option<f64> {
+        let (mut side, mut from, mut length) = (Side::Outside, None, 0.0);
+        while let Some(hit) = self.scene.shape.intersect(&ray, side, from, f64::INFINITY) {
+            if side == Side::Inside {
+                length += hit.t;
+            }
+            (ray.origin, from) = (hit.point, Some(hit.face));
+            side = if side == Side::Inside { Side::Outside } else { Side::Inside };
+        }
+        (from.is_some() && side == Side::Outside).then_some(length)
+    }
+}
+
+impl Estimator for Ballistic {
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        let scene = &self.scene;
+        for index in 0..scene.sensor.rays_per_pass() {
+            let mut stream = key.stream(index as u64, Purpose::Sensor);
+            for _ in 0..self.rays {
+                let ([a, b], [c, d]) = (stream.draw2(), stream.draw2());
+                let start = scene.sensor.ray(index, [a, b, c, d]);
+                scores.count(Cost::Paths);
+                let Some(length) = self.length_inside(start.ray) else { continue };
+                for &band in bands {
+                    let mut through = transmittance(scene.medium[band].sigma_t, length);
+                    if cfg!(feature = "planted") && band == 1 {
+                        through = 1.0; // forgotten, for once
+                    }
+                    let weight = start.weight * through / f64::from(self.rays);
+                    for (light, emission) in scene.lights.iter().enumerate() {
+                        let (radiance, _) = emission.eval(band, start.ray.dir);
+                        scores.add(start.slot, band, TransportClass::Surface, light, weight * radiance);
+                    }
+                }
+            }
+        }
+    }
+
+    fn bias(&self) -> Bias {
+        Bias::Unbiased
+    }
+
+    fn band_use(&self) -> BandUse {
+        BandUse::Shared // one straight line serves all bands
+    }
+
+    fn notes(&self) -> Vec<String> {
+        vec!["ballistic scores the class surface alone: light that scatters is missing, not dark".into()]
+    }
+}
