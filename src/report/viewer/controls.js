@@ -78,6 +78,7 @@ class Controls extends Canvases {
   // Decodes what is in view, paints it, and says what it is.
   async refresh() {
     const ticket = (this.ticket = {});
+    this.stage.setAttribute("aria-busy", "true");
     this.arrange();
     for (const picture of new Set(this.shown().map((i) => this.pictures[i]))) {
       picture.values = await this.load(picture.linear, linear);
@@ -89,6 +90,7 @@ class Controls extends Canvases {
     }
     this.caption();
     this.draw();
+    this.stage.setAttribute("aria-busy", "false");
     this.root.dataset.drawn = "true";
   }
 
@@ -160,10 +162,11 @@ class Controls extends Canvases {
       const text = layer === "z" ? (x) => (x === 0 ? "0" : signed(x)) : (x) => (x === 0 ? "0" : (x < 0 ? "−" : "+") + percent(Math.abs(x)));
       const [low, high] = data.noise_range;
       const ticks = layer === "noise" ? [0, 1, 2, 3].map((i) => percent(low * (high / low) ** (i / 3)))
-        : [-1, -0.5, 0, 0.5, 1].map((part) => text(part * limit));
+        : (layer === "z" ? [-1, -0.5, 0, 0.5, 1] : [-1, 0, 1]).map((part) => text(part * limit));
       [ticks[0], ticks[ticks.length - 1]] = [`≤ ${ticks[0]}`, `≥ ${ticks[ticks.length - 1]}`];
       const bar = make("div", { style: `background: linear-gradient(to right, ${stops.join(",")})` });
-      this.scale.replaceChildren(bar, make("div", { class: "viewer-ticks" }, ...ticks.map((tick) => make("span", {}, tick))));
+      this.scale.replaceChildren(bar, make("div", { class: "viewer-ticks" }, ...ticks.map((tick, i) =>
+        make("span", { style: `left: ${(100 * i) / (ticks.length - 1)}%` }, tick))));
       said.push({
         noise: "Standard error of a pixel over its mean. Grey: both are 0.",
         difference: "Difference from the other estimator's pixel, over that pixel. Grey: both are 0.",
