@@ -249,17 +249,13 @@ fn browser_opens_nine_cells_at_once() {
     let text = replaced(nine, "[[sweep]]\nname = \"boundary\"", second);
     let report = Report::of(&replaced(&text, "passes = 1024", "passes = 8"), "nine-cells");
     let size = report.page.len();
-    let page = report.test_page("speed", false);
-    let mut times: Vec<f64> = (0..5)
-        .map(|_| {
-            let outcome = sound(Open::page(&page, false).outcome());
-            assert_eq!(outcome["viewers"], 9, "{outcome}");
-            assert!(outcome["late"].as_u64() >= Some(4), "those out of sight wait: {outcome}");
-            outcome["drawn"].as_f64().expect("milliseconds")
-        })
-        .collect();
+    let outcome = report.test("speed", false);
+    assert_eq!(outcome["viewers"], 9, "{outcome}");
+    assert!(outcome["late"].as_u64() >= Some(4), "those out of sight wait: {outcome}");
+    let times = outcome["times"].as_array().expect("times");
+    let mut times: Vec<f64> = times.iter().filter_map(Value::as_f64).collect();
     times.sort_by(f64::total_cmp);
     println!("{size} bytes; milliseconds until loaded and drawn: {times:.0?}");
     assert!(size < 5_000_000, "{size} bytes");
-    assert!(times[2] < 1000.0, "{times:?}");
+    assert!(times[times.len() / 2] < 1000.0, "{times:?}");
 }

@@ -10,7 +10,11 @@
   };
   const say = (outcome) => console.log("BROWSER-TEST " + JSON.stringify(outcome));
   const wait = (ms) => new Promise((done) => setTimeout(done, ms));
-  const settle = () => wait(60);
+  const settle = async () => {
+    await wait(20);
+    for (let i = 0; i < 500 && document.querySelector("[aria-busy=true]"); i++) await wait(5);
+    await wait(20);
+  };
   const drawn = async (root) => {
     root.scrollIntoView({ block: "center" });
     for (let i = 0; i < 200 && !root.dataset.drawn; i++) await wait(10);
@@ -451,21 +455,24 @@
     fits("the readout");
   }
 
-  // Milliseconds from the start of the navigation until the page is loaded and its first viewer drawn.
+  // Milliseconds from the start of a navigation until the page is loaded and its first viewer drawn, of several opens in
+  // one browser.
   async function speed() {
     if (document.readyState !== "complete") await new Promise((done) => addEventListener("load", done));
-    const loaded = performance.now();
-    const before = roots.filter((root) => root.dataset.drawn).length;
-    if (before === 0) {
-      roots[0].scrollIntoView();
-      while (!roots[0].dataset.drawn) await new Promise((done) => setTimeout(done, 1));
+    roots[0].scrollIntoView();
+    while (!roots[0].dataset.drawn) await wait(1);
+    const times = [...JSON.parse(sessionStorage.getItem("times") ?? "[]"), performance.now()];
+    if (times.length < 7) {
+      sessionStorage.setItem("times", JSON.stringify(times));
+      location.reload();
+      return null;
     }
-    return { loaded, drawn: performance.now(), viewers: roots.length, late: roots.filter((root) => !root.dataset.drawn).length };
+    return { times, viewers: roots.length, late: roots.filter((root) => !root.dataset.drawn).length };
   }
 
   try {
     const more = await { behaviour, contrast, narrow, speed }[TEST.what]();
-    say({ checks, failures, ...more });
+    if (more !== null) say({ checks, failures, ...more });
   } catch (error) {
     say({ checks, failures: [...failures, String(error.stack)] });
   }

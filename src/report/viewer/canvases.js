@@ -9,7 +9,9 @@ class Canvases {
     this.data = JSON.parse(root.querySelector("script").textContent);
     this.pictures = this.data.pictures.map((picture) => ({ ...picture, sheet: document.createElement("canvas") }));
     this.cache = new Map();
-    this.state = { mode: this.data.bands.length === 0 ? "split" : "side", layer: "image", band: 0, pair: [0, Math.min(1, this.pictures.length - 1)], isFlipped: false };
+    this.isGrid = this.data.bands.length === 0;
+    const pair = [0, Math.min(1, this.pictures.length - 1)];
+    this.state = { mode: this.isGrid ? "split" : "side", layer: "image", band: 0, pair, isFlipped: false };
     this.home();
   }
 
@@ -96,7 +98,8 @@ class Canvases {
       const context = canvas.getContext("2d");
       context.clearRect(0, 0, width, height);
       context.imageSmoothingEnabled = scale < 1; // a pixel is a square
-      const sheet = (index) => context.drawImage(this.pictures[index].sheet, left, top, data.width * scale, data.height * scale);
+      const sheet = (index) =>
+        context.drawImage(this.pictures[index].sheet, left, top, data.width * scale, data.height * scale);
       if (state.mode === "split" && shown.length > 1) {
         // One seam in the view; in a grid one in every tile, which zoom and pan with it.
         const tile = data.columns > 1 ? { left, width: (data.width * scale) / data.columns } : { left: 0, width };

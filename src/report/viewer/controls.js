@@ -1,6 +1,12 @@
 // A viewer's controls, and what it says in words.
 
 const LAYERS = { image: "Image", noise: "Noise", difference: "Difference", z: "z-score of the difference" };
+const ABOUT = {
+  noise: "Standard error of a pixel over its mean. Grey: both are 0.",
+  difference: "Difference from the other estimator's pixel, over that pixel. Grey: both are 0.",
+  z: "Difference from the other estimator's pixel over the standard error of that difference, both sides' noise added in " +
+    "squares. Grey: no standard error on either side.",
+};
 const MODES = { side: "Side by side", flip: "Flip", split: "Split" };
 const REACH = 10; // stops by which the exposure can be moved either way
 
@@ -21,8 +27,9 @@ class Controls extends Canvases {
     });
     this.modes = make("fieldset", { "aria-label": "Arrangement" }, ...modes);
     // A picture alone differs from nothing.
-    const layers = Object.entries(LAYERS).filter(([layer]) => layer === "image" || (data.bands.length > 0 &&
-      (pictures.length > 1 || layer === "noise")));
+    const isPair = pictures.length > 1 && !this.isGrid;
+    const has = { image: true, noise: !this.isGrid, difference: isPair, z: isPair };
+    const layers = Object.entries(LAYERS).filter(([layer]) => has[layer]);
     this.layers = layers.map(([layer]) => layer);
     this.layer = select(Object.fromEntries(layers));
     this.band = select(Object.fromEntries(data.bands.map((name, i) => [i, name])));
@@ -71,13 +78,14 @@ class Controls extends Canvases {
       ["B D", "brighter, darker by half a stop"], ["+ −", "zoom"], ["0", "reset"],
       ["Arrows", "move the pixel that is read out; in split the seam, with Shift the pixel"]];
     const parts = keys.flatMap(([key, what]) => [...key.split(" ").flatMap((k) => [make("kbd", {}, k), " "]), `${what}; `]);
-    this.keys.append("With the pictures in focus: ", ...parts, "wheel to zoom (with Ctrl at any time). Drag to pan, in split to " +
-      "move the seam, with Shift to pan. Two fingers zoom and pan; a tap flips.");
+    this.keys.append("With the pictures in focus: ", ...parts, "wheel to zoom (with Ctrl at any time). Drag to pan, in " +
+      "split to move the seam, with Shift to pan. Two fingers zoom and pan; a tap flips.");
   }
 
   // Decodes what is in view, paints it, and says what it is.
   async refresh() {
     const ticket = (this.ticket = {});
+    this.stage.setAttribute("aria-busy", "true");
     this.arrange();
     for (const picture of new Set(this.shown().map((i) => this.pictures[i]))) {
       picture.values = await this.load(picture.linear, linear);
@@ -89,6 +97,7 @@ class Controls extends Canvases {
     }
     this.caption();
     this.draw();
+    this.stage.setAttribute("aria-busy", "false");
     this.root.dataset.drawn = "true";
   }
 
@@ -152,30 +161,31 @@ class Controls extends Canvases {
     const { data } = this;
     const { layer, band } = this.state;
     this.scale.hidden = layer === "image";
-    const said = [];
-    if (layer !== "image") {
-      const palette = this.palettes[layer === "noise" ? "noise" : "signed"].slice(1);
-      const stops = palette.filter((_, i) => i % 2 === 0).map((c) => `#${c.toString(16).padStart(6, "0")}`);
-      const limit = layer === "z" ? data.z_limit : data.limit;
-      const text = layer === "z" ? (x) => (x === 0 ? "0" : signed(x)) : (x) => (x === 0 ? "0" : (x < 0 ? "−" : "+") + percent(Math.abs(x)));
-      const [low, high] = data.noise_range;
-      const ticks = layer === "noise" ? [0, 1, 2, 3].map((i) => percent(low * (high / low) ** (i / 3)))
-        : [-1, -0.5, 0, 0.5, 1].map((part) => text(part * limit));
-      [ticks[0], ticks[ticks.length - 1]] = [`≤ ${ticks[0]}`, `≥ ${ticks[ticks.length - 1]}`];
-      const bar = make("div", { style: `background: linear-gradient(to right, ${stops.join(",")})` });
-      this.scale.replaceChildren(bar, make("div", { class: "viewer-ticks" }, ...ticks.map((tick) => make("span", {}, tick))));
-      said.push({
-        noise: "Standard error of a pixel over its mean. Grey: both are 0.",
-        difference: "Difference from the other estimator's pixel, over that pixel. Grey: both are 0.",
-        z: "Difference from the other estimator's pixel over the standard error of that difference, both sides' noise " +
-          "added in squares. Grey: no standard error on either side.",
-      }[layer] + (data.bands.length > 0 ? ` Band ${data.bands[band]}.` : "") + (data.bands_note ? ` ${data.bands_note}` : ""));
-      for (const picture of new Set(shown)) {
-        const note = picture[layer]?.notes?.[band]?.trim();
-        if (note) said.push(`${picture.name}: ${note}`);
-      }
+    this.notes.replaceChildren();
+    if (layer === "image") return;
+    const palette = this.palettes[layer === "noise" ? "noise" : "signed"].slice(1);
+    const stops = palette.filter((_, i) => i % 2 === 0).map((colour) => `#${colour.toString(16).padStart(6, "0")}`);
+    const ticks = this.ticks(layer);
+    this.scale.replaceChildren(
+      make("div", { style: `background: linear-gradient(to right, ${stops.join(",")})` }),
+      make("div", { class: "viewer-ticks" }, ...ticks.map((tick, i) =>
+        make("span", { style: `left: ${(100 * i) / (ticks.length - 1)}%` }, tick))));
+    this.notes.append(make("p", {}, `${ABOUT[layer]} Band ${data.bands[band]}. ${data.bands_note}`));
+    for (const picture of new Set(shown)) {
+      const note = picture[layer]?.notes?.[band]?.trim();
+      if (note) this.notes.append(make("p", {}, `${picture.name}: ${note}`));
     }
-    this.notes.replaceChildren(...said.map((text) => make("p", {}, text)));
+  }
+
+  // What stands at equal steps of the colour bar.
+  ticks(layer) {
+    const { limit, z_limit: zLimit, noise_range: [low, high] } = this.data;
+    const words = {
+      noise: () => [0, 1, 2, 3].map((i) => percent(low * (high / low) ** (i / 3))),
+      difference: () => [`−${percent(limit)}`, "0", `+${percent(limit)}`],
+      z: () => [-1, -0.5, 0, 0.5, 1].map((part) => (part === 0 ? "0" : signed(part * zLimit))),
+    }[layer]();
+    return words.map((word, i) => (i === 0 ? `≤ ${word}` : i === words.length - 1 ? `≥ ${word}` : word));
   }
 
   tell() {
@@ -195,8 +205,7 @@ class Controls extends Canvases {
       const map = !picture.indices ? "" : this.mapped(picture.indices[at]);
       return make("tr", {}, make("th", { scope: "row" }, picture.name), make("td", {}, cells), make("td", {}, map));
     });
-    const isGrid = this.data.bands.length === 0;
-    const place = make("div", {}, `Pixel x ${cursor.x}, y ${cursor.y}; linear sRGB${isGrid ? " over white" : ""}:`);
+    const place = make("div", {}, `Pixel x ${cursor.x}, y ${cursor.y}; linear sRGB${this.isGrid ? " over white" : ""}:`);
     this.readout.replaceChildren(place, make("table", {}, ...rows));
   }
 

@@ -32,6 +32,10 @@ pub fn to_html(viewer: &Viewer) -> String {
             "<div class=\"viewer\" role=\"group\" aria-label=\"{label}\">\n\
              <script type=\"application/json\">{data}</script>\n<noscript>{figures}</noscript>\n</div>\n"
         ),
+        None if viewer.figures.is_empty() => {
+            "<p class=\"viewer-left-out\">The page has no room for the same with seams to move.</p>\n"
+                .into()
+        }
         None => format!(
             "<p class=\"viewer-left-out\">The page has no room for more pictures that a script can compare. These \
              stand beside it, with EXR files of all values.</p>\n{figures}\n"

@@ -153,3 +153,26 @@ fn what_the_page_has_no_room_for_is_said() {
     assert_eq!(parts(&blocks).1.matches("<script").count(), 2);
     assert_eq!(parts(&[Block::Text("x".into())]), Default::default());
 }
+
+#[test]
+fn a_grid_is_two_sheets_without_maps() {
+    let sheet = |name, value: f64| Sheet { name, rgb: vec![[value, 2.0 * value, 0.0]; 6] };
+    let mut viewer = grid("a | b", [sheet("a", 0.5), sheet("b", 1.0)], 3, 3).expect("a viewer");
+    let data: Value = serde_json::from_str(viewer.data.as_ref().expect("data")).expect("JSON");
+    assert_eq!((&data["width"], &data["height"], &data["columns"]), (&3.into(), &2.into(), &3.into()));
+    // 0.5, 1 and 0 are 3f00, 3f80 and 0000 (IEEE 754).
+    let bytes = decoded_plane(&bytes(&data["pictures"][0]["linear"])).1;
+    assert_eq!(
+        (bytes.0, bytes.1, &bytes.2[..3], &bytes.2[18..21]),
+        (3, 4, &[63, 63, 0][..], &[0, 128, 0][..])
+    );
+    assert_eq!((&data["bands"], &data["pictures"][1]["z"]), (&serde_json::json!([]), &Value::Null));
+    assert!(to_html(&viewer).starts_with("<details>"));
+
+    let full = Viewer { data: Some(" ".repeat(ROOM)), ..Viewer::default() };
+    keep_room(&[], [&mut viewer].into_iter());
+    assert!(viewer.data.is_some());
+    keep_room(&[full], [&mut viewer].into_iter());
+    assert_eq!(viewer.data, None);
+    assert!(to_html(&viewer).contains("no room"));
+}
