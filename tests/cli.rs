@@ -276,3 +276,16 @@ fn no_bar_where_there_is_no_terminal() {
     ran.exits(0).check(ran.stderr().is_empty(), "nothing is drawn");
     ran.check(!ran.stdout().contains(['\u{1b}', '\r']), "no control characters");
 }
+
+/// The script that plays published experiments says what it does not know before it plays anything.
+#[test]
+fn reproduce_refuses_what_is_not_published() {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/reproduce");
+    let work = Work::new();
+    work.shell(&format!("'{script}' nothing"))
+        .exits(2)
+        .complains("`nothing` is not published")
+        .complains("snee-matrix");
+    work.shell(&format!("'{script}' --fast")).exits(2).complains("no option --fast");
+    work.shell(&format!("'{script}' --help")).exits(0).says("whether the record is byte-identical");
+}

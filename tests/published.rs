@@ -82,7 +82,8 @@ fn stale(folder: &Path) -> Vec<String> {
     stale
 }
 
-const HELP: &str = "scripts/reproduce --publish NAME plays it again; where only its views have changed, `scatterproof report` and a copy do";
+const HELP: &str =
+    "scripts/reproduce --views makes views again; --publish NAME plays the experiment again";
 
 #[test]
 fn every_view_is_what_its_record_gives() {

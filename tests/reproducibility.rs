@@ -220,3 +220,30 @@ fn a_budget_in_seconds_is_fixed_once() {
         assert_eq!(work.record("results"), first);
     }
 }
+
+/// A budget in seconds gives other passes each time; those of a record give its bits again.
+#[test]
+fn a_budget_in_seconds_comes_again_by_the_passes_of_its_record() {
+    let work = Work::with(&edit("budget.passes = 100", "budget.cpu_seconds = 0.2"));
+    let first = record(&work, "first", "");
+    same(&first, &record(&work, "again", "--passes-of first"), "with the passes of the first");
+    // What an earlier run of that folder had begun with is not asked.
+    work.run("run x.toml -q --out other --set budget.cpu_seconds=0.4").exits(0);
+    same(
+        &first,
+        &record(&work, "other", "--passes-of first"),
+        "in a folder with a state of another budget",
+    );
+    let compared = work.run("compare first/x again/x");
+    compared
+        .exits(0)
+        .says("identical: all")
+        .says("the records are byte-identical")
+        .says("ratios are compatible");
+    let other =
+        work.run("run x.toml -q --out no --passes-of first --set object.boundary.rough.alpha=0.4");
+    other.exits(3).complains("of another experiment than the file").complains("compare");
+    work.run("run x.toml -q --out no --passes-of nowhere").exits(3).complains("no record here");
+    work.run("run x.toml -q --out third --set object.boundary.rough.alpha=0.4").exits(0);
+    work.run("compare first/x third/x").says("the records are not byte-identical");
+}

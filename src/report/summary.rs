@@ -30,7 +30,7 @@ pub fn chosen<'a>(stored: &Stored, rows: &'a [Row], cost: CostMeasure) -> Vec<&'
 /// What the variance is of.
 pub fn metric_words(row: &Row) -> String {
     if row.metric == PIXELS {
-        "a pixel, averaged over the image".into()
+        "a pixel (averaged over the image)".into()
     } else {
         format!("`{}`", row.metric)
     }
@@ -48,18 +48,15 @@ pub fn efficiency(stored: &Stored, rows: &[Row], cost: CostMeasure) -> Option<Ta
     });
     let table = pivot(stored, &["band"], entries.collect());
     let what = metric_words(quoted);
-    let cost = match cost {
-        CostMeasure::Counters => "counted work, the same on every machine",
-        CostMeasure::Cpu
-            if rows.iter().all(|row| row.side_by_side || !row.efficiency_ratio.is_finite()) =>
-        {
-            "CPU time of this machine, timed side by side"
-        }
-        CostMeasure::Cpu => "CPU time of this machine, timed one after the other",
+    let is_timed_together = || rows.iter().all(|row| row.side_by_side || row.efficiency_ratio.is_nan());
+    let (cost, how) = match cost {
+        CostMeasure::Counters => ("counted work", "the same on every machine"),
+        CostMeasure::Cpu if is_timed_together() => ("CPU time", "of this machine, side by side"),
+        CostMeasure::Cpu => ("CPU time", "of this machine, one after the other"),
     };
     let mut caption = format!(
-        "Efficiency: variance of {what} times cost ({cost}), of the estimator behind the stroke over the one before it; above \
-         1 the one before it is the better. In brackets the 95 % interval."
+        "Efficiency: A / B is the variance of {what} times {cost} ({how}) of B over that of A; above 1 A is the better. In \
+         brackets the 95 % interval."
     );
     if rows.iter().any(|row| row.efficiency_ratio.is_finite() && !row.resolved) {
         caption += " An asterisk: not resolved, more passes may move the ratio out of its interval.";

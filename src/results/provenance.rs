@@ -132,7 +132,9 @@ fn checkout(folder: &Path) -> (Option<String>, Option<bool>) {
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_string())
     };
     let commit = git(&["rev-parse", "HEAD"]);
-    let status = commit.as_ref().and_then(|_| git(&["status", "--porcelain", "--untracked-files=no"]));
+    // What runs write makes no other program.
+    let changes = ["status", "--porcelain", "--untracked-files=no", "--", ".", ":(exclude)results"];
+    let status = commit.as_ref().and_then(|_| git(&changes));
     (commit, status.map(|s| !s.is_empty()))
 }
 
