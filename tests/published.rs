@@ -260,8 +260,8 @@ fn the_advice_on_rules_is_what_the_ratios_say() {
     let kernel = behind("kernel");
     assert_eq!(kernel.len(), rows.len(), "kernel has a ratio in every row");
     let sentence = format!(
-        "nowhere more than {:.1} times behind the best rule of its band (median {:.1}), while the published `mean`, the best where \
-         it has a valid mean, has none in red of skin1 and ketchup but on small bodies, and floors fall behind the best by up to \
+        "nowhere more than {:.1} times behind the best rule of its band (median {:.1}), while the published `mean` has \
+         none in red of skin1 and ketchup but on small bodies, and floors fall behind the best by up to \
          {:.1} times (0.001) and {:.1} times (0.01)",
         largest("kernel"),
         kernel[kernel.len() / 2],

@@ -99,6 +99,13 @@ impl Document {
     }
 }
 
+/// A text as the name of a file or a place on a page: ASCII letters and digits, else `-`.
+pub fn slug(text: &str) -> String {
+    let letters =
+        text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
+    letters.collect()
+}
+
 fn markdown(block: &Block) -> String {
     match block {
         Block::Heading(level, text) => format!("{} {text}\n", "#".repeat(usize::from(*level))),

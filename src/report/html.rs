@@ -1,7 +1,7 @@
 //! The page as one HTML file: no network, pictures as data URIs, light and dark, readable on a phone.
 
 use super::base64;
-use super::document::{Block, Document, FigureBlock, Picture, TableBlock};
+use super::document::{Block, Document, FigureBlock, Picture, TableBlock, slug};
 use super::latex::to_latex;
 use super::viewer;
 
@@ -36,13 +36,6 @@ fn contents(page: &Document) -> String {
         0 | 1 => String::new(),
         _ => format!("<nav aria-label=\"Sections\">\n{}</nav>\n", links.concat()),
     }
-}
-
-/// A heading as the name of a place: letters and digits, else `-`.
-fn slug(text: &str) -> String {
-    let letters =
-        text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
-    letters.collect()
 }
 
 fn block(of: &Block) -> String {

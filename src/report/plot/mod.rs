@@ -140,7 +140,7 @@ impl Plot {
     /// What it shows as numbers: a row a point.
     pub fn to_csv(&self) -> String {
         let header = ["series", &self.x.label, &self.y.label, "low", "high", "firm"];
-        let x = |p: &Point| match self.x.names.get(p.x as usize) {
+        let x = |p: &Point| match self.x.names.get(p.x.round() as usize) {
             Some(name) => name.clone(),
             None => csv_text::number(p.x),
         };
@@ -394,6 +394,19 @@ mod tests {
             assert_eq!(svg.matches(text).count(), 1, "{text}");
         }
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    }
+
+    /// Marks that stand side by side at one name are of that name.
+    #[test]
+    fn numbers_stand_by_their_names() {
+        let points = vec![Point::bare(-0.2, 1.0), Point::bare(0.8, 2.0)];
+        let series = vec![Series { name: "a".into(), points, style: Style::Marks }];
+        let x = Axis { names: vec!["left".into(), "right".into()], ..Axis::linear("side") };
+        let csv = Plot { x, y: Axis::linear("ratio"), series, ..Plot::default() }.to_csv();
+        assert_eq!(
+            csv,
+            "series,side,ratio,low,high,firm\na,left,1.0,1.0,1.0,true\na,right,2.0,2.0,2.0,true\n"
+        );
     }
 
     /// Names whose lines end at one height do not stand on each other.

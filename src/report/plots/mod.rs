@@ -1,5 +1,7 @@
 //! The plots of a record: what each shows, from the record and its timing alone.
 
+use std::collections::BTreeSet;
+
 use super::document::{Block, FigureBlock, Picture};
 use super::plot::{Plot, panels};
 use crate::error::Result;
@@ -69,7 +71,16 @@ pub fn sections(stored: &Stored, rows: &[Row], wanted: &[Wanted]) -> Vec<Section
         convergence::section(stored),
         goodness::section(stored),
     ];
-    sections.into_iter().filter(|section| !section.drawn.is_empty()).collect()
+    let mut sections: Vec<Section> =
+        sections.into_iter().filter(|section| !section.drawn.is_empty()).collect();
+    let mut taken = BTreeSet::new();
+    for drawn in sections.iter_mut().flat_map(|section| &mut section.drawn) {
+        // Names of estimators may differ in what no file name has.
+        while !taken.insert(drawn.name.clone()) {
+            drawn.name += "-2";
+        }
+    }
+    sections
 }
 
 impl Section {

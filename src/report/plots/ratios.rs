@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Content, Drawn, Section, band_name, joined, shown_bands};
+use crate::report::document::slug;
 use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
 use crate::report::summary;
 use crate::results::record::CostMeasure;
@@ -20,9 +21,14 @@ pub(super) fn section(stored: &Stored, rows: &[Row]) -> Section {
     let mut drawn = Vec::new();
     for cost in [CostMeasure::Cpu, CostMeasure::Counters] {
         let chosen = summary::chosen(stored, rows, cost);
-        for (number, axis) in axes.iter().enumerate() {
-            for (place, values) in places(stored, axis).into_iter().enumerate() {
-                let name = format!("efficiency-{}-{}-{}", words(cost).1, number + 1, place + 1);
+        for axis in &axes {
+            for values in places(stored, axis) {
+                let word = if values.what == *axis {
+                    String::new()
+                } else {
+                    format!("-{}", slug(&values.what))
+                };
+                let name = format!("efficiency-{}-{}{word}", words(cost).1, slug(axis));
                 drawn.extend(of_axis(stored, &chosen, &values, (axis, cost), &name));
             }
         }
@@ -114,7 +120,7 @@ fn of_axis(
     pairs.sort_unstable();
     pairs.dedup();
     let mut drawn = Vec::new();
-    for (part, (candidate, baseline)) in pairs.into_iter().enumerate() {
+    for (candidate, baseline) in pairs {
         for band in shown_bands(stored) {
             let own = |row: &&&Row| {
                 (&*row.candidate, &*row.baseline) == (candidate, baseline)
@@ -149,7 +155,8 @@ fn of_axis(
                 size: Size::Small,
             };
             drawn.push(Drawn {
-                name: format!("{name}-{}-{}", part + 1, band + 1),
+                name: joined(&[name, &slug(candidate), &slug(band_name(stored, band))])
+                    .replace(", ", "-"),
                 title: joined(&[&format!("{candidate} over {baseline}"), band_name(stored, band)]),
                 caption,
                 content: Content::Plots(vec![plot]),
@@ -217,7 +224,8 @@ mod tests {
         }
         let section = section(&stored, &comparisons(&stored));
         // By counted work alone, as no time was measured; for two bands.
-        assert_eq!(section.drawn.len(), 2);
+        let names: Vec<&str> = section.drawn.iter().map(|drawn| drawn.name.as_str()).collect();
+        assert_eq!(names, ["efficiency-counters-alpha-snee-r", "efficiency-counters-alpha-snee-g"]);
         let Content::Plots(plots) = &section.drawn[0].content else { panic!("plots") };
         assert_eq!(
             (plots[0].series.len(), plots[0].x.label.as_str(), plots[0].x.is_log),
