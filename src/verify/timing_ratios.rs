@@ -61,16 +61,14 @@ pub fn timing_ratios(before: &Stored, after: &Stored) -> Vec<TimingRatio> {
     let changes: Vec<(f64, f64)> = pairs.iter().map(|(a, b)| log_change(a, b)).collect();
     let p: Vec<f64> = changes.iter().map(|(change, error)| normal_two_sided(change / error)).collect();
     let adjusted = holm(&p);
-    let ratio = |(((before, after), (change, error)), adjusted_p): (((Row, Row), (f64, f64)), f64)| {
-        TimingRatio {
-            before,
-            after,
-            change: math::exp(change),
-            interval: [-1.0, 1.0].map(|side| math::exp(change + side * HALF_WIDTH * error)),
-            adjusted_p,
-        }
-    };
-    pairs.into_iter().zip(changes).zip(adjusted).map(ratio).collect()
+    let mut ratios = Vec::new();
+    for ((before, after), ((change, error), adjusted_p)) in
+        pairs.into_iter().zip(changes.into_iter().zip(adjusted))
+    {
+        let interval = [-1.0, 1.0].map(|side| math::exp(change + side * HALF_WIDTH * error));
+        ratios.push(TimingRatio { before, after, change: math::exp(change), interval, adjusted_p });
+    }
+    ratios
 }
 
 /// Logarithm of the second ratio over the first, and its standard error.
