@@ -163,7 +163,7 @@ fn misquoted(quote: &Quote) -> Option<String> {
     let Ok(text) = fs::read_to_string(&path) else { return Some(format!("no file {}", quote.path)) };
     let is_wanted = |line: &&str| {
         let holds = |word: &&str| line.split('|').any(|field| field.trim() == *word);
-        quote.words.is_empty() || quote.words.iter().any(|word| holds(&word))
+        quote.words.is_empty() || quote.words.iter().any(holds)
     };
     let lines: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
     let (head, rows) = lines.split_at(lines.len().min(2));

@@ -116,6 +116,8 @@ const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b07b00
 const LINE: f64 = 15.0;
 /// Most points of a line that are marked one by one.
 const MARKED: usize = 20;
+/// From so many points on marks are small.
+const CROWDED: usize = 60;
 /// Longest name of a series, in letters.
 const LETTERS: usize = 30;
 /// Width of a letter.
@@ -310,7 +312,9 @@ impl Series {
                 path()
             )
         };
-        let marks = || places().map(|(x, y, p)| mark(x, y, colour, p.is_firm)).collect::<String>();
+        let radius = if self.points.len() > CROWDED { 1.4 } else { 3.0 };
+        let marks =
+            || places().map(|(x, y, p)| mark(x, y, radius, (colour, p.is_firm))).collect::<String>();
         match self.style {
             _ if points().next().is_none() => String::new(),
             Style::Guide => stroked(1.0, " stroke-dasharray=\"2 4\""),
@@ -345,9 +349,9 @@ impl Series {
     }
 }
 
-fn mark(x: f64, y: f64, colour: &str, is_firm: bool) -> String {
+fn mark(x: f64, y: f64, radius: f64, (colour, is_firm): (&str, bool)) -> String {
     let fill = if is_firm { colour } else { "var(--paper, #fff)" };
-    format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{fill}\" stroke=\"{colour}\"/>\n")
+    format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{fill}\" stroke=\"{colour}\"/>\n")
 }
 
 /// A name that finds room.

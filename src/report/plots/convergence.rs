@@ -134,7 +134,8 @@ fn errors(stored: &Stored, run: &EstimatorRun) -> Option<Errors> {
         }
         size *= 2;
     }
-    Some(Errors { measured, of_a_pass, passes: all[0].n as f64 })
+    let passes = all[0].n as f64;
+    (!measured.is_empty()).then_some(Errors { measured, of_a_pass, passes })
 }
 
 /// Batches joined `size` at a time; those that are left over, and a last batch with fewer passes, are in none.

@@ -23,8 +23,17 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> 
     let cells = stored.cells(&run.coarse)?;
     let samples = run.samples as f64;
     let expected = |mass: f64| mass * samples;
-    let places =
-        || cells.observed.iter().zip(cells.mass).enumerate().map(|(i, (o, m))| (i as f64, *o, *m));
+    // Outcomes that neither can be nor were have no place.
+    let is_there = |(_, observed, mass): &(f64, f64, f64)| *observed > 0.0 || *mass > 0.0;
+    let places = || {
+        cells
+            .observed
+            .iter()
+            .zip(cells.mass)
+            .enumerate()
+            .map(|(i, (o, m))| (i as f64, *o, *m))
+            .filter(is_there)
+    };
     let share = |(x, observed, _): (f64, f64, f64)| Point::bare(x, observed / samples);
     let mass = |(x, _, mass): (f64, f64, f64)| Point::bare(x, mass);
     let possible = || places().filter(|(_, _, mass)| *mass > 0.0);

@@ -1,11 +1,13 @@
 //! Means by wavelength, and the colour that they give.
 
 use super::{Content, Drawn, Section, runs};
+use crate::report::number::with_error;
 use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
 use crate::results::image::{gain, shown_bytes};
-use crate::results::record::{Cell, EstimatorRun};
+use crate::results::record::{Band, Cell, EstimatorRun};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::Estimate;
+use crate::stats::moments::Moments;
 use crate::stats::tails::critical_value;
 
 /// Fewest bands that make a spectrum.
@@ -51,15 +53,16 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [Drawn; 2] {
         ..Plot::default()
     };
     let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
-    let colours: Vec<(String, [f64; 3])> =
-        runs.iter().map(|(run, means)| (run.estimator.clone(), colour(stored, means))).collect();
-    let rgb = |(name, rgb): &(String, [f64; 3])| {
-        let [r, g, b] = rgb.map(|c| format!("{c:.4}"));
+    let colours: Vec<(String, [Estimate; 3])> =
+        runs.iter().filter_map(|(run, _)| Some((run.estimator.clone(), colour(stored, run)?))).collect();
+    let rgb = |(name, rgb): &(String, [Estimate; 3])| {
+        let [r, g, b] = rgb.map(|c| with_error(c.value, c.std_error));
         format!("{name}: linear sRGB {r}, {g}, {b}.")
     };
     let caption = colours.iter().map(rgb).collect::<Vec<_>>().join(" ");
-    let swatches =
-        colours.into_iter().map(|(name, rgb)| (name, shown_bytes(rgb, gain(stops)))).collect();
+    let shown =
+        |(name, rgb): (String, [Estimate; 3])| (name, shown_bytes(rgb.map(|c| c.value), gain(stops)));
+    let swatches = colours.into_iter().map(shown).collect();
     [
         Drawn {
             name: format!("spectrum-{index:03}"),
@@ -76,11 +79,24 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [Drawn; 2] {
     ]
 }
 
-/// Linear sRGB of a spectrum of means.
-fn colour(stored: &Stored, means: &[Estimate]) -> [f64; 3] {
-    let bands = means.iter().zip(&stored.record.bands);
-    bands
-        .fold([0.0; 3], |rgb, (mean, band)| [0, 1, 2].map(|c| rgb[c] + mean.value * band.display_rgb[c]))
+/// Linear sRGB of a run's spectrum. Its error is that of the sums over bands in each batch: bands may share their paths.
+fn colour(stored: &Stored, run: &EstimatorRun) -> Option<[Estimate; 3]> {
+    let bands = &stored.record.bands;
+    let gates: Vec<Vec<Moments>> =
+        (0..bands.len()).map(|band| stored.gate(run, 0, band)).collect::<Option<_>>()?;
+    let channel = |c: usize| {
+        let batch = |batch: usize| {
+            let part = |(gate, band): (&Vec<Moments>, &Band)| gate[batch].mean * band.display_rgb[c];
+            Moments {
+                n: gates[0][batch].n,
+                mean: gates.iter().zip(bands).map(part).sum(),
+                ..Moments::default()
+            }
+        };
+        let batches: Vec<Moments> = (0..gates[0].len()).map(batch).collect();
+        Estimate::of_batches(&batches)
+    };
+    Some([0, 1, 2].map(channel))
 }
 
 /// Colours with their names.
@@ -118,15 +134,29 @@ mod tests {
             display_rgb: [0.1, 0.2, 0.3],
         };
         stored.record.bands = (0..4).map(band).collect();
-        // The arrays of the sample have two bands: the others have no mean and no point.
+        // The arrays of the sample have two bands: here each stands twice.
+        for array in
+            stored.arrays.values_mut().filter(|array| array.shape.len() == 4 && array.shape[3] == 5)
+        {
+            let twice = |rows: &[f64]| [rows, rows].concat();
+            array.data = array.data.chunks(10).flat_map(twice).collect();
+            array.shape[2] = 4;
+        }
         let section = section(&stored);
         assert_eq!(section.drawn.len(), 2);
         let Content::Plots(plots) = &section.drawn[0].content else { panic!("plots") };
-        assert_eq!(plots[0].series[0].points.iter().map(|p| p.x).collect::<Vec<_>>(), [425.0, 475.0]);
+        assert_eq!(
+            plots[0].series[0].points.iter().map(|p| p.x).collect::<Vec<_>>(),
+            [425.0, 475.0, 525.0, 575.0]
+        );
         let Content::Swatches(colours) = &section.drawn[1].content else { panic!("colours") };
-        // Means near 1 in two bands: linear 0.2, 0.4, 0.6 are 124, 170, 203 in sRGB.
-        let off = |[r, g, b]: [u8; 3]| [r.abs_diff(124), g.abs_diff(170), b.abs_diff(203)];
+        // Means near 1 in four bands: linear 0.4, 0.8, 1.2 are 170, 231, 255 in sRGB.
+        let off = |[r, g, b]: [u8; 3]| [r.abs_diff(170), g.abs_diff(231), b.abs_diff(255)];
         assert!(off(colours[0].1).iter().all(|d| *d <= 1), "{colours:?}");
+        assert!(
+            section.drawn[1].caption.contains("linear sRGB 0.4")
+                && section.drawn[1].caption.contains('(')
+        );
         assert!(swatches(colours).contains("rgb("));
     }
 }
