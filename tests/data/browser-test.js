@@ -448,7 +448,8 @@
     check(innerWidth === 360, "the width asked for", String(innerWidth));
     await drawn(roots[0]);
     const fits = (state) => check(document.documentElement.scrollWidth <= 360, `no overflow: ${state}`, document.documentElement.scrollWidth);
-    roots[0].querySelectorAll("details").forEach((details) => (details.open = true));
+    document.querySelectorAll("details").forEach((details) => (details.open = true));
+    fits("all that opens is open");
     await states(parts(roots[0]), fits);
     await key(parts(roots[0]), "1");
     await key(parts(roots[0]), "ArrowRight", { shiftKey: true });
