@@ -12,7 +12,7 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 19] = [
+const PAGES: [&str; 20] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
@@ -28,6 +28,7 @@ const PAGES: [&str; 19] = [
     "docs/live-view.md",
     "docs/own-estimator.md",
     "docs/subdivision.md",
+    "docs/verification.md",
     "examples/ci-gate/README.md",
     "examples/own-estimator/README.md",
     "results/README.md",
@@ -372,4 +373,23 @@ fn every_command_exists() {
         assert!(found.contains(words), "not found: {words}\n{found}");
     }
     assert_eq!(found.lines().count(), 6, "{found}");
+}
+
+/// A page that the book does not list is a page that nobody finds.
+#[test]
+fn the_book_lists_every_page() {
+    let summary = text("docs/SUMMARY.md");
+    let pages =
+        fs::read_dir(package().join("docs")).expect("docs").map(|entry| entry.expect("an entry").path());
+    let names = pages.filter(|path| path.extension().is_some_and(|e| e == "md"));
+    let names: Vec<String> =
+        names.filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned())).collect();
+    assert!(names.len() > 8, "{names:?}");
+    for name in names.iter().filter(|name| *name != "SUMMARY.md") {
+        assert!(summary.contains(&format!("]({name})")), "docs/SUMMARY.md does not list {name}");
+        assert!(
+            PAGES.contains(&format!("docs/{name}").as_str()),
+            "docs/{name} is not among the pages tested"
+        );
+    }
 }
