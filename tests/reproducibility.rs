@@ -244,6 +244,9 @@ fn a_budget_in_seconds_comes_again_by_the_passes_of_its_record() {
         work.run("run x.toml -q --out no --passes-of first --set object.boundary.rough.alpha=0.4");
     other.exits(3).complains("of another experiment than the file").complains("compare");
     work.run("run x.toml -q --out no --passes-of nowhere").exits(3).complains("no record here");
+    let samplers = concat!(env!("CARGO_MANIFEST_DIR"), "/experiments/verify/samplers.toml");
+    let refused = work.run(&format!("run {samplers} -q --passes-of first"));
+    refused.exits(2).complains("no passes to take").complains("leave --passes-of out");
     work.run("run x.toml -q --out third --set object.boundary.rough.alpha=0.4").exits(0);
     work.run("compare first/x third/x").says("the records are not byte-identical");
 }

@@ -135,6 +135,16 @@ pub fn run_any(
     match loaded {
         Loaded::Scene(experiment) => run(experiment, registry, options, interrupt),
         Loaded::Samplers(experiment) => {
+            if options.passes_of.is_some() {
+                let words = format!(
+                    "`{}` draws from samplers: it has no passes to take from a record",
+                    loaded.name()
+                );
+                return Err(Error::input_help(
+                    words,
+                    "leave --passes-of out: its file says how many draws",
+                ));
+            }
             if options.live.is_some() {
                 eprintln!("{}", nothing_to_show(loaded.name()));
             }
