@@ -185,6 +185,14 @@ fn summary(material: &Material) -> Value {
     })
 }
 
+/// Of so many bands those that have pictures of their own: all of three, and of more the first, the middle and the last.
+fn few_bands(count: usize) -> Vec<usize> {
+    match count {
+        0..=3 => (0..count).collect(),
+        _ => vec![0, count / 2, count - 1],
+    }
+}
+
 fn write_figures(folder: &RecordFolder, stored: &Stored) -> Result<Vec<Figure>> {
     let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
     let mut figures = Vec::new();

@@ -4,7 +4,7 @@ use super::document::TableBlock;
 use super::number::{significant, with_error};
 use super::table::Table;
 use crate::results::measurements::Measurement;
-use crate::results::record::{Cell, CostMeasure, Observable, PIXELS};
+use crate::results::record::{Cell, CostMeasure, PIXELS};
 use crate::results::store::Stored;
 use crate::verify::comparisons::Row;
 use crate::verify::model_errors::ModelError;
@@ -42,7 +42,8 @@ pub fn efficiency(stored: &Stored, rows: &[Row], cost: CostMeasure) -> Option<Ta
     let quoted = rows.iter().find(|row| row.efficiency_ratio.is_finite())?;
     let name = |row: &Row| format!("{} / {}", row.candidate, row.baseline);
     let entries = rows.iter().map(|row| Entry {
-        row: [&row.cell, &row.band].map(String::from),
+        cell: row.cell.clone(),
+        names: vec![row.band.clone()],
         column: name(row),
         text: ratio(row),
     });
@@ -89,7 +90,8 @@ pub fn means(stored: &Stored, rows: &[Measurement]) -> Option<TableBlock> {
     let rows: Vec<&Measurement> = rows.iter().filter(|row| first(row) == Some(true)).collect();
     let observable = &rows.first()?.observable;
     let entry = |row: &&Measurement| Entry {
-        row: [row.cell.clone(), row.band.clone()],
+        cell: row.cell.clone(),
+        names: vec![row.band.clone()],
         column: row.estimator.clone(),
         text: with_error(row.mean, row.std_error),
     };
@@ -108,7 +110,8 @@ pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> 
         let percent = |x: f64| format!("{:+.1}", 100.0 * x);
         let star = if row.note.is_empty() { "" } else { "*" };
         Entry {
-            row: [row.cell.clone(), format!("{}\n{}", row.band, named(&row.observable))],
+            cell: row.cell.clone(),
+            names: vec![row.band.clone(), row.observable.name.clone()],
             column: row.estimator.clone(),
             text: format!("{}{star} [{}, {}]", percent(row.relative.value), percent(low), percent(high)),
         }
@@ -124,15 +127,18 @@ pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> 
     Some(TableBlock::new("model-error", caption, table))
 }
 
-fn named(observable: &Observable) -> &str {
-    &observable.name
-}
-
-/// A field of a table: the label of its cell and what else names its row, separated by line breaks; its column; its text.
+/// A field of a table: the label of its cell and what else names its row; its column; its text.
 struct Entry {
-    row: [String; 2],
+    cell: String,
+    names: Vec<String>,
     column: String,
     text: String,
+}
+
+impl Entry {
+    fn row(&self) -> (&str, &[String]) {
+        (&self.cell, &self.names)
+    }
 }
 
 /// A row for each cell and name, a column for each axis of the sweep, each part of the names, and each column of the
@@ -140,10 +146,10 @@ struct Entry {
 fn pivot(stored: &Stored, parts: &[&str], entries: Vec<Entry>) -> Table {
     let axes: Vec<&String> =
         stored.record.cells.first().map(|cell| cell.axes.keys().collect()).unwrap_or_default();
-    let (mut rows, mut columns): (Vec<&[String; 2]>, Vec<&String>) = (Vec::new(), Vec::new());
+    let (mut rows, mut columns): (Vec<(&str, &[String])>, Vec<&String>) = (Vec::new(), Vec::new());
     for entry in &entries {
-        if !rows.contains(&&entry.row) {
-            rows.push(&entry.row);
+        if !rows.contains(&entry.row()) {
+            rows.push(entry.row());
         }
         if !columns.contains(&&entry.column) {
             columns.push(&entry.column);
@@ -153,13 +159,13 @@ fn pivot(stored: &Stored, parts: &[&str], entries: Vec<Entry>) -> Table {
     let (axis_names, column_names) = header.split_at(axes.len());
     let mut table = Table::new(&[axis_names, parts, column_names].concat());
     for row in rows {
-        let cell: Option<&Cell> = stored.record.cells.iter().find(|cell| cell.label == row[0]);
+        let cell: Option<&Cell> = stored.record.cells.iter().find(|cell| cell.label == row.0);
         let label =
             |axis: &&String| cell.and_then(|cell| cell.axes.get(*axis)).cloned().unwrap_or_default();
         let mut fields: Vec<String> = axes.iter().map(label).collect();
-        fields.extend(row[1].split('\n').map(String::from));
+        fields.extend(row.1.iter().cloned());
         fields.extend(columns.iter().map(|column| {
-            let own = entries.iter().find(|entry| entry.row == *row && entry.column == **column);
+            let own = entries.iter().find(|entry| entry.row() == row && entry.column == **column);
             own.map(|entry| entry.text.clone()).unwrap_or_default()
         }));
         table.push(fields);

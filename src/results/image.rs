@@ -119,8 +119,10 @@ pub fn shown_bytes(rgb: [f64; 3], gain: f64) -> [u8; 3] {
 
 /// A PNG of 8-bit sRGB values, row by row from the top.
 pub(super) fn encoded(width: usize, height: usize, data: &[u8]) -> Result<Vec<u8>> {
-    encode(width, height, data)
-        .map_err(|e| Error::input(format!("an image of {width}x{height} pixels: {e}")))
+    let set = |encoder: &mut png::Encoder<&mut Vec<u8>>| {
+        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    };
+    encode((width, height), png::ColorType::Rgb, data, set)
 }
 
 /// Writes the PNG and says what it could not show.
@@ -183,34 +185,35 @@ fn upper_half(x: f64) -> u16 {
     if x.is_nan() { 0x7fc0 } else { ((bits + 0x7fff + (bits >> 16 & 1)) >> 16) as u16 }
 }
 
+/// Data for a script: no profile, no filters.
 fn plane_png(width: usize, height: usize, colour: png::ColorType, data: &[u8]) -> Result<Vec<u8>> {
-    let encoded = || {
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
-        encoder.set_color(colour);
-        encoder.set_depth(png::BitDepth::Eight);
+    let set = |encoder: &mut png::Encoder<&mut Vec<u8>>| {
         encoder.set_compression(png::Compression::Balanced);
         encoder.set_filter(png::Filter::NoFilter);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(data)?;
-        writer.finish()?;
-        Ok(bytes)
     };
-    encoded().map_err(|e: png::EncodingError| {
-        Error::input(format!("data of an image of {width}x{height} pixels: {e}"))
-    })
+    encode((width, height), colour, data, set)
 }
 
-fn encode(width: usize, height: usize, data: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
+/// A PNG of 8 bits a channel, with what `set` sets.
+fn encode(
+    (width, height): (usize, usize),
+    colour: png::ColorType,
+    data: &[u8],
+    set: impl FnOnce(&mut png::Encoder<&mut Vec<u8>>),
+) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
-    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_color(colour);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(data)?;
-    writer.finish()?;
-    Ok(bytes)
+    set(&mut encoder);
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(data)?;
+        writer.finish()
+    });
+    match written {
+        Ok(()) => Ok(bytes),
+        Err(e) => Err(Error::input(format!("an image of {width}x{height} pixels: {e}"))),
+    }
 }
 
 /// The transfer function of IEC 61966-2-1: linear in, display value out.

@@ -1,8 +1,10 @@
 //! Plots as SVG, inline in the page and by themselves as files, and their numbers as CSV. Text is in the reader's colours,
 //! series are in the palette of Okabe & Ito, which colour-blind readers can tell apart, each named at its end too.
 
+use super::html::escape;
 use super::number::significant;
 use crate::results::csv_text;
+use crate::stats::hypothesis::{Estimate, critical_value};
 use scale::Scale;
 
 mod scale;
@@ -105,13 +107,21 @@ impl Point {
         Point { x, y, low, high, is_firm: true }
     }
 
+    /// An estimate with its 95 % interval.
+    pub fn of(x: f64, estimate: &Estimate) -> Point {
+        let reach = critical_value(0.05, estimate.dof) * estimate.std_error;
+        Point::new(x, estimate.value, [estimate.value - reach, estimate.value + reach])
+    }
+
     /// A value without one.
     pub fn bare(x: f64, y: f64) -> Point {
         Point::new(x, y, [y, y])
     }
 }
 
-const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b07b00", "#3a9bd9", "#8c6d31"];
+/// Colours of the series, in their order.
+pub(super) const COLOURS: [&str; 7] =
+    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b07b00", "#3a9bd9", "#8c6d31"];
 /// Least distance of names at the right, in units of the picture.
 const LINE: f64 = 15.0;
 /// Most points of a line that are marked one by one.
@@ -360,10 +370,6 @@ fn shortened(name: &str) -> String {
         return name.into();
     }
     name.chars().take(LETTERS - 1).chain(['…']).collect()
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]

@@ -87,3 +87,36 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> 
         content: Content::Plots(vec![above, below]),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::npy::Array;
+    use crate::results::sample;
+
+    /// 100 draws in three cells of masses 0.25, 0.75 and 0, and an outcome that neither can be nor was.
+    #[test]
+    fn residuals_are_in_standard_deviations_and_the_impossible_is_said() {
+        let mut stored = sample::stored(0.1);
+        let run = serde_json::json!({
+            "sampler": "coin", "kind": "test", "samples": 100, "coarse": "c", "fine": null, "serial": null, "deltas": [],
+            "nulls": 0, "null": "never", "outside": 0, "own_density_differs": 0, "own_density_largest": 0.0,
+            "total": 1.0, "total_bound": 0.0, "evaluations": 1, "senseless": 0, "senseless_contrasts": 0,
+            "exhausted": false, "contrasts": [],
+        });
+        stored.record.samplers = vec![serde_json::from_value(run).expect("a sampler")];
+        let cells = [[30.0, 69.0, 1.0, 0.0], [0.25, 0.75, 0.0, 0.0], [0.0; 4]].concat();
+        stored.arrays.insert("c".into(), Array::new(vec![3, 4], cells));
+        let section = section(&stored);
+        let Content::Plots(plots) = &section.drawn[0].content else { panic!("plots") };
+        let values = |plot: usize, series: usize| {
+            plots[plot].series[series].points.iter().map(|p| p.y).collect::<Vec<_>>()
+        };
+        assert_eq!((values(0, 0), values(0, 1)), (vec![0.25, 0.75, 0.0], vec![0.3, 0.69, 0.01]));
+        // (30 - 25) / 5 and (69 - 75) / sqrt(75).
+        assert_eq!(values(1, 1), [1.0, -6.0 / 75f64.sqrt()]);
+        assert!(
+            section.drawn[0].caption.contains("largest residual 1.00. 1 draws in cells without mass")
+        );
+    }
+}

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::document::{Block, FigureBlock, Picture};
+use super::few_bands;
 use super::plot::{Plot, panels};
 use crate::error::Result;
 use crate::results::pictures::Wanted;
@@ -22,9 +23,6 @@ mod ratios;
 mod running;
 /// Means by wavelength, and their colour.
 mod spectra;
-
-/// Most bands that have plots of their own; of more, the first, the middle and the last one have.
-pub const MOST_BANDS: usize = 3;
 
 /// One picture of one or more plots, one above the other.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,11 +145,7 @@ impl Drawn {
 
 /// Indices of the bands that have plots of their own.
 fn shown_bands(stored: &Stored) -> Vec<usize> {
-    let count = stored.record.bands.len();
-    match count {
-        0..=MOST_BANDS => (0..count).collect(),
-        _ => vec![0, count / 2, count - 1],
-    }
+    few_bands(stored.record.bands.len())
 }
 
 /// The estimators of a cell, without second arms of one.

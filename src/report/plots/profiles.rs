@@ -1,11 +1,12 @@
 //! Exitance by distance from where the light came in: the rings of a sensor.
 
+use std::f64::consts::PI;
+
 use super::{Content, Drawn, Section, band_name, joined, runs, shown_bands};
 use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
 use crate::results::record::{Cell, EstimatorRun, Observable, Quantity};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::Estimate;
-use crate::stats::tails::critical_value;
 
 /// A plot for each cell and band, where the sensor has rings.
 pub(super) fn section(stored: &Stored) -> Section {
@@ -38,11 +39,10 @@ fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &
             let observable = Observable { name: format!("ring_{ring}"), class: "all".into() };
             let quantity = Quantity { cell: index, estimator: run.estimator.clone(), observable, band };
             let mean = Estimate::of_batches(&stored.batches(&quantity)?);
-            let reach = critical_value(0.05, mean.dof) * mean.std_error;
             let [from, to] = [edges[ring], edges[ring + 1]];
-            let area = std::f64::consts::PI * (to - from) * (to + from);
-            let [y, low, high] = [0.0, -reach, reach].map(|away| (mean.value + away) / area);
-            Some(Point::new(0.5 * (from + to), y, [low, high]))
+            let area = PI * (to - from) * (to + from);
+            let (value, std_error) = (mean.value / area, mean.std_error / area);
+            Some(Point::of(0.5 * (from + to), &Estimate { value, std_error, ..mean }))
         };
         let points: Vec<Point> = (0..edges.len() - 1).filter_map(point).filter(|p| p.y > 0.0).collect();
         Series { name: run.estimator.clone(), points, style: Style::Line }
@@ -57,7 +57,7 @@ fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &
     Drawn {
         name: format!("profile-{index:03}-{}", band + 1),
         title: joined(&[&cell.label, band_name(stored, band)]),
-        caption: "A ring whose mean is 0 has no point.".into(),
+        caption: "A ring whose mean is not above 0 has no point.".into(),
         content: Content::Plots(vec![plot]),
     }
 }
@@ -84,7 +84,7 @@ mod tests {
         assert_eq!(points.iter().map(|p| p.x).collect::<Vec<_>>(), [0.5, 2.0]);
         assert!(points.iter().all(|p| p.low < p.y && p.y < p.high && p.low > 0.0));
         // Both rings of the sample have a mean of 1.
-        let areas = [std::f64::consts::PI, 8.0 * std::f64::consts::PI];
+        let areas = [PI, 8.0 * PI];
         assert!(points.iter().zip(areas).all(|(p, area)| (p.y * area - 1.0).abs() < 0.1), "{points:?}");
     }
 }

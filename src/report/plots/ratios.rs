@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use super::{Content, Drawn, Section, band_name, joined, shown_bands};
 use crate::report::document::slug;
-use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
+use crate::report::plot::{Axis, COLOURS, Plot, Point, Series, Size, Style};
 use crate::report::summary;
 use crate::results::record::CostMeasure;
 use crate::results::store::Stored;
 use crate::verify::comparisons::Row;
 
-/// Most lines of one plot.
-const MOST_LINES: usize = 9;
+/// Most lines of one plot: each has a colour of its own.
+const MOST_LINES: usize = COLOURS.len();
 /// Fewest numbers that make an axis of numbers.
 const FEWEST: usize = 3;
 
@@ -155,8 +155,7 @@ fn of_axis(
                 size: Size::Small,
             };
             drawn.push(Drawn {
-                name: joined(&[name, &slug(candidate), &slug(band_name(stored, band))])
-                    .replace(", ", "-"),
+                name: slug(&joined(&[name, candidate, band_name(stored, band)])).replace("--", "-"),
                 title: joined(&[&format!("{candidate} over {baseline}"), band_name(stored, band)]),
                 caption,
                 content: Content::Plots(vec![plot]),

@@ -1,6 +1,7 @@
 //! Means by wavelength, and the colour that they give.
 
 use super::{Content, Drawn, Section, runs};
+use crate::report::html::escape;
 use crate::report::number::with_error;
 use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
 use crate::results::image::{gain, shown_bytes};
@@ -8,7 +9,6 @@ use crate::results::record::{Band, Cell, EstimatorRun};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::Estimate;
 use crate::stats::moments::Moments;
-use crate::stats::tails::critical_value;
 
 /// Fewest bands that make a spectrum.
 const FEWEST: usize = 4;
@@ -40,8 +40,7 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [Drawn; 2] {
     let line = |(run, means): &(&EstimatorRun, Vec<Estimate>)| {
         let points = means.iter().zip(&stored.record.bands).map(|(mean, band)| {
             let [from, to] = band.range_nm.unwrap_or_default();
-            let reach = critical_value(0.05, mean.dof) * mean.std_error;
-            Point::new(0.5 * (from + to), mean.value, [mean.value - reach, mean.value + reach])
+            Point::of(0.5 * (from + to), mean)
         });
         Series { name: run.estimator.clone(), points: points.collect(), style: Style::Line }
     };
@@ -104,7 +103,7 @@ pub(super) fn swatches(colours: &[(String, [u8; 3])]) -> String {
     let height = 12.0 + 44.0 * colours.len() as f64;
     let row = |(place, (name, [r, g, b])): (usize, &(String, [u8; 3]))| {
         let top = 12.0 + 44.0 * place as f64;
-        let name = name.replace('&', "&amp;").replace('<', "&lt;");
+        let name = escape(name);
         format!(
             "<rect x=\"12\" y=\"{top}\" width=\"120\" height=\"36\" rx=\"4\" fill=\"rgb({r},{g},{b})\" stroke=\"currentColor\" \
              stroke-opacity=\"0.3\"/><text x=\"146\" y=\"{}\" fill=\"currentColor\">{name}, rgb({r}, {g}, {b})</text>\n",

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::base64;
 use super::document::{self, FigureBlock};
-use super::{Figure, number::significant};
+use super::{Figure, few_bands, number::significant};
 use crate::error::Result;
 use crate::results::image::{Picture, to_byte_png, to_linear_png};
 use crate::results::record::{Bias, Cell, EstimatorRun};
@@ -21,8 +21,6 @@ pub use html::{parts, to_html};
 
 /// Bytes that the viewers of a page may hold together; a browser opens that much at once.
 const ROOM: usize = 24_000_000;
-/// Up to so many bands have maps; of more, the first, the middle and the last.
-const MAPPED: usize = 3;
 
 /// The pictures of one cell.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -206,11 +204,12 @@ pub(super) fn keep_room<'a>(first: &[Viewer], more: impl Iterator<Item = &'a mut
 
 /// The bands that have maps, and a note where that is not all of them.
 fn mapped(bands: usize) -> (Vec<usize>, String) {
-    if bands <= MAPPED {
-        return ((0..bands).collect(), String::new());
-    }
-    let note = format!("Maps of the first, the middle and the last of {bands} bands.");
-    (vec![0, bands / 2, bands - 1], note)
+    let few = few_bands(bands);
+    let note = match few.len() == bands {
+        true => String::new(),
+        false => format!("Maps of the first, the middle and the last of {bands} bands."),
+    };
+    (few, note)
 }
 
 /// The first of the cell's estimators of the same integral, where that is another one.
