@@ -71,14 +71,13 @@ fn stale(folder: &Path) -> Vec<String> {
             None => stale.push(format!("{}/{name}: the record gives no such file", folder.display())),
         }
     }
-    // Pictures for people are kept, their data are not.
-    let in_parts = |name: &str| name.starts_with("tables/measurements-") || name.contains("-cell-");
-    let kept = |name: &&String| {
-        !in_parts(name)
-            && is_view(name)
-            && !name.ends_with(".exr")
-            && !(name.starts_with("images/") && name.ends_with(".md"))
+    // Pictures for people are kept, their data are not, nor what is shown whole elsewhere.
+    let is_left_out = |name: &str| {
+        let is_caption = name.starts_with("images/") && name.ends_with(".md");
+        let is_part = name.starts_with("tables/measurements-") || name.contains("-cell-");
+        name.ends_with(".exr") || is_caption || is_part
     };
+    let kept = |name: &&String| is_view(name) && !is_left_out(name);
     let missing = made.keys().filter(kept).filter(|name| !all.contains_key(*name));
     stale.extend(missing.map(|name| format!("{}/{name}: missing", folder.display())));
     stale
