@@ -177,7 +177,7 @@ fn paths(criterion: &mut Criterion) {
                 bencher.iter(|| {
                     scores.clear();
                     tracer.pass(&[0], &key, &mut scores);
-                    black_box(scores.gates[0])
+                    black_box(scores.observables[0])
                 });
             });
         }

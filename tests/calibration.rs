@@ -17,11 +17,11 @@ use std::sync::LazyLock;
 
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
-use scatterproof::stats::acceptance::Bin;
+use scatterproof::stats::acceptance::Bin as DepthBin;
 use scatterproof::stats::continuous::Sorted;
 use scatterproof::stats::efficiency::{Block, compare};
 use scatterproof::stats::evidence::{TwoSided, Upward};
-use scatterproof::stats::goodness::{Cell, contrast, independence, pearson, proportion};
+use scatterproof::stats::goodness::{Bin, contrast, independence, pearson, proportion};
 use scatterproof::stats::hypothesis::Estimate;
 use scatterproof::stats::moments::Moments;
 use scatterproof::stats::tails::{
@@ -59,9 +59,9 @@ impl Draws {
         (-2.0 * self.uniform().ln()).sqrt() * (TAU * self.uniform()).cos()
     }
 
-    /// The cell of `count` cells that a number of density (1 + x) / 1.5 on [0, 1] falls into:
+    /// The bin of `count` bins that a number of density (1 + x) / 1.5 on [0, 1] falls into:
     /// F(x) = (x + x^2/2) / 1.5.
-    fn cell(&mut self, count: usize) -> usize {
+    fn bin(&mut self, count: usize) -> usize {
         let x = (1.0 + 3.0 * self.uniform()).sqrt() - 1.0;
         ((x * count as f64) as usize).min(count - 1)
     }
@@ -73,7 +73,7 @@ impl Draws {
     }
 }
 
-/// Masses of the cells of [`Draws::cell`].
+/// Masses of the bins of [`Draws::bin`].
 fn masses(count: usize) -> Vec<f64> {
     let cdf = |x: f64| (x + 0.5 * x * x) / 1.5;
     let n = count as f64;
@@ -135,13 +135,13 @@ const KINDS: [Kind; 15] = [
     },
     Kind {
         name: "pearson",
-        null: "4096 samples in 64 cells of linear density",
+        null: "4096 samples in 64 bins of linear density",
         promise: Promise::Uniform,
         p_value: |d| {
-            let cell = |mass: f64| Cell { mass, error: 0.0, count: 0 };
-            let mut cells: Vec<Cell> = masses(64).into_iter().map(cell).collect();
-            (0..4096).for_each(|_| cells[d.cell(64)].count += 1);
-            pearson(&cells).expect("a test").p_value
+            let bin = |mass: f64| Bin { mass, error: 0.0, count: 0 };
+            let mut bins: Vec<Bin> = masses(64).into_iter().map(bin).collect();
+            (0..4096).for_each(|_| bins[d.bin(64)].count += 1);
+            pearson(&bins).expect("a test").p_value
         },
     },
     Kind {
@@ -175,12 +175,12 @@ const KINDS: [Kind; 15] = [
     },
     Kind {
         name: "independence",
-        null: "4096 disjoint pairs of draws in 8 x 8 cells",
+        null: "4096 disjoint pairs of draws in 8 x 8 bins",
         promise: Promise::Uniform,
         p_value: |d| {
             let masses: Vec<(f64, f64)> = masses(8).into_iter().map(|m| (m, 0.0)).collect();
             let mut counts = [0; 64];
-            (0..4096).for_each(|_| counts[8 * d.cell(8) + d.cell(8)] += 1);
+            (0..4096).for_each(|_| counts[8 * d.bin(8) + d.bin(8)] += 1);
             independence(&masses, &counts).expect("a test").p_value
         },
     },
@@ -244,7 +244,7 @@ const KINDS: [Kind; 15] = [
         null: "2000 trials at optical depths from 1 to 1.25",
         promise: Promise::Conservative,
         p_value: |d| {
-            let mut bin = Bin::default();
+            let mut bin = DepthBin::default();
             for _ in 0..2000 {
                 let tau = 1.0 + 0.25 * d.uniform();
                 let p = (-tau).exp();

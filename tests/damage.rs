@@ -65,8 +65,8 @@ fn a_disk_that_is_full_for_the_record_alone() {
     // The states are written with room to spare, then the room shrinks.
     work.run("run x.toml -q").exits(0);
     fs::remove_dir_all(work.path("results/x/record")).expect("removed");
-    let gates = size(&work.record("fresh"), ".gates.npy");
-    let ran = work.run_limited(gates / 1024 / 2, "run x.toml -q");
+    let observables = size(&work.record("fresh"), ".observables.npy");
+    let ran = work.run_limited(observables / 1024 / 2, "run x.toml -q");
     ran.exits(3).complains("could not write the record").complains(".npy");
     assert!(!work.path("results/x/record").exists());
     assert_eq!(unfinished(&work), [""; 0]);

@@ -58,14 +58,16 @@ fn playing_rivals_side_by_side_changes_no_byte() {
         work.run("run x.toml -q --threads 1").exits(0);
         let first = work.record("results");
         for name in ["mis", "analog"] {
-            for kind in ["gates", "costs", "spread", "pixels"] {
+            for kind in ["observables", "costs", "spread", "pixels"] {
                 let path = format!("cells/000/{name}.{kind}.npy");
                 // A probe has no pixels, and then neither record holds any.
                 assert!(first.get(&path) == alone.get(&path), "{path} is another than without a rival");
             }
         }
-        assert!(alone.contains_key("cells/000/mis.gates.npy"));
-        assert!(first["cells/000/mis.gates.npy"] != first["cells/000/mis (control).gates.npy"]);
+        assert!(alone.contains_key("cells/000/mis.observables.npy"));
+        assert!(
+            first["cells/000/mis.observables.npy"] != first["cells/000/mis (control).observables.npy"]
+        );
         for options in ["--threads 2", "--threads 7", "--threads 2 --block-passes 5"] {
             work.run(&format!("run x.toml -q --out other {options}")).exits(0);
             same(&first, &work.record("other"), options);

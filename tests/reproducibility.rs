@@ -32,17 +32,17 @@ fn json(files: &Files) -> Value {
 }
 
 /// Gate bytes by what was measured: hash of the cell's content and estimator.
-fn gates(files: &Files) -> BTreeMap<(String, String), Vec<u8>> {
+fn observables(files: &Files) -> BTreeMap<(String, String), Vec<u8>> {
     let text = |value: &Value| value.as_str().expect("a text").to_string();
-    let mut gates = BTreeMap::new();
+    let mut observables = BTreeMap::new();
     for cell in json(files)["cells"].as_array().expect("cells") {
         for run in cell["runs"].as_array().expect("runs") {
             let key = (text(&cell["content_hash"]), text(&run["estimator"]));
-            let before = gates.insert(key, files[&text(&run["gates"])].clone());
+            let before = observables.insert(key, files[&text(&run["observables"])].clone());
             assert!(before.is_none(), "two cells are the same");
         }
     }
-    gates
+    observables
 }
 
 #[test]
@@ -98,10 +98,10 @@ fn swept(values: &str) -> String {
 
 #[test]
 fn the_order_of_a_sweep_changes_no_number() {
-    let forward = gates(&fresh(&swept("[1.0, 1.5, 2.0]")));
+    let forward = observables(&fresh(&swept("[1.0, 1.5, 2.0]")));
     assert_eq!(forward.len(), 6);
-    assert_eq!(forward, gates(&fresh(&swept("[2.0, 1.0, 1.5]"))));
-    for (key, bytes) in gates(&fresh(&swept("[1.5]"))) {
+    assert_eq!(forward, observables(&fresh(&swept("[2.0, 1.0, 1.5]"))));
+    for (key, bytes) in observables(&fresh(&swept("[1.5]"))) {
         assert_eq!(forward.get(&key), Some(&bytes), "a cell by itself");
     }
     let mut numbers: Vec<&Vec<u8>> = forward.values().collect();
@@ -116,7 +116,7 @@ fn what_names_the_streams_and_what_does_not() {
     let numbers = |old: &str, new: &str| arrays(&fresh(&replaced(&probe(), old, new)));
     for (old, new) in [("seed = 7", "seed = 8"), ("name = \"mis\"", "name = \"path\"")] {
         let other = numbers(old, new);
-        let mis = &arrays(&base)["cells/000/mis.gates.npy"];
+        let mis = &arrays(&base)["cells/000/mis.observables.npy"];
         assert!(other.values().all(|bytes| bytes != mis), "{new} changes the numbers");
     }
     let claim = "seed = 7\ndescription = \"something\"\ndisplay.exposure_stops = 2\n\
@@ -145,7 +145,7 @@ fn paired_cells_share_their_streams() {
     for (more, is_paired) in [("", false), ("[pair]\nover = [\"object.boundary\"]\n", true)] {
         let files = fresh(&boundaries(more));
         for name in ["mis", "analog"] {
-            for kind in ["gates", "pixels"] {
+            for kind in ["observables", "pixels"] {
                 let [grey, bands] =
                     [0, 1].map(|cell| &files[&format!("cells/{cell:03}/{name}.{kind}.npy")]);
                 assert_eq!(grey == bands, is_paired, "{name} {kind}");
@@ -157,7 +157,7 @@ fn paired_cells_share_their_streams() {
     }
     // Paired over something else, they do not.
     let files = fresh(&boundaries("[pair]\nover = [\"object.shape\"]\n"));
-    assert_ne!(files["cells/000/mis.gates.npy"], files["cells/001/mis.gates.npy"]);
+    assert_ne!(files["cells/000/mis.observables.npy"], files["cells/001/mis.observables.npy"]);
 }
 
 /// The furnace of `init`, whose claim holds, in 64 passes of one estimator and without its claim.

@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use super::bssrdf_probe::adds_single;
 use super::bssrdf_single::score_single;
-use super::emergence::{Emergence, Gather, Skin};
+use super::emergence::{BssrdfScene, Emergence, Gather};
 use super::illumination::{Entrance, Illumination, PathStreams, groups_among};
 use super::{BandUse, Bias, Cost, Estimator, Scores, TransportClass};
 use crate::error::{Error, Result};
@@ -47,7 +47,7 @@ pub struct DensityOptions {
 /// The estimator, for one scene.
 #[derive(Debug)]
 pub struct BssrdfDensity {
-    skin: Skin,
+    bssrdf: BssrdfScene,
     illumination: Illumination,
     sampler: BodySampler,
     samples: usize,
@@ -68,27 +68,27 @@ impl BssrdfDensity {
                 "use a finite body, or bssrdf_probe",
             ));
         };
-        let skin = Skin::new(scene, &options.model, options.straight)?;
-        if skin.models.iter().any(|model| model.needs_directions()) {
+        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
+        if bssrdf.models.iter().any(|model| model.needs_directions()) {
             return Err(Error::input_help(
                 "bssrdf_density stores irradiance, which has lost the direction of light that this model needs",
                 "use bssrdf_probe or point_cloud",
             ));
         }
         Ok(BssrdfDensity {
-            illumination: Illumination::new(&skin.scene),
+            illumination: Illumination::new(&bssrdf.scene),
             sampler,
             samples: options.samples,
             radius: options.radius,
-            single: adds_single(&skin, options.single),
+            single: adds_single(&bssrdf, options.single),
             model: options.model.to_string(),
-            skin,
+            bssrdf,
         })
     }
 
     /// Points of one pass with their irradiance.
     fn store(&self, key: &PassKey, scores: &mut Scores) -> Stored {
-        let scene = &*self.skin.scene;
+        let scene = &*self.bssrdf.scene;
         let stride = scene.bands() * scene.lights.len();
         let mut points = Vec::with_capacity(self.samples);
         let mut irradiance = vec![0.0; self.samples * stride];
@@ -107,13 +107,13 @@ impl BssrdfDensity {
 
     /// Irradiance that goes in at a point, `[light][band]`, from one light sample per band.
     fn enter(&self, at: &BodyPoint, u: [f64; 3], entered: &mut [f64], scores: &mut Scores) {
-        let scene = &*self.skin.scene;
+        let scene = &*self.bssrdf.scene;
         let BodyPoint { point, normal, shading_normal, face, .. } = *at;
         let hit = Hit { t: 0.0, point, normal, shading_normal, face };
         let mut last: Option<(DVec3, bool)> = None;
         for band in 0..scene.bands() {
             let Some(arrival) = self.illumination.draw(scene, band, u) else { continue };
-            let eta = self.skin.eta[band];
+            let eta = self.bssrdf.eta[band];
             let Some(entrance) = Entrance::at(&hit, arrival.wi, eta, scores) else { continue };
             let is_lit = match last {
                 Some((wi, is_lit)) if wi == arrival.wi => is_lit,
@@ -138,20 +138,20 @@ impl BssrdfDensity {
         stride: usize,
         radius: f64,
     ) -> Vec<f64> {
-        let cell = |point: DVec3| (point / radius).floor().to_array().map(|x| x as i64);
-        let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+        let voxel = |point: DVec3| (point / radius).floor().to_array().map(|x| x as i64);
+        let mut voxels: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
         for (index, (point, _)) in points.iter().enumerate() {
-            cells.entry(cell(*point)).or_default().push(index);
+            voxels.entry(voxel(*point)).or_default().push(index);
         }
         let mut averaged = vec![0.0; irradiance.len()];
         let area = self.sampler.area() / (points.len() - 1) as f64;
         let scale = area / (PI * radius * radius);
         for (index, (point, normal)) in points.iter().enumerate() {
             let sum = &mut averaged[index * stride..][..stride];
-            let [x, y, z] = cell(*point);
+            let [x, y, z] = voxel(*point);
             for k in 0..27 {
                 let neighbour = [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1];
-                for &other in cells.get(&neighbour).into_iter().flatten() {
+                for &other in voxels.get(&neighbour).into_iter().flatten() {
                     let (place, facing) = points[other];
                     let is_near = (place - *point).length_squared() < radius * radius;
                     if other != index && is_near && facing.dot(*normal) > 0.0 {
@@ -178,11 +178,11 @@ struct Stored {
 impl Estimator for BssrdfDensity {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         let stored = self.store(key, scores);
-        for group in groups_among(&self.skin, bands) {
-            for index in 0..self.skin.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(&self.skin, key, index, &group);
+        for group in groups_among(&self.bssrdf, bands) {
+            for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
+                let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut sum = Sum { estimator: self, stored: &stored, streams };
-                self.skin.play(&group, index, key, scores, &mut sum);
+                self.bssrdf.play(&group, index, key, scores, &mut sum);
             }
         }
     }
@@ -203,12 +203,12 @@ impl Estimator for BssrdfDensity {
     }
 
     fn notes(&self) -> Vec<String> {
-        self.skin.notes()
+        self.bssrdf.notes()
     }
 
     fn working_bytes(&self) -> usize {
-        let stride = self.skin.scene.bands() * self.skin.scene.lights.len();
-        // Points, both irradiances, and the cells' lists at their fullest.
+        let stride = self.bssrdf.scene.bands() * self.bssrdf.scene.lights.len();
+        // Points, both irradiances, and the voxels' lists at their fullest.
         self.samples * (48 + 16 * stride + if self.radius.is_some() { 96 } else { 0 })
     }
 }
@@ -221,18 +221,18 @@ struct Sum<'a> {
 
 impl Gather for Sum<'_> {
     fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let BssrdfDensity { skin, illumination, sampler, single, .. } = self.estimator;
+        let BssrdfDensity { bssrdf, illumination, sampler, single, .. } = self.estimator;
         if *single {
-            score_single(skin, illumination, emergence, &mut self.streams.single, scores);
+            score_single(bssrdf, illumination, emergence, &mut self.streams.single, scores);
         }
         let Stored { points, irradiance, stride } = self.stored;
-        let bands = skin.scene.bands();
+        let bands = bssrdf.scene.bands();
         let area = sampler.area() / points.len() as f64;
         for (&band, throughput) in emergence.bands.iter().zip(emergence.throughput) {
-            let mut sums = vec![0.0; skin.scene.lights.len()];
+            let mut sums = vec![0.0; bssrdf.scene.lights.len()];
             for ((point, normal), entered) in points.iter().zip(irradiance.chunks_exact(*stride)) {
                 let entry = Entry { point: *point, normal: *normal, dir: -*normal };
-                let kernel = skin.models[band].kernel(&entry, &emergence.exit);
+                let kernel = bssrdf.models[band].kernel(&entry, &emergence.exit);
                 for (sum, entered) in sums.iter_mut().zip(entered.chunks_exact(bands)) {
                     *sum += kernel * entered[band];
                 }
@@ -288,27 +288,27 @@ mod tests {
     fn sphere_in_a_sky() {
         for radius in [None, Some(0.3)] {
             let density = estimator(sky(), 512, radius);
-            let skin = &density.skin;
-            let Sensor::Probe { ray, .. } = skin.scene.sensor else { unreachable!() };
+            let bssrdf = &density.bssrdf;
+            let Sensor::Probe { ray, .. } = bssrdf.scene.sensor else { unreachable!() };
             let met = SPHERE.intersect(&ray, Side::Outside, None, f64::INFINITY).expect("a hit");
             let t21 = 1.0 - fresnel(-met.normal.dot(ray.dir), 1.3).reflectance;
             let flux = |mu: f64| 2.0 * PI * mu * (1.0 - fresnel(mu, 1.3).reflectance);
             let kernel = |d: f64| {
                 let entry = Entry { point: DVec3::X * d, normal: DVec3::Z, dir: -DVec3::Z };
                 let exit = Exit { point: DVec3::ZERO, normal: DVec3::Z };
-                2.0 * PI * d * skin.models[0].kernel(&entry, &exit)
+                2.0 * PI * d * bssrdf.models[0].kernel(&entry, &exit)
             };
             let expected =
                 t21 * integrate(flux, 0.0, 1.0, 1e-12).value * integrate(kernel, 0.0, 2.0, 1e-12).value;
-            let mut scores = Scores::new(Layout::new(&skin.scene));
+            let mut scores = Scores::new(Layout::new(&bssrdf.scene));
             let key = StreamKey::named("bssrdf_density: sphere_in_a_sky");
             let (mut mean, mut m2, n) = (0.0, 0.0, 6000);
             for pass in 0..n {
                 scores.clear();
                 density.pass(&[0], &key.pass(pass), &mut scores);
-                let before = scores.gates[1 + TransportClass::Multiple as usize] - mean;
+                let before = scores.observables[1 + TransportClass::Multiple as usize] - mean;
                 mean += before / (pass + 1) as f64;
-                m2 += before * (scores.gates[1 + TransportClass::Multiple as usize] - mean);
+                m2 += before * (scores.observables[1 + TransportClass::Multiple as usize] - mean);
             }
             let error = (m2 / (n as f64 * (n as f64 - 1.0))).sqrt();
             assert!(scores.anomalies.iter().all(|&count| count == 0));
@@ -326,7 +326,7 @@ mod tests {
         for blurred in [false, true] {
             let sun = Emission::Directional { toward: DVec3::Z, irradiance: vec![1.0] };
             let density = estimator(sun, 4000, blurred.then_some(radius));
-            let mut scores = Scores::new(Layout::new(&density.skin.scene));
+            let mut scores = Scores::new(Layout::new(&density.bssrdf.scene));
             let key = StreamKey::named("borders_of_shadows_are_blurred").pass(0);
             let stored = density.store(&key, &mut scores);
             let (mut near, mut far) = (0, 0);

@@ -18,7 +18,7 @@
 use std::sync::Arc;
 
 use super::bssrdf_single::score_single;
-use super::emergence::{Emergence, Gather, Skin};
+use super::emergence::{BssrdfScene, Emergence, Gather};
 use super::illumination::{Illumination, PathStreams, groups_among};
 use super::{Anomaly, BandUse, Bias, Cost, Estimator, Scores};
 use crate::error::Result;
@@ -46,7 +46,7 @@ pub struct ProbeOptions {
 /// The estimator, for one scene.
 #[derive(Debug)]
 pub struct BssrdfProbe {
-    skin: Skin,
+    bssrdf: BssrdfScene,
     lines: Lines,
     illumination: Illumination,
     probes: usize,
@@ -61,34 +61,34 @@ impl BssrdfProbe {
     /// # Errors
     /// A rough boundary; a medium that the model does not fit.
     pub fn new(scene: Arc<Scene>, options: &ProbeOptions) -> Result<BssrdfProbe> {
-        let skin = Skin::new(scene, &options.model, options.straight)?;
+        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
         Ok(BssrdfProbe {
             lines: Lines::new(
-                &skin.scene.shape,
-                skin.models.iter().map(|model| model.techniques()).collect(),
+                &bssrdf.scene.shape,
+                bssrdf.models.iter().map(|model| model.techniques()).collect(),
             ),
-            illumination: Illumination::new(&skin.scene),
+            illumination: Illumination::new(&bssrdf.scene),
             probes: options.probes,
-            single: adds_single(&skin, options.single),
+            single: adds_single(&bssrdf, options.single),
             model: options.model.to_string(),
             reach: options.reach,
-            skin,
+            bssrdf,
         })
     }
 }
 
 /// Whether single scattering is added to a model.
-pub(super) fn adds_single(skin: &Skin, wanted: Option<bool>) -> bool {
-    wanted.unwrap_or_else(|| skin.models.iter().any(|model| model.leaves_out_single))
+pub(super) fn adds_single(bssrdf: &BssrdfScene, wanted: Option<bool>) -> bool {
+    wanted.unwrap_or_else(|| bssrdf.models.iter().any(|model| model.leaves_out_single))
 }
 
 impl Estimator for BssrdfProbe {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
-        for group in groups_among(&self.skin, bands) {
-            for index in 0..self.skin.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(&self.skin, key, index, &group);
+        for group in groups_among(&self.bssrdf, bands) {
+            for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
+                let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut gather = Probing { estimator: self, streams, hits: Vec::new() };
-                self.skin.play(&group, index, key, scores, &mut gather);
+                self.bssrdf.play(&group, index, key, scores, &mut gather);
             }
         }
     }
@@ -109,7 +109,7 @@ impl Estimator for BssrdfProbe {
     }
 
     fn notes(&self) -> Vec<String> {
-        self.skin.notes()
+        self.bssrdf.notes()
     }
 }
 
@@ -121,9 +121,9 @@ struct Probing<'a> {
 
 impl Gather for Probing<'_> {
     fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let BssrdfProbe { skin, lines, illumination, probes, single, reach, .. } = self.estimator;
+        let BssrdfProbe { bssrdf, lines, illumination, probes, single, reach, .. } = self.estimator;
         if *single {
-            score_single(skin, illumination, emergence, &mut self.streams.single, scores);
+            score_single(bssrdf, illumination, emergence, &mut self.streams.single, scores);
         }
         let frame = Frame::about(emergence.exit.normal);
         let reach = reach.unwrap_or(f64::INFINITY);
@@ -134,7 +134,7 @@ impl Gather for Probing<'_> {
                 continue; // all its points are too far
             }
             self.hits.clear();
-            let met = line.cross(&skin.scene.shape, &mut self.hits);
+            let met = line.cross(&bssrdf.scene.shape, &mut self.hits);
             scores.cost[Cost::Rays as usize] += met.rays;
             if met.is_lost {
                 scores.note(Anomaly::LostRay);
@@ -146,7 +146,7 @@ impl Gather for Probing<'_> {
                     continue;
                 }
                 let pdf_area = lines.pdf_area(emergence.bands, &frame, offset, hit.normal);
-                illumination.enter(skin, emergence, hit, *probes as f64 * pdf_area, u, scores);
+                illumination.enter(bssrdf, emergence, hit, *probes as f64 * pdf_area, u, scores);
             }
         }
     }

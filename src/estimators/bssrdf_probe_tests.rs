@@ -89,7 +89,7 @@ fn measure(
         scores.clear();
         estimator.pass(&bands, &key.pass(pass), &mut scores);
         let first = (1 + class as usize) * bands.len();
-        for ((mean, m2), x) in moments.iter_mut().zip(&scores.gates[first..]) {
+        for ((mean, m2), x) in moments.iter_mut().zip(&scores.observables[first..]) {
             let before = x - *mean;
             *mean += before / (pass + 1) as f64;
             *m2 += before * (x - *mean);
@@ -114,11 +114,11 @@ fn diffuse_entry(eta: f64) -> f64 {
 }
 
 /// Int of K over distances up to `r_max` on the plane or, which is the same in chords, on a sphere.
-fn kernel_within(skin: &Skin, band: usize, r_max: f64) -> f64 {
+fn kernel_within(bssrdf: &BssrdfScene, band: usize, r_max: f64) -> f64 {
     let exit = Exit { point: DVec3::ZERO, normal: DVec3::Z };
     let kernel = |r: f64| {
         let entry = Entry { point: DVec3::X * r, normal: DVec3::Z, dir: -DVec3::Z };
-        2.0 * PI * r * skin.models[band].kernel(&entry, &exit)
+        2.0 * PI * r * bssrdf.models[band].kernel(&entry, &exit)
     };
     integrate(kernel, 0.0, r_max, 1e-12).value
 }
@@ -138,7 +138,7 @@ fn half_space_probes_follow_the_kernel() {
         let offset = DVec3::new(0.6 * r, -0.8 * r, 0.0);
         let entry = Entry { point: exit.point + offset, normal: DVec3::Z, dir: -DVec3::Z };
         let pdf_area = estimator.lines.pdf_area(&[0], &frame, offset, DVec3::Z);
-        estimator.skin.models[0].kernel(&entry, &exit) / pdf_area
+        estimator.bssrdf.models[0].kernel(&entry, &exit) / pdf_area
     };
     for k in -40..=5 {
         let r = (0.5 * f64::from(k)).exp2();
@@ -153,13 +153,13 @@ fn half_space_under_a_sky() {
     let eta = 1.3;
     let scene = scene(Shape::HalfSpace, &[eta], &[medium(2.0, 0.95, 0.3)], sky(1, 1.0), 1024);
     let by_probe = probe(&scene);
-    let kernel = kernel_within(&by_probe.skin, 0, 1.0) + {
+    let kernel = kernel_within(&by_probe.bssrdf, 0, 1.0) + {
         // The rest with r = 1/x.
-        let skin = &by_probe.skin;
+        let bssrdf = &by_probe.bssrdf;
         let exit = Exit { point: DVec3::ZERO, normal: DVec3::Z };
         let far = |x: f64| {
             let entry = Entry { point: DVec3::X / x, normal: DVec3::Z, dir: -DVec3::Z };
-            2.0 * PI * skin.models[0].kernel(&entry, &exit) / (x * x * x)
+            2.0 * PI * bssrdf.models[0].kernel(&entry, &exit) / (x * x * x)
         };
         integrate(far, 0.0, 1.0, 1e-12).value
     };
@@ -184,7 +184,7 @@ fn sphere_under_a_sky() {
     let met = Shape::Sphere { radius: 1.0 }.intersect(&ray(), Side::Outside, None, f64::INFINITY);
     let cos = -met.expect("a hit").normal.dot(ray().dir);
     let expected: Vec<f64> = (0..3)
-        .map(|b| t21(eta[b], cos) * diffuse_entry(eta[b]) * kernel_within(&by_probe.skin, b, 2.0))
+        .map(|b| t21(eta[b], cos) * diffuse_entry(eta[b]) * kernel_within(&by_probe.bssrdf, b, 2.0))
         .collect();
     let estimators: [(&str, &dyn Estimator); 2] = [("probe", &by_probe), ("rays", &rays(&scene))];
     for (name, estimator) in estimators {
@@ -209,11 +209,11 @@ fn depth_does_not_matter_and_reach_does() {
     let options = ProbeOptions { reach: Some(0.4), ..probe_options() };
     let near = BssrdfProbe::new(Arc::clone(&scene), &options).expect("it serves");
     assert_eq!(near.bias(), Bias::Biased("entries farther than 0.4 mm are left out".into()));
-    assert!(kernel_within(&near.skin, 0, 0.4) < 0.9 * kernel_within(&near.skin, 0, 2.0));
+    assert!(kernel_within(&near.bssrdf, 0, 0.4) < 0.9 * kernel_within(&near.bssrdf, 0, 2.0));
     let estimators: [(&str, &dyn Estimator, f64); 2] =
         [("shallow rays", &shallow, 2.0), ("near probes", &near, 0.4)];
     for (name, estimator, r_max) in estimators {
-        let expected = t21(1.3, cos) * diffuse_entry(1.3) * kernel_within(&near.skin, 0, r_max);
+        let expected = t21(1.3, cos) * diffuse_entry(1.3) * kernel_within(&near.bssrdf, 0, r_max);
         let test = format!("depth_does_not_matter_and_reach_does, {name}");
         let means = measure(estimator, &scene, TransportClass::Multiple, 384, &test);
         assert_mean(name, means[0], expected, 0.01);

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use super::bssrdf_probe::adds_single;
 use super::bssrdf_single::score_single;
-use super::emergence::{Emergence, Gather, Skin};
+use super::emergence::{BssrdfScene, Emergence, Gather};
 use super::illumination::{Illumination, PathStreams, groups_among};
 use super::{Anomaly, BandUse, Bias, Cost, Estimator, Scores};
 use crate::error::Result;
@@ -45,7 +45,7 @@ pub struct RayOptions {
 /// The estimator, for one scene.
 #[derive(Debug)]
 pub struct BssrdfRays {
-    skin: Skin,
+    bssrdf: BssrdfScene,
     illumination: Illumination,
     rays: usize,
     depth: Option<f64>,
@@ -60,25 +60,25 @@ impl BssrdfRays {
     /// # Errors
     /// A rough boundary; a medium that the model does not fit.
     pub fn new(scene: Arc<Scene>, options: &RayOptions) -> Result<BssrdfRays> {
-        let skin = Skin::new(scene, &options.model, options.straight)?;
+        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
         Ok(BssrdfRays {
-            illumination: Illumination::new(&skin.scene),
+            illumination: Illumination::new(&bssrdf.scene),
             rays: options.rays,
             depth: options.depth,
-            single: adds_single(&skin, options.single),
+            single: adds_single(&bssrdf, options.single),
             model: options.model.to_string(),
-            sees_all: match &*skin.scene.shape {
+            sees_all: match &*bssrdf.scene.shape {
                 Shape::Mesh(mesh) => is_convex(mesh),
                 shape => shape.is_convex(),
             },
-            skin,
+            bssrdf,
         })
     }
 
     fn depth(&self, bands: &[usize]) -> f64 {
         self.depth.unwrap_or_else(|| {
             let mfp = bands.iter().map(|&band| {
-                let medium = &self.skin.scene.medium[band];
+                let medium = &self.bssrdf.scene.medium[band];
                 1.0 / (medium.sigma_t * (1.0 - medium.albedo * medium.phase.g))
             });
             let (least, most) = mfp.fold((f64::INFINITY, 0f64), |(a, b), mfp| (a.min(mfp), b.max(mfp)));
@@ -108,12 +108,12 @@ fn is_convex(mesh: &Mesh) -> bool {
 
 impl Estimator for BssrdfRays {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
-        for group in groups_among(&self.skin, bands) {
+        for group in groups_among(&self.bssrdf, bands) {
             let depth = self.depth(&group);
-            for index in 0..self.skin.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(&self.skin, key, index, &group);
+            for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
+                let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut gather = Shooting { estimator: self, streams, depth };
-                self.skin.play(&group, index, key, scores, &mut gather);
+                self.bssrdf.play(&group, index, key, scores, &mut gather);
             }
         }
     }
@@ -135,7 +135,7 @@ impl Estimator for BssrdfRays {
     }
 
     fn notes(&self) -> Vec<String> {
-        self.skin.notes()
+        self.bssrdf.notes()
     }
 }
 
@@ -147,12 +147,12 @@ struct Shooting<'a> {
 
 impl Gather for Shooting<'_> {
     fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let BssrdfRays { skin, illumination, rays, single, .. } = self.estimator;
+        let BssrdfRays { bssrdf, illumination, rays, single, .. } = self.estimator;
         if *single {
-            score_single(skin, illumination, emergence, &mut self.streams.single, scores);
+            score_single(bssrdf, illumination, emergence, &mut self.streams.single, scores);
         }
         let Some(origin) = self.below(emergence, scores) else { return };
-        let shape = &skin.scene.shape;
+        let shape = &bssrdf.scene.shape;
         for _ in 0..*rays {
             let u = self.streams.entries.draw2();
             let u_light = self.streams.lights.draw3();
@@ -165,7 +165,7 @@ impl Gather for Shooting<'_> {
                 continue;
             };
             let pdf_area = pdf_cap(2.0) * ray.dir.dot(hit.normal).abs() / (hit.t * hit.t);
-            illumination.enter(skin, emergence, &hit, *rays as f64 * pdf_area, u_light, scores);
+            illumination.enter(bssrdf, emergence, &hit, *rays as f64 * pdf_area, u_light, scores);
         }
     }
 }
@@ -173,7 +173,7 @@ impl Gather for Shooting<'_> {
 impl Shooting<'_> {
     /// The point under the exit.
     fn below(&self, emergence: &Emergence<'_>, scores: &mut Scores) -> Option<DVec3> {
-        let shape = &self.estimator.skin.scene.shape;
+        let shape = &self.estimator.bssrdf.scene.shape;
         let down = Ray { origin: emergence.exit.point, dir: -emergence.exit.normal };
         scores.count(Cost::Rays);
         let opposite = shape.intersect(&down, Side::Inside, Some(emergence.face), f64::INFINITY);

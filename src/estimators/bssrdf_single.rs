@@ -17,7 +17,7 @@
 //! that leaves the body before t carries nothing, and paths that are reflected inside are no part of the term. T21 is left
 //! out: the camera path was refracted with that probability.
 
-use super::emergence::{Emergence, Skin};
+use super::emergence::{BssrdfScene, Emergence};
 use super::illumination::{Entrance, Illumination};
 use super::{Anomaly, Cost, Scores, TransportClass};
 use crate::geometry::{Ray, Side};
@@ -27,7 +27,7 @@ use crate::sampling::stream::Stream;
 
 /// Scores the term once per emergence and band.
 pub(super) fn score_single(
-    skin: &Skin,
+    bssrdf: &BssrdfScene,
     illumination: &Illumination,
     emergence: &Emergence<'_>,
     stream: &mut Stream,
@@ -35,22 +35,22 @@ pub(super) fn score_single(
 ) {
     let u = stream.draw();
     let u_light = stream.draw3();
-    let shape = &skin.scene.shape;
+    let shape = &bssrdf.scene.shape;
     let ray = Ray { origin: emergence.exit.point, dir: emergence.dir };
     scores.count(Cost::Rays);
     let far_end = shape.intersect(&ray, Side::Inside, Some(emergence.face), f64::INFINITY);
     let t_max = far_end.map_or(f64::INFINITY, |hit| hit.t);
     for (&band, throughput) in emergence.bands.iter().zip(emergence.throughput) {
-        let t = sample_exponential(skin.scene.medium[band].sigma_t, u);
+        let t = sample_exponential(bssrdf.scene.medium[band].sigma_t, u);
         if t >= t_max {
             continue;
         }
         scores.count(Cost::MediumEvents);
         let vertex = ray.at(t);
         if let Some(Scattered { light, entry, value }) =
-            scattered(skin, illumination, emergence, band, vertex, u_light, scores)
+            scattered(bssrdf, illumination, emergence, band, vertex, u_light, scores)
         {
-            let slot = skin.scene.sensor.slot_of(emergence.slot, entry);
+            let slot = bssrdf.scene.sensor.slot_of(emergence.slot, entry);
             scores.add(slot, band, TransportClass::Single, light, throughput * value);
         }
     }
@@ -67,7 +67,7 @@ struct Scattered {
 
 /// Light and its part that a vertex on the refracted ray scatters along it, the way to the exit left out.
 fn scattered(
-    skin: &Skin,
+    bssrdf: &BssrdfScene,
     illumination: &Illumination,
     emergence: &Emergence<'_>,
     band: usize,
@@ -75,7 +75,7 @@ fn scattered(
     u: [f64; 3],
     scores: &mut Scores,
 ) -> Option<Scattered> {
-    let scene = &*skin.scene;
+    let scene = &*bssrdf.scene;
     let arrival = illumination.draw(scene, band, u)?;
     let to_light = Ray { origin: vertex, dir: arrival.wi };
     scores.count(Cost::Rays);
@@ -134,8 +134,8 @@ mod tests {
                 });
                 let mut scores = Scores::new(Layout::new(&scene));
                 let model = Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
-                let skin = Skin::new(scene, &model, true).expect("a model");
-                let illumination = Illumination::new(&skin.scene);
+                let bssrdf = BssrdfScene::new(scene, &model, true).expect("a model");
+                let illumination = Illumination::new(&bssrdf.scene);
                 let emergence = Emergence {
                     exit,
                     face: FaceId(0),
@@ -148,7 +148,7 @@ mod tests {
                 let mut at = |t: f64| {
                     let vertex = exit.point + dir * t;
                     let drawn =
-                        scattered(&skin, &illumination, &emergence, 0, vertex, [0.5; 3], &mut scores);
+                        scattered(&bssrdf, &illumination, &emergence, 0, vertex, [0.5; 3], &mut scores);
                     pdf_distance_exponential(3.0, t) * drawn.map_or(0.0, |drawn| drawn.value)
                 };
                 let mean = integrate(&mut at, 0.0, 15.0, 1e-13).value;

@@ -27,7 +27,7 @@ use crate::scene::Scene;
 
 /// A scene whose medium is replaced by a model.
 #[derive(Debug)]
-pub(super) struct Skin {
+pub(super) struct BssrdfScene {
     pub scene: Arc<Scene>,
     /// Per band.
     pub models: Vec<Bssrdf>,
@@ -74,12 +74,12 @@ pub(super) trait Gather {
 /// Weight of a straight path below which roulette decides.
 const ROULETTE: f64 = 0.05;
 
-impl Skin {
+impl BssrdfScene {
     /// For a scene with smooth or matched boundaries.
     ///
     /// # Errors
     /// A rough boundary; a medium that the model does not fit.
-    pub fn new(scene: Arc<Scene>, model: &Model, straight: bool) -> Result<Skin> {
+    pub fn new(scene: Arc<Scene>, model: &Model, straight: bool) -> Result<BssrdfScene> {
         let eta = scene.boundary.iter().map(|boundary| match boundary {
             Boundary::Matched => Ok(1.0),
             Boundary::Smooth { eta } => Ok(*eta),
@@ -105,7 +105,7 @@ impl Skin {
         let mean =
             |light: usize| shares.iter().map(|band| band[light]).sum::<f64>() / shares.len() as f64;
         let choice = (0..scene.lights.len()).map(mean).collect();
-        Ok(Skin { models, eta, groups, straight, choice, scene })
+        Ok(BssrdfScene { models, eta, groups, straight, choice, scene })
     }
 
     /// A light for all bands, and the probability of that choice.
@@ -150,7 +150,7 @@ impl Skin {
         let [c, d] = sensor_stream.draw2();
         let start = self.scene.sensor.ray(index, [a, b, c, d]);
         let mut path = CameraPath {
-            skin: self,
+            bssrdf: self,
             bands,
             eta: self.eta[bands[0]],
             weight: start.weight,
@@ -167,7 +167,7 @@ impl Skin {
 }
 
 struct CameraPath<'a> {
-    skin: &'a Skin,
+    bssrdf: &'a BssrdfScene,
     bands: &'a [usize],
     eta: f64,
     /// Of the sensor's ray.
@@ -184,7 +184,7 @@ impl CameraPath<'_> {
     /// From one hit of the surface to the next; `None` where the path ends.
     fn step(&mut self, scores: &mut Scores, gather: &mut impl Gather) -> Option<()> {
         scores.count(Cost::Rays);
-        let shape = &self.skin.scene.shape;
+        let shape = &self.bssrdf.scene.shape;
         let Some(hit) = shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY) else {
             self.escape(scores);
             return None;
@@ -216,13 +216,13 @@ impl CameraPath<'_> {
             slot: self.slot,
         };
         gather.gather(&emergence, scores);
-        if self.skin.straight { self.go_through(scores) } else { None }
+        if self.bssrdf.straight { self.go_through(scores) } else { None }
     }
 
     /// Goes straight to the other side and out.
     fn go_through(&mut self, scores: &mut Scores) -> Option<()> {
         scores.count(Cost::Rays);
-        let shape = &self.skin.scene.shape;
+        let shape = &self.bssrdf.scene.shape;
         let Some(hit) = shape.intersect(&self.ray, Side::Inside, self.from, f64::INFINITY) else {
             if shape.bounds().is_some() {
                 scores.note(Anomaly::LostRay);
@@ -238,7 +238,7 @@ impl CameraPath<'_> {
         }
         let surface = fresnel(-wo.z, 1.0 / self.eta);
         for (throughput, &band) in self.throughput.iter_mut().zip(self.bands) {
-            let sigma_t = self.skin.models[band].straight_sigma_t;
+            let sigma_t = self.bssrdf.models[band].straight_sigma_t;
             *throughput *= (1.0 - surface.reflectance) * transmittance(sigma_t, hit.t);
         }
         let most = self.throughput.iter().fold(0.0, |most: f64, &t| most.max(t));
@@ -267,8 +267,8 @@ impl CameraPath<'_> {
         if !self.has_met {
             return;
         }
-        let slot = self.skin.scene.sensor.slot_of(self.slot, self.ray.origin);
-        for (light, source) in self.skin.scene.lights.iter().enumerate() {
+        let slot = self.bssrdf.scene.sensor.slot_of(self.slot, self.ray.origin);
+        for (light, source) in self.bssrdf.scene.lights.iter().enumerate() {
             for (&band, throughput) in self.bands.iter().zip(&self.throughput) {
                 let (radiance, _) = source.eval(band, self.ray.dir);
                 if radiance > 0.0 {

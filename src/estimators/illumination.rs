@@ -2,7 +2,7 @@
 //! ways of choosing the point share.
 
 use super::choice::{choose_light, light_shares};
-use super::emergence::{Emergence, Skin};
+use super::emergence::{BssrdfScene, Emergence};
 use super::{Anomaly, Cost, Scores, TransportClass};
 use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, Frame};
@@ -48,14 +48,14 @@ impl Illumination {
     /// Bands whose light samples are the same direction share its shadow ray.
     pub fn enter(
         &self,
-        skin: &Skin,
+        bssrdf: &BssrdfScene,
         emergence: &Emergence<'_>,
         hit: &Hit,
         pdf_area: f64,
         u: [f64; 3],
         scores: &mut Scores,
     ) {
-        let scene = &*skin.scene;
+        let scene = &*bssrdf.scene;
         let slot = scene.sensor.slot_of(emergence.slot, hit.point);
         let mut last: Option<(DVec3, Option<Entrance>)> = None;
         for (&band, throughput) in emergence.bands.iter().zip(emergence.throughput) {
@@ -68,7 +68,7 @@ impl Illumination {
             let Some(entrance) = entrance else { continue };
             let entry = Entry { point: hit.point, normal: hit.shading_normal, dir: entrance.dir };
             scores.count(Cost::Evaluations);
-            let kernel = skin.models[band].kernel(&entry, &emergence.exit);
+            let kernel = bssrdf.models[band].kernel(&entry, &emergence.exit);
             let irradiance = entrance.transmittance * entrance.cos * arrival.value;
             let value = throughput * kernel * irradiance / pdf_area;
             scores.add(slot, band, TransportClass::Multiple, arrival.light, value);
@@ -137,8 +137,8 @@ const SINGLE: u64 = 1 << 63;
 
 impl PathStreams {
     /// For path `index` of a pass and a group of bands.
-    pub fn new(skin: &Skin, key: &PassKey, index: usize, bands: &[usize]) -> PathStreams {
-        let lane = skin.lane(index, bands);
+    pub fn new(bssrdf: &BssrdfScene, key: &PassKey, index: usize, bands: &[usize]) -> PathStreams {
+        let lane = bssrdf.lane(index, bands);
         PathStreams {
             lights: key.stream(lane, Purpose::Light),
             entries: key.stream(lane, Purpose::Connection),
@@ -147,10 +147,10 @@ impl PathStreams {
     }
 }
 
-/// The groups of a skin, as far as they are among `bands`.
-pub(super) fn groups_among(skin: &Skin, bands: &[usize]) -> Vec<Vec<usize>> {
+/// The groups of a bssrdf, as far as they are among `bands`.
+pub(super) fn groups_among(bssrdf: &BssrdfScene, bands: &[usize]) -> Vec<Vec<usize>> {
     let among = |group: &Vec<usize>| -> Vec<usize> {
         group.iter().copied().filter(|band| bands.contains(band)).collect()
     };
-    skin.groups.iter().map(among).filter(|group| !group.is_empty()).collect()
+    bssrdf.groups.iter().map(among).filter(|group| !group.is_empty()).collect()
 }

@@ -79,11 +79,11 @@ fn measure(
 ) -> (Vec<(f64, f64)>, Scores) {
     let mut scores = Scores::new(layout.clone());
     let key = StreamKey::named(test);
-    let mut moments = vec![(0.0, 0.0); scores.gates.len()];
+    let mut moments = vec![(0.0, 0.0); scores.observables.len()];
     for pass in 0..passes {
         scores.clear();
         estimator.pass(&[0], &key.pass(pass), &mut scores);
-        for ((mean, m2), x) in moments.iter_mut().zip(&scores.gates) {
+        for ((mean, m2), x) in moments.iter_mut().zip(&scores.observables) {
             let before = x - *mean;
             *mean += before / (pass + 1) as f64;
             *m2 += before * (x - *mean);
@@ -270,7 +270,7 @@ fn draws_per_event() {
         let mut scores = Scores::new(layout.clone());
         let draws = Photon::play(&tracer, 0, index, &key, &mut scores);
         let [paths, rays, shadow_rays, medium_events, boundary_events, ..] = scores.cost;
-        let out = u64::from(scores.gates[0] > 0.0);
+        let out = u64::from(scores.observables[0] > 0.0);
         let survived = medium_events - (1 - out); // else the last event ended it
         let flights = rays - 1 - out;
         assert_eq!((paths, shadow_rays), (1, 0));
@@ -293,12 +293,12 @@ fn equal_bands_on_one_key_are_equal() {
     let key = StreamKey::named("equal_bands_on_one_key_are_equal, light");
     let mut scores = Scores::new(layout);
     tracer.pass(&[0, 1], &key.pass(0), &mut scores);
-    assert!(scores.gates[0] > 0.0);
-    assert!(scores.gates.chunks(2).all(|bands| bands[0].to_bits() == bands[1].to_bits()));
+    assert!(scores.observables[0] > 0.0);
+    assert!(scores.observables.chunks(2).all(|bands| bands[0].to_bits() == bands[1].to_bits()));
     scores.clear();
     tracer.pass(&[0], &key.pass(0), &mut scores);
     tracer.pass(&[1], &key.pass(1), &mut scores);
-    assert_ne!(scores.gates[0], scores.gates[1]);
+    assert_ne!(scores.observables[0], scores.observables[1]);
 }
 
 /// A scene scaled by a power of two, with coefficients scaled to match, gives the same bits: images

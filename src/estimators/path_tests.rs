@@ -36,12 +36,12 @@ fn measure(scene: Scene, roulette: Roulette, passes: u64, test: &str) -> (Vec<(f
     let tracer = PathTracer::new(Arc::new(scene), roulette);
     let mut scores = Scores::new(layout);
     let key = StreamKey::named(test);
-    let mut moments = vec![(0.0, 0.0); scores.gates.len()];
+    let mut moments = vec![(0.0, 0.0); scores.observables.len()];
     for pass in 0..passes {
         scores.clear();
         tracer.pass(&[0], &key.pass(pass), &mut scores);
         // Welford's update: a variance of 0 comes out as 0.
-        for ((mean, m2), x) in moments.iter_mut().zip(&scores.gates) {
+        for ((mean, m2), x) in moments.iter_mut().zip(&scores.observables) {
             let before = x - *mean;
             *mean += before / (pass + 1) as f64;
             *m2 += before * (x - *mean);
@@ -190,7 +190,7 @@ fn weights_of_both_techniques_sum_to_one() {
     assert!(from_boundary > 500 && from_light > 5000, "{from_boundary} {from_light}");
 }
 
-/// D3: roulette keeps its promise, by enumeration of u over 2^16 cells through the estimator's own
+/// D3: roulette keeps its promise, by enumeration of u over 2^16 intervals through the estimator's own
 /// arithmetic: survivors times their weight is the weight that came in.
 #[test]
 fn roulette_is_compensated() {
@@ -223,7 +223,7 @@ fn draws_per_event() {
         let path = Path { field: &tracer.field, band: 0, index, key: &key };
         let draws = Walk::play(path, &mut scores, Unrivalled, OneBand);
         let [_, rays, _, medium_events, boundary_events, ..] = scores.cost;
-        let out = u64::from(scores.gates[0] > 0.0); // it flew to the sky, and scored
+        let out = u64::from(scores.observables[0] > 0.0); // it flew to the sky, and scored
         let survived = medium_events - (1 - out); // else the last event ended it
         let flights = rays - 1 - out;
         assert_eq!(draws, flights + medium_events + 2 * survived + 3 * boundary_events);
@@ -249,12 +249,12 @@ fn equal_bands_on_one_key_are_equal() {
     let key = StreamKey::named("equal_bands_on_one_key_are_equal");
     let mut scores = Scores::new(layout);
     tracer.pass(&[0, 1], &key.pass(0), &mut scores);
-    assert!(scores.gates[0] > 0.0);
-    assert!(scores.gates.chunks(2).all(|bands| bands[0].to_bits() == bands[1].to_bits()));
+    assert!(scores.observables[0] > 0.0);
+    assert!(scores.observables.chunks(2).all(|bands| bands[0].to_bits() == bands[1].to_bits()));
     scores.clear();
     tracer.pass(&[0], &key.pass(0), &mut scores);
     tracer.pass(&[1], &key.pass(1), &mut scores);
-    assert_ne!(scores.gates[0], scores.gates[1]);
+    assert_ne!(scores.observables[0], scores.observables[1]);
 }
 
 /// A scene scaled by a power of two, with coefficients scaled to match, gives the same bits: no

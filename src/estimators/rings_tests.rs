@@ -57,7 +57,7 @@ fn measure(
     for pass in 0..passes {
         scores.clear();
         estimator.pass(&[0], &key.pass(pass), &mut scores);
-        let own = scores.gates.iter().skip(place).step_by(1 + TransportClass::ALL.len());
+        let own = scores.observables.iter().skip(place).step_by(1 + TransportClass::ALL.len());
         for ((mean, m2), x) in moments.iter_mut().zip(own) {
             let before = x - *mean;
             *mean += before / (pass + 1) as f64;
@@ -172,10 +172,10 @@ fn all_is_the_flux() {
         scores
     });
     let stride = 1 + TransportClass::ALL.len();
-    assert!(whole.gates[0] > 0.0);
-    assert_eq!(by_ring.gates[..stride], whole.gates[..stride]);
-    let rings: f64 = by_ring.gates.iter().step_by(stride).skip(1).sum();
-    assert!(0.0 < rings && rings < whole.gates[0]);
+    assert!(whole.observables[0] > 0.0);
+    assert_eq!(by_ring.observables[..stride], whole.observables[..stride]);
+    let rings: f64 = by_ring.observables.iter().step_by(stride).skip(1).sum();
+    assert!(0.0 < rings && rings < whole.observables[0]);
 }
 
 /// A body of finite size has no face without end.

@@ -167,7 +167,7 @@ impl Layout {
 pub struct Scores {
     layout: Layout,
     /// `[observable][band]`.
-    pub gates: Vec<f64>,
+    pub observables: Vec<f64>,
     /// `[pixel][band]`; empty where the sensor has no pixels.
     pub pixels: Vec<f64>,
     /// By [`Cost`].
@@ -180,7 +180,7 @@ impl Scores {
     /// Zeros.
     pub fn new(layout: Layout) -> Scores {
         Scores {
-            gates: vec![0.0; layout.names.len() * layout.bands],
+            observables: vec![0.0; layout.names.len() * layout.bands],
             pixels: vec![0.0; layout.pixels() * layout.bands],
             cost: [0; Cost::ALL.len()],
             anomalies: [0; Anomaly::ALL.len()],
@@ -190,7 +190,7 @@ impl Scores {
 
     /// Back to zeros for the next pass; counts go on.
     pub fn clear(&mut self) {
-        self.gates.fill(0.0);
+        self.observables.fill(0.0);
         self.pixels.fill(0.0);
     }
 
@@ -210,14 +210,15 @@ impl Scores {
             let share = factor * value;
             if region < layout.split_regions {
                 let first = region * layout.stride();
-                self.gates[first * bands + band] += share;
-                self.gates[(first + 1 + class as usize) * bands + band] += share;
+                self.observables[first * bands + band] += share;
+                self.observables[(first + 1 + class as usize) * bands + band] += share;
                 if layout.lights > 0 {
-                    self.gates[(first + 1 + TransportClass::ALL.len() + light) * bands + band] += share;
+                    self.observables[(first + 1 + TransportClass::ALL.len() + light) * bands + band] +=
+                        share;
                 }
             } else {
                 let first = layout.split_regions * layout.stride() + region - layout.split_regions;
-                self.gates[first * bands + band] += share;
+                self.observables[first * bands + band] += share;
             }
         }
     }

@@ -1,20 +1,20 @@
 //! How far a point surely is from the surface: rules out short flights without the tree.
 //!
-//! A uniform grid of cubic cells over the mesh's box. A cell is occupied if a triangle may touch it.
-//! Cells at an offset (i, j, k) are apart by at least `size sqrt(f(i)^2 + f(j)^2 + f(k)^2)` with
-//! `f(i) = max(|i| - 1, 0)`; the least such distance to an occupied cell bounds the distance to the
-//! surface from every point of the cell. Since f(i) is the least |i + e| with e in {-1, 0, 1}, it
-//! is the plain distance transform of the occupied set grown by one cell each way, and both steps
+//! A uniform grid of cubic voxels over the mesh's box. A voxel is occupied if a triangle may touch it.
+//! Voxels at an offset (i, j, k) are apart by at least `size sqrt(f(i)^2 + f(j)^2 + f(k)^2)` with
+//! `f(i) = max(|i| - 1, 0)`; the least such distance to an occupied voxel bounds the distance to the
+//! surface from every point of the voxel. Since f(i) is the least |i + e| with e in {-1, 0, 1}, it
+//! is the plain distance transform of the occupied set grown by one voxel each way, and both steps
 //! go axis by axis (Saito, Toriwaki, "New algorithms for Euclidean distance transformation of an
 //! n-dimensional digitized picture", Pattern Recognition 27(11), 1994).
 
 use super::tree::{Frame, PAD};
 use crate::math::DVec3;
 
-/// Edge of a cell, units of the frame: 64 cells along the longest side.
-const CELL: f64 = 32.0;
+/// Edge of a voxel, units of the frame: 64 voxels along the longest side.
+const VOXEL: f64 = 32.0;
 
-/// Squared distance, in cells, of what has no occupied cell in sight.
+/// Squared distance, in voxels, of what has no occupied voxel in sight.
 const FAR: u32 = u32::MAX / 2;
 
 /// The grid.
@@ -22,7 +22,7 @@ const FAR: u32 = u32::MAX / 2;
 pub struct Clearance {
     /// Least corner, units of the frame.
     corner: DVec3,
-    cells: [usize; 3],
+    voxels: [usize; 3],
     /// Lower bound of the distance to the surface, units of the frame, x fastest.
     bounds: Vec<f32>,
 }
@@ -36,9 +36,9 @@ impl Clearance {
     ) -> Clearance {
         let corner = frame.place(min) - PAD;
         let size = frame.place(max) + PAD - corner;
-        let cells = size.to_array().map(|side| (side / CELL) as usize + 1);
-        let mut grid = Clearance { corner, cells, bounds: Vec::new() };
-        let mut distance2 = vec![FAR; cells.iter().product()];
+        let voxels = size.to_array().map(|side| (side / VOXEL) as usize + 1);
+        let mut grid = Clearance { corner, voxels, bounds: Vec::new() };
+        let mut distance2 = vec![FAR; voxels.iter().product()];
         for triangle in triangles {
             grid.occupy(&triangle.map(|vertex| frame.place(vertex)), &mut distance2);
         }
@@ -48,20 +48,20 @@ impl Clearance {
         for axis in 0..3 {
             grid.along(axis, &mut distance2, transform);
         }
-        // The padding pays for the rounding of points at cell borders and of f32.
-        let bound = |&d2: &u32| (f64::from(d2).sqrt() * CELL - PAD).max(0.0) as f32;
+        // The padding pays for the rounding of points at voxel borders and of f32.
+        let bound = |&d2: &u32| (f64::from(d2).sqrt() * VOXEL - PAD).max(0.0) as f32;
         grid.bounds = distance2.iter().map(bound).collect();
         grid
     }
 
     /// A lower bound of the distance to the surface, units of the frame; 0 outside the grid.
     pub fn at(&self, point: DVec3) -> f64 {
-        let cell = (point - self.corner) * (1.0 / CELL);
-        if cell.min_element() < 0.0 {
+        let voxel = (point - self.corner) * (1.0 / VOXEL);
+        if voxel.min_element() < 0.0 {
             return 0.0;
         }
-        let [i, j, k] = cell.to_array().map(|c| c as usize);
-        let [nx, ny, nz] = self.cells;
+        let [i, j, k] = voxel.to_array().map(|c| c as usize);
+        let [nx, ny, nz] = self.voxels;
         if i < nx && j < ny && k < nz { self.bounds[i + nx * (j + ny * k)].into() } else { 0.0 }
     }
 
@@ -70,20 +70,20 @@ impl Clearance {
         size_of_val(&*self.bounds)
     }
 
-    /// Sets the cells that the triangle, units of the frame, may touch to 0: those in its box that
+    /// Sets the voxels that the triangle, units of the frame, may touch to 0: those in its box that
     /// its plane passes.
     fn occupy(&self, triangle: &[DVec3; 3], distance2: &mut [u32]) {
         let [a, b, c] = *triangle;
-        let cell = |point: DVec3| ((point - self.corner) / CELL).to_array().map(|x| x as usize);
-        let (low, high) = (cell(a.min(b).min(c) - PAD), cell(a.max(b).max(c) + PAD));
+        let voxel = |point: DVec3| ((point - self.corner) / VOXEL).to_array().map(|x| x as usize);
+        let (low, high) = (voxel(a.min(b).min(c) - PAD), voxel(a.max(b).max(c) + PAD));
         let normal = super::triangle::normal(triangle);
-        let reach = (0.5 * CELL + PAD) * normal.abs().element_sum();
-        let [nx, ny, nz] = self.cells;
+        let reach = (0.5 * VOXEL + PAD) * normal.abs().element_sum();
+        let [nx, ny, nz] = self.voxels;
         for k in low[2]..=high[2].min(nz - 1) {
             for j in low[1]..=high[1].min(ny - 1) {
                 for i in low[0]..=high[0].min(nx - 1) {
                     let index = DVec3::new(i as f64, j as f64, k as f64);
-                    let middle = self.corner + (index + 0.5) * CELL;
+                    let middle = self.corner + (index + 0.5) * VOXEL;
                     if normal.dot(middle - a).abs() <= reach {
                         distance2[i + nx * (j + ny * k)] = 0;
                     }
@@ -92,10 +92,10 @@ impl Clearance {
         }
     }
 
-    /// Applies `step` to every line of cells along an axis.
+    /// Applies `step` to every line of voxels along an axis.
     fn along(&self, axis: usize, field: &mut [u32], step: fn(&[u32], usize) -> u32) {
-        let n = self.cells[axis];
-        let stride: usize = self.cells[..axis].iter().product();
+        let n = self.voxels[axis];
+        let stride: usize = self.voxels[..axis].iter().product();
         let mut line = vec![0; n];
         for start in (0..field.len()).filter(|i| (i / stride).is_multiple_of(n)) {
             for (i, value) in line.iter_mut().enumerate() {
@@ -108,7 +108,7 @@ impl Clearance {
     }
 }
 
-/// The least of a cell and its two neighbours.
+/// The least of a voxel and its two neighbours.
 fn grow(line: &[u32], i: usize) -> u32 {
     line[i.saturating_sub(1)..(i + 2).min(line.len())].iter().copied().fold(FAR, u32::min)
 }

@@ -115,8 +115,8 @@ pub fn torus(major: f64, minor: f64, segments: [u32; 2], interpolated: bool) -> 
 /// # Errors
 /// As [`Mesh::new`].
 pub fn drilled_box(size: DVec3, holes: [u32; 2], hole_fraction: f64) -> Result<Mesh> {
-    // Lines at the rims of all holes cut the top into cells, so every vertex of a wall is one of
-    // the top: cell (i, j) is a hole if i and j are odd.
+    // Lines at the rims of all holes cut the top into rectangles, so every vertex of a wall is one of
+    // the top: rectangle (i, j) is a hole if i and j are odd.
     let pitch = [size.x / f64::from(holes[0]), size.y / f64::from(holes[1])];
     let half_side = 0.5 * hole_fraction * pitch[0].min(pitch[1]);
     let lines = |side: f64, pitch: f64, count: u32| -> Vec<f64> {
@@ -143,7 +143,7 @@ pub fn drilled_box(size: DVec3, holes: [u32; 2], hole_fraction: f64) -> Result<M
                 continue;
             }
             let (a, b) = (i as usize, j as usize);
-            // The cell's corners, counter-clockwise seen from above, and its neighbours' offsets.
+            // The rectangle's corners, counter-clockwise seen from above, and its neighbours' offsets.
             let corners = [(a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1)];
             let beside = [(0, -1), (1, 0), (0, 1), (-1, 0)];
             parts.quad(corners.map(|(i, j)| at(i, j, true)));

@@ -10,8 +10,8 @@
 //! isotropic density iso(w) = (pi - theta) / (pi^3 sin theta), which its own map realises exactly, only
 //! phase(w_in.w) is left to tabulate, and it is bounded: a table of it over (theta, azimuth) for each angle
 //! alpha between `w_in` and b, piecewise constant, gives
-//!   pdf(w) = iso(w) P(cell) / I(cell),     I(cell) = the isotropic probability of the cell,
-//! which is the density of what is drawn to the last bit, however coarse the cells.
+//!   pdf(w) = iso(w) P(texel) / I(texel),     I(texel) = the isotropic probability of the texel,
+//! which is the density of what is drawn to the last bit, however coarse the texels.
 //!
 //! How close: the mean of target / pdf over the target (both normalised) is 1 where they are the same, and
 //! its excess over 1 is the relative variance of a sample's weight. By the angle alpha (test
@@ -24,7 +24,7 @@
 //! | 0.8 | 1.009, 1.018, 1.008          | 2.033, 1.387, 1.371 |
 //! | 0.9 | 1.035, 1.083, 1.033          | 1.862, 1.584, 1.591 |
 //!
-//! Beyond that the cells, 2.8 by 5.6 degrees, become coarse beside the phase function's peak, and the variance
+//! Beyond that the texels, 2.8 by 5.6 degrees, become coarse beside the phase function's peak, and the variance
 //! grows. Tables for one g are built in 0.05 s and take 1.2 MB; drawing costs about 60 ns, a density 45 ns.
 
 use std::f64::consts::PI;
@@ -34,7 +34,7 @@ use crate::math::{DVec3, Frame, cos, sin};
 use crate::sampling::discrete::{Cumulative, choose};
 use crate::sampling::towards::TowardsPoint;
 
-/// Cells in theta, in the half turn of azimuth (the target is even about the plane of `w_in`), in alpha.
+/// Texels in theta, in the half turn of azimuth (the target is even about the plane of `w_in`), in alpha.
 const ROWS: usize = 64;
 const COLUMNS: usize = 32;
 const NODES: usize = 64;
@@ -72,11 +72,11 @@ pub struct Joint<'a> {
 }
 
 impl JointTable {
-    /// Cells in theta over [0, pi], and in azimuth over the half turn from the plane of `w_in`; in both the
+    /// Texels in theta over [0, pi], and in azimuth over the half turn from the plane of `w_in`; in both the
     /// density jumps at the edges.
-    pub const CELLS: [usize; 2] = [ROWS, COLUMNS];
+    pub const TEXELS: [usize; 2] = [ROWS, COLUMNS];
 
-    /// Builds the tables: for each step of alpha and each cell the mean of the phase function over both,
+    /// Builds the tables: for each step of alpha and each texel the mean of the phase function over both,
     /// by three Gauss points along each of the three angles. No mean is 0.
     pub fn new(phase: HenyeyGreenstein) -> JointTable {
         let ends = |n: usize| (1..n).map(move |k| cos(PI * k as f64 / n as f64)).collect();
@@ -100,7 +100,7 @@ impl JointTable {
             })
         };
         let thetas: Vec<[(f64, f64, f64); 3]> = (0..ROWS).map(row_spots).collect();
-        let cell = |alpha: &[(f64, f64, f64); 3], row: usize, column: usize| {
+        let texel = |alpha: &[(f64, f64, f64); 3], row: usize, column: usize| {
             let mut sum = 0.0;
             for (cos_a, sin_a, weight_a) in alpha {
                 for (cos_t, sin_t, weight_t) in &thetas[row] {
@@ -115,7 +115,7 @@ impl JointTable {
         let node = |alpha: &[(f64, f64, f64); 3]| {
             let (mut rows, mut columns) = (Vec::new(), Vec::new());
             for row in 0..ROWS {
-                let means: Vec<f64> = (0..COLUMNS).map(|column| cell(alpha, row, column)).collect();
+                let means: Vec<f64> = (0..COLUMNS).map(|column| texel(alpha, row, column)).collect();
                 rows.push(means.iter().sum::<f64>() * share(row));
                 columns.push(Cumulative::new(&means)?);
             }
@@ -327,7 +327,7 @@ mod tests {
         }
     }
 
-    /// D2: the density is the inverse Jacobian of the map, wherever a difference stays inside a cell.
+    /// D2: the density is the inverse Jacobian of the map, wherever a difference stays inside a texel.
     #[test]
     fn density_is_the_inverse_jacobian() {
         for g in [-0.5, 0.0, 0.8, 0.95] {

@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn no_ratio_is_said_to_be_none() {
         let mut stored = sample::stored(0.1);
-        sample::set_gates(&mut stored, "snee", |i, _, band| {
+        sample::set_observables(&mut stored, "snee", |i, _, band| {
             let off = if band == 0 { 0.3 } else { 0.0 };
             1.0 + off + 0.05 * sample::uniform(i + 7000)
         });

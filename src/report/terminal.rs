@@ -39,22 +39,22 @@ pub fn run_table(material: &Material) -> Table {
 /// found.
 pub fn sampler_table(material: &Material) -> Table {
     let record = &material.stored.record;
-    let header = ["sampler", "draws", "cells", "tests", "green", "detectable", "CPU s", "draws/s/core"];
+    let header = ["sampler", "draws", "bins", "tests", "green", "detectable", "CPU s", "draws/s/core"];
     let mut table = Table::new(&header);
     for run in &record.samplers {
         let own =
             || material.verdicts.iter().filter(|v| v.estimators == run.sampler && v.class.is_empty());
         let green = own().filter(|v| v.is_green()).count();
         let coarse = own().find(|v| v.test == "chi2 coarse");
-        let cells = [Some(&run.coarse), run.fine.as_ref()].into_iter().flatten();
-        let cells = cells.filter_map(|path| material.stored.cells(path));
-        let cells: Vec<String> = cells.map(|cells| (cells.mass.len() - 1).to_string()).collect();
+        let bins = [Some(&run.coarse), run.fine.as_ref()].into_iter().flatten();
+        let bins = bins.filter_map(|path| material.stored.bins(path));
+        let bins: Vec<String> = bins.map(|bins| (bins.mass.len() - 1).to_string()).collect();
         let cost = material.timing.as_ref().and_then(|t| t.of("", &run.sampler));
         let rate = cost.and_then(|c| c.paths_per_second());
         table.push(vec![
             run.sampler.clone(),
             run.samples.to_string(),
-            cells.join(" + "),
+            bins.join(" + "),
             own().count().to_string(),
             green.to_string(),
             coarse.map_or(String::new(), |v| per_cent(v.detectable)),

@@ -80,7 +80,7 @@ fn of_run(
     let mut rows = Vec::new();
     for (o, observable) in run.observables.iter().enumerate() {
         for (b, band) in stored.record.bands.iter().enumerate() {
-            let moments: Moments = stored.gate(run, o, b).and_then(total).unwrap_or_default();
+            let moments: Moments = stored.moments(run, o, b).and_then(total).unwrap_or_default();
             rows.push(Measurement {
                 experiment: stored.record.experiment.clone(),
                 cell: cell.label.clone(),

@@ -113,12 +113,12 @@ pub struct EstimatorRun {
     pub notes: Vec<String>,
     /// Number of independent passes.
     pub passes: u64,
-    /// The gate observables, in the order of the gate array's observable axis.
+    /// The observables, in the order of the observables array's observable axis.
     pub observables: Vec<Observable>,
-    /// Path of the gate moments, `[batch][observable][band][5]` f64: count, mean, and the sums of
+    /// Path of the moments of the observables, `[batch][observable][band][5]` f64: count, mean, and the sums of
     /// second, third and fourth powers of deviations from the mean.
-    pub gates: String,
-    /// Path of the counts of work, `[batch][counter]` f64: the batches of `gates`, the counters in the order
+    pub moments: String,
+    /// Path of the counts of work, `[batch][counter]` f64: the batches of `moments`, the counters in the order
     /// of `cost`'s names. Their sums over batches are `cost`.
     pub costs: String,
     /// The image, where the sensor has pixels.
@@ -190,9 +190,9 @@ pub struct Image {
     pub height: usize,
     /// Path of the `[2][row][column][band]` f64 array: mean over passes, and its standard error.
     pub pixels: String,
-    /// Path of the `[batch][band][5]` f64 array: the moments, as of `gates`, of half the squared difference of
+    /// Path of the `[batch][band][5]` f64 array: the moments, as of `moments`, of half the squared difference of
     /// passes 2i and 2i + 1, averaged over the pixels. Its mean is the variance of a pixel in one pass, averaged
-    /// over the pixels. The batches are those of `gates`, but at least 2 passes each; a last pass without a
+    /// over the pixels. The batches are those of `moments`, but at least 2 passes each; a last pass without a
     /// partner is in none.
     pub spread: String,
 }

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::npy::Array;
 use super::record::*;
-use super::store::{Arrays, Stored, costs_path, gates_path, pixels_path, spread_path};
+use super::store::{Arrays, Stored, costs_path, observables_path, pixels_path, spread_path};
 use crate::stats::moments::Moments;
 use crate::stats::tree::{Counter, batch_level};
 
@@ -52,9 +52,9 @@ pub fn quantity(estimator: &str, band: usize) -> Quantity {
     Quantity { cell: 0, estimator: estimator.into(), observable, band }
 }
 
-/// Replaces an estimator's gates by what `score(pass, observable, band)` says.
-pub fn set_gates(stored: &mut Stored, estimator: &str, score: impl Fn(u64, usize, usize) -> f64) {
-    stored.arrays.insert(gates_path(0, estimator), gates(PASSES, score));
+/// Replaces an estimator's moments by what `score(pass, observable, band)` says.
+pub fn set_observables(stored: &mut Stored, estimator: &str, score: impl Fn(u64, usize, usize) -> f64) {
+    stored.arrays.insert(observables_path(0, estimator), moments(PASSES, score));
 }
 
 /// What pairs of passes show of 16 pixels whose standard deviation is `noise`: see [`Image::spread`].
@@ -80,7 +80,7 @@ fn set_spread_of(arrays: &mut Arrays, estimator: &str, spread: impl Fn(u64, usiz
     arrays.insert(spread_path(0, estimator), Array::new(vec![batches.len(), 2, 5], data));
 }
 
-fn gates(passes: u64, score: impl Fn(u64, usize, usize) -> f64) -> Array {
+fn moments(passes: u64, score: impl Fn(u64, usize, usize) -> f64) -> Array {
     let mut tree = Counter::new(0, batch_level(passes));
     let pass = |i| (0..4).map(|k| Moments::of(score(i, k / 2, k % 2))).collect::<Vec<_>>();
     (0..passes).for_each(|i| tree.push(pass(i)));
@@ -91,7 +91,7 @@ fn gates(passes: u64, score: impl Fn(u64, usize, usize) -> f64) -> Array {
 
 fn run(e: usize, name: &str, noise: f64, arrays: &mut Arrays) -> EstimatorRun {
     let score = |i, o: usize, b: usize| 1.0 + noise * uniform(i + 1000 * (4 * e + 2 * o + b) as u64);
-    arrays.insert(gates_path(0, name), gates(PASSES, score));
+    arrays.insert(observables_path(0, name), moments(PASSES, score));
     let pixels = (0..24).map(|i| if i < 12 { 0.1 * i as f64 } else { 0.01 }).collect();
     arrays.insert(pixels_path(0, name), Array::new(vec![2, 2, 3, 2], pixels));
     set_spread_of(arrays, name, pairs(noise, 1_000_000 * e as u64));
@@ -108,7 +108,7 @@ fn run(e: usize, name: &str, noise: f64, arrays: &mut Arrays) -> EstimatorRun {
         notes: vec![],
         passes: PASSES,
         observables: vec![observable("all"), observable("single")],
-        gates: gates_path(0, name),
+        moments: observables_path(0, name),
         costs: costs_path(0, name),
         image: Some(Image {
             width: 3,

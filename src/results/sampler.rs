@@ -1,4 +1,4 @@
-//! What a record holds of samplers: counts, and the masses that their densities give the same cells.
+//! What a record holds of samplers: counts, and the masses that their densities give the same bins.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,12 +16,12 @@ pub struct SamplerRun {
     pub kind: String,
     /// Number of draws.
     pub samples: u64,
-    /// Path of the coarse cells, `[3][cells]` f64: draws counted, mass, bound of the mass's error.
+    /// Path of the coarse bins, `[3][bins]` f64: draws counted, mass, bound of the mass's error.
     pub coarse: String,
-    /// The same for the fine cells, where there are more of them.
+    /// The same for the fine bins, where there are more of them.
     pub fine: Option<String>,
-    /// The same for pairs of consecutive draws by groups of coarse cells, `[3][groups][groups]`; a pair
-    /// with a draw that is in no cell is not counted. None where there are not draws enough.
+    /// The same for pairs of consecutive draws by groups of coarse bins, `[3][groups][groups]`; a pair
+    /// with a draw that is in no bin is not counted. None where there are not draws enough.
     pub serial: Option<String>,
     /// Discrete outcomes.
     pub deltas: Vec<Delta>,
@@ -94,9 +94,9 @@ pub struct ContrastRun {
     pub bound: f64,
 }
 
-/// Cells of a run: one row each of what was counted, masses, bounds.
+/// Bins of a run: one row each of what was counted, masses, bounds.
 #[derive(Clone, Copy, Debug)]
-pub struct Cells<'a> {
+pub struct Bins<'a> {
     /// Draws, or pairs.
     pub observed: &'a [f64],
     /// Masses, which sum to 1 where the density is one.
@@ -106,21 +106,17 @@ pub struct Cells<'a> {
 }
 
 impl Stored {
-    /// The cells that stand at `path`.
-    pub fn cells(&self, path: &str) -> Option<Cells<'_>> {
+    /// The bins that stand at `path`.
+    pub fn bins(&self, path: &str) -> Option<Bins<'_>> {
         let array = self.arrays.get(path)?;
         let n = array.data.len() / 3;
         let row = |i: usize| &array.data[i * n..(i + 1) * n];
-        (array.shape.first() == Some(&3)).then(|| Cells {
-            observed: row(0),
-            mass: row(1),
-            bound: row(2),
-        })
+        (array.shape.first() == Some(&3)).then(|| Bins { observed: row(0), mass: row(1), bound: row(2) })
     }
 }
 
-/// Where the cells of sampler number `index` stand, relative to the record's folder.
-pub fn cells_path(index: usize, which: &str) -> String {
+/// Where the bins of sampler number `index` stand, relative to the record's folder.
+pub fn bins_path(index: usize, which: &str) -> String {
     format!("samplers/{index:03}.{which}.npy")
 }
 
@@ -134,6 +130,6 @@ pub(super) fn defect(record: &Record, arrays: &Arrays) -> Option<String> {
             _ => true,
         };
         let bad = paths.into_iter().flatten().find(|path| wrong(arrays.get(*path)))?;
-        Some(format!("cells of {} have no usable array at {bad}", run.sampler))
+        Some(format!("bins of {} have no usable array at {bad}", run.sampler))
     })
 }

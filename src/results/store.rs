@@ -3,7 +3,7 @@
 //! ```text
 //! record/record.json              everything but the arrays (see results::record)
 //! record/record.json.b3           its hash, as b3sum writes and checks it
-//! record/cells/<NNN>/<estimator>.gates.npy, <estimator>.costs.npy, <estimator>.pixels.npy, .spread.npy
+//! record/cells/<NNN>/<estimator>.observables.npy, <estimator>.costs.npy, <estimator>.pixels.npy, .spread.npy
 //! record/samplers/<NNN>.coarse.npy, .fine.npy, .serial.npy
 //! timing.json, provenance.json    beside the record, never byte-identical
 //! pictures.json                   what pictures are wanted beside those of every run
@@ -39,9 +39,9 @@ pub struct Stored {
     pub timing: Option<Timing>,
 }
 
-/// Where a run's gate moments stand, relative to the record's folder.
-pub fn gates_path(cell: usize, estimator: &str) -> String {
-    format!("cells/{cell:03}/{estimator}.gates.npy")
+/// Where a run's moments of the observables stand, relative to the record's folder.
+pub fn observables_path(cell: usize, estimator: &str) -> String {
+    format!("cells/{cell:03}/{estimator}.observables.npy")
 }
 
 /// Where a run's counts of work stand, relative to the record's folder.
@@ -75,12 +75,12 @@ impl Stored {
     pub fn batches(&self, quantity: &Quantity) -> Option<Vec<Moments>> {
         let run = self.run(quantity)?;
         let observable = run.observables.iter().position(|o| *o == quantity.observable)?;
-        self.gate(run, observable, quantity.band)
+        self.moments(run, observable, quantity.band)
     }
 
     /// The moments of every batch of one observable of a run, both by index.
-    pub fn gate(&self, run: &EstimatorRun, observable: usize, band: usize) -> Option<Vec<Moments>> {
-        let array = self.arrays.get(&run.gates)?;
+    pub fn moments(&self, run: &EstimatorRun, observable: usize, band: usize) -> Option<Vec<Moments>> {
+        let array = self.arrays.get(&run.moments)?;
         let [batches, observables, bands, 5] = array.shape[..] else { return None };
         if observable >= observables || band >= bands {
             return None;
@@ -104,9 +104,9 @@ impl Stored {
     fn defect(&self) -> Option<String> {
         let bands = self.record.bands.len();
         for run in self.record.cells.iter().flat_map(|cell| &cell.runs) {
-            let shape = self.arrays.get(&run.gates).map(|a| &a.shape[..]);
+            let shape = self.arrays.get(&run.moments).map(|a| &a.shape[..]);
             if !matches!(shape, Some(&[_, o, b, 5]) if o == run.observables.len() && b == bands) {
-                return Some(format!("gates of {} have shape {shape:?}", run.estimator));
+                return Some(format!("moments of {} have shape {shape:?}", run.estimator));
             }
             let batches = shape.map(|shape| shape[0]);
             let shape = self.arrays.get(&run.costs).map(|a| &a.shape[..]);

@@ -95,22 +95,22 @@ fn unknown_key() {
 #[test]
 fn changed_missing_and_truncated_arrays() {
     let (_temp, folder, _) = written();
-    let path = folder.record_dir().join(gates_path(0, "mis"));
+    let path = folder.record_dir().join(observables_path(0, "mis"));
     let mut bytes = fs::read(&path).expect("bytes");
     fs::write(&path, &bytes[..bytes.len() - 3]).expect("a write");
-    refused(&folder, &["truncated", "mis.gates.npy"]);
+    refused(&folder, &["truncated", "mis.observables.npy"]);
     let last = bytes.len() - 1;
     bytes[last] ^= 1;
     fs::write(&path, &bytes).expect("a write");
-    refused(&folder, &["checksum mismatch", "mis.gates.npy"]);
+    refused(&folder, &["checksum mismatch", "mis.observables.npy"]);
     fs::remove_file(&path).expect("a removal");
-    refused(&folder, &["could not read the record", "mis.gates.npy"]);
+    refused(&folder, &["could not read the record", "mis.observables.npy"]);
 }
 
 #[test]
 fn a_path_that_leaves_the_folder() {
     let (_temp, folder, _) = written();
-    tamper(&folder, "\"cells/000/mis.gates.npy\": ", "\"../../secret\": ", true);
+    tamper(&folder, "\"cells/000/mis.observables.npy\": ", "\"../../secret\": ", true);
     refused(&folder, &["not a path inside the record"]);
 }
 
@@ -124,8 +124,8 @@ fn will_not_write_what_does_not_fit_or_read_back() {
         assert!(!folder.root().join(".record.new").exists());
     };
     let mut arrays = stored.arrays.clone();
-    arrays.insert(gates_path(0, "mis"), Array::new(vec![1, 1, 1, 5], vec![0.0; 5]));
-    refused(&stored.record, &arrays, "gates of mis");
+    arrays.insert(observables_path(0, "mis"), Array::new(vec![1, 1, 1, 5], vec![0.0; 5]));
+    refused(&stored.record, &arrays, "moments of mis");
     let mut record = stored.record.clone();
     record.bands[0].display_rgb[0] = f64::NAN;
     refused(&record, &stored.arrays, "not finite");

@@ -17,7 +17,7 @@ use crate::results::provenance::fingerprint;
 use crate::results::record::{
     Bias, Cell, EstimatorRun, HeavyTail, Image, Record, Replay, SCHEMA_VERSION,
 };
-use crate::results::store::{Arrays, costs_path, gates_path, pixels_path, spread_path};
+use crate::results::store::{Arrays, costs_path, observables_path, pixels_path, spread_path};
 use crate::results::timing::{self, Timing};
 
 /// A record before it is written.
@@ -111,8 +111,8 @@ fn estimator_run(
     let shape = vec![batches.len(), observables, bands, 5];
     let data = batches.iter().flatten().flat_map(|moments| moments.to_array()).collect();
     let name = &job.name;
-    let gates = gates_path(job.cell, name);
-    arrays.insert(gates.clone(), Array::new(shape, data));
+    let moments = observables_path(job.cell, name);
+    arrays.insert(moments.clone(), Array::new(shape, data));
 
     let mut counters = Cost::ALL;
     counters.sort_by_key(|counter| counter.name());
@@ -150,7 +150,7 @@ fn estimator_run(
         notes: job.estimator.notes(),
         passes: finished.passes,
         observables: named(&job.layout),
-        gates,
+        moments,
         costs,
         image,
         cost: counts(Cost::ALL.map(Cost::name).into(), &finished.tally.cost),

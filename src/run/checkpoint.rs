@@ -19,8 +19,8 @@ struct Header {
     identity: String,
     origin: Origin,
     tally: Tally,
-    /// Level and number of values of every gate node.
-    gates: Vec<(u32, usize)>,
+    /// Level and number of values of every node of moments.
+    moments: Vec<(u32, usize)>,
     /// Level, passes and number of values of every image node.
     pixels: Vec<(u32, u64, usize)>,
     /// Level and number of values of every node of pairs.
@@ -36,13 +36,13 @@ pub fn path(root: &Path, identity: &str) -> PathBuf {
 
 /// Writes the state of a job whose passes start at 0.
 pub fn save(path: &Path, identity: &str, block: &Block) -> Result<()> {
-    let gates = block.gates.nodes();
+    let moments = block.moments.nodes();
     let (pixels, spread) = (block.pixels.nodes(), block.spread.nodes());
     let header = Header {
         identity: identity.into(),
         origin: block.origin.clone(),
         tally: block.tally,
-        gates: gates.iter().map(|n| (n.level, n.value.len())).collect(),
+        moments: moments.iter().map(|n| (n.level, n.value.len())).collect(),
         pixels: pixels.iter().map(|n| (n.level, n.value.n, n.value.mean.len())).collect(),
         spread: spread.iter().map(|n| (n.level, n.value.len())).collect(),
         work: block.work.nodes().iter().map(|n| (n.level, n.value)).collect(),
@@ -51,7 +51,7 @@ pub fn save(path: &Path, identity: &str, block: &Block) -> Result<()> {
     let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
     bytes.extend(header.as_bytes());
     let mut put = |x: f64| bytes.extend(x.to_le_bytes());
-    let moments = gates.iter().chain(spread).flat_map(|n| &n.value);
+    let moments = moments.iter().chain(spread).flat_map(|n| &n.value);
     moments.flat_map(|m| m.to_array()).for_each(&mut put);
     pixels.iter().flat_map(|n| n.value.mean.iter().chain(&n.value.m2)).for_each(|&x| put(x));
     let checksum = hash_bytes(&bytes);
@@ -78,7 +78,7 @@ fn parts<'a>(bytes: &'a [u8], identity: &str) -> Option<(Header, &'a [u8])> {
     (header.identity == identity).then_some((header, numbers))
 }
 
-/// Reads the state of a job, with gates kept at `keep_level`; `None` where there is none that fits.
+/// Reads the state of a job, with moments kept at `keep_level`; `None` where there is none that fits.
 pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
     let bytes = std::fs::read(path).ok()?;
     let (header, numbers) = parts(&bytes, identity)?;
@@ -88,13 +88,13 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
         (taken.len() == n).then_some(taken)
     };
     let mut block = Block::empty(0, keep_level);
-    for (level, length) in header.gates {
+    for (level, length) in header.moments {
         if level > keep_level {
             return None; // kept coarser than this run's batches: they cannot be cut
         }
         let values = take(5 * length)?;
         let moments = values.as_chunks::<5>().0.iter().map(|m| Moments::from_array(*m)).collect();
-        block.gates.push_node(level, moments);
+        block.moments.push_node(level, moments);
     }
     for (level, length) in header.spread {
         if level > pair_level(keep_level) {
@@ -117,8 +117,8 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
     block.tally = header.tally;
     block.origin = header.origin;
     let ends = [block.pixels.next_pass(), block.work.next_pass()];
-    let fits = ends.iter().all(|end| *end == block.gates.next_pass())
-        && block.spread.next_pass() == block.gates.next_pass() / 2;
+    let fits = ends.iter().all(|end| *end == block.moments.next_pass())
+        && block.spread.next_pass() == block.moments.next_pass() / 2;
     fits.then_some(block)
 }
 
@@ -148,7 +148,7 @@ mod tests {
         let mut block = Block { bands: 2, ..Block::empty(start, keep_level) };
         for pass in start..end {
             let x = 1.0 / (pass as f64 + 3.0);
-            block.gates.push(vec![Moments::of(x), Moments::of(-x)]);
+            block.moments.push(vec![Moments::of(x), Moments::of(-x)]);
             if pass % 2 == 1 && pass > start {
                 block.spread.push(spread(&image(pass - 1), &image(pass), 2));
             }
@@ -169,7 +169,7 @@ mod tests {
         assert!(load(&path, "you", 2).is_none(), "another job");
         assert!(load(&path, "me", 1).is_none(), "coarser than asked");
         // A longer run keeps wider batches: the nodes merge on.
-        assert_eq!(load(&path, "me", 3).expect("a state").gates.nodes().len(), 3);
+        assert_eq!(load(&path, "me", 3).expect("a state").moments.nodes().len(), 3);
 
         let mut bytes = std::fs::read(&path).expect("bytes");
         bytes[200] ^= 1;
@@ -188,7 +188,7 @@ mod tests {
         save(&path, "me", &block(11, 0)).expect("saved");
         let mut resumed = load(&path, "me", 3).expect("a state");
         resumed.append(later);
-        assert_eq!((resumed.gates, resumed.pixels), (whole.gates, whole.pixels));
+        assert_eq!((resumed.moments, resumed.pixels), (whole.moments, whole.pixels));
         assert_eq!(resumed.work, whole.work);
         // Passes 10 and 11 are a pair, of which the state held the first.
         // 14 pairs, kept by four: 4 + 4 + 4 + 2.

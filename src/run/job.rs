@@ -57,7 +57,7 @@ pub struct Group {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Block {
     /// Moments of `[observable][band]`, kept by batch.
-    pub gates: Counter<Vec<Moments>>,
+    pub moments: Counter<Vec<Moments>>,
     /// Moments of `[pixel][band]`.
     pub pixels: Counter<ImageMoments>,
     /// Moments of `[band]` over pairs of passes, kept by batch: the variance of a pixel as passes 2i and 2i + 1
@@ -66,7 +66,7 @@ pub struct Block {
     pub spread: Counter<Vec<Moments>>,
     /// Number of bands; 0 where nothing was played.
     pub bands: usize,
-    /// Work and time, kept by batch like the gates.
+    /// Work and time, kept by batch like the moments.
     pub work: Counter<Work>,
     /// Work and time.
     pub tally: Tally,
@@ -167,7 +167,7 @@ impl Block {
     /// No passes yet, from pass `start` on.
     pub fn empty(start: u64, keep_level: u32) -> Block {
         Block {
-            gates: Counter::new(start, keep_level),
+            moments: Counter::new(start, keep_level),
             pixels: Counter::new(start, Counter::<ImageMoments>::MERGE_ALL),
             spread: Counter::new(start.div_ceil(2), pair_level(keep_level)),
             bands: 0,
@@ -188,7 +188,7 @@ impl Block {
 
     /// The pass that comes next.
     pub fn next_pass(&self) -> u64 {
-        self.gates.next_pass()
+        self.moments.next_pass()
     }
 
     /// Marks all passes as timed side by side with their rivals; `keep_level` is the block's own.
@@ -207,7 +207,7 @@ impl Block {
             self.pair_with(&first.value.mean);
         }
         self.spread.append(later.spread);
-        self.gates.append(later.gates);
+        self.moments.append(later.moments);
         self.pixels.append(later.pixels);
         self.work.append(later.work);
         self.tally.add(&later.tally);
@@ -238,7 +238,7 @@ impl Block {
     pub fn finish(self) -> Finished {
         Finished {
             passes: self.next_pass(),
-            batches: self.gates.batches(),
+            batches: self.moments.batches(),
             image: self.pixels.finish().unwrap_or_default(),
             spread: self.spread.batches(),
             work: self.work.batches(),
@@ -286,7 +286,7 @@ impl Job {
             // Blocks are appended to each other, so that those without an image hold empty ones.
             let image = if stage == Stage::Main { scores.pixels.clone() } else { Vec::new() };
             block.pair_with(&image);
-            block.gates.push(scores.gates.iter().map(|&x| Moments::of(x)).collect());
+            block.moments.push(scores.observables.iter().map(|&x| Moments::of(x)).collect());
             block.pixels.push(ImageMoments::of(image));
         }
         block.tally = Tally {
@@ -314,7 +314,7 @@ mod tests {
         let mut block = Block { bands: 2, ..Block::empty(start, keep_level) };
         for pass in start..end {
             block.pair_with(&image(pass));
-            block.gates.push(vec![Moments::of(pass as f64)]);
+            block.moments.push(vec![Moments::of(pass as f64)]);
             block.pixels.push(ImageMoments::of(image(pass)));
             block.work.push(Work::default());
         }

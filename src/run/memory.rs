@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 pub struct Estimate {
     /// Meshes and maps.
     pub shapes: usize,
-    /// Moments of gate observables and images of everything measured, kept until the record is written.
+    /// Moments of observables and images of everything measured, kept until the record is written.
     pub results: usize,
     /// What the threads and the collector hold on top while playing.
     pub working: usize,
@@ -18,14 +18,14 @@ impl Estimate {
     /// For jobs on a number of threads, whose scenes hold `shapes` bytes.
     ///
     /// An image keeps mean and M2, 16 bytes a pixel and band. A finished job holds one, and the record's
-    /// array beside it; and 128 batches of 5 moments per gate observable, likewise twice. A job under way
+    /// array beside it; and 128 batches of 5 moments per observable, likewise twice. A job under way
     /// holds one image per bit of its passes, and as much again while its state is written. Each thread
     /// holds the images of its block (sized by time: large images have blocks of a few passes) and one
     /// more waits to be collected. Jobs that are timed side by side are under way together, and two batches
     /// of each may wait for the turn of those before them. What an estimator needs for a pass it needs on each thread.
     pub fn new(jobs: &[Job], shapes: usize, threads: usize, passes: Option<u64>) -> Estimate {
         let image = |job: &Job| 16 * job.layout.pixels() * job.layout.bands();
-        let gates = |job: &Job| 128 * 40 * job.layout.observables().len() * job.layout.bands();
+        let moments = |job: &Job| 128 * 40 * job.layout.observables().len() * job.layout.bands();
         let largest = jobs.iter().map(image).max().unwrap_or(0);
         let own = jobs.iter().map(|job| job.estimator.working_bytes()).max().unwrap_or(0);
         let side_by_side = |group| jobs.iter().filter(|job| job.side_by_side == Some(group)).count();
@@ -33,7 +33,7 @@ impl Estimate {
         let bits = passes.map_or(20, |passes| passes.max(1).ilog2() as usize + 1);
         Estimate {
             shapes,
-            results: jobs.iter().map(|job| 2 * (image(job) + gates(job))).sum(),
+            results: jobs.iter().map(|job| 2 * (image(job) + moments(job))).sum(),
             working: (2 * bits * arms + (3 + 2 * arms) * threads) * largest + threads * own,
         }
     }

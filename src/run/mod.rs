@@ -3,16 +3,14 @@
 //! experiment -> jobs (scene + estimator + streams) -> blocks of passes, in any order, on any threads
 //! -> moments in the order of passes -> record, timing, provenance.
 
-pub mod cells;
 pub mod checkpoint;
+pub mod chi_square;
 pub mod clock;
 pub mod comparisons;
-pub mod count;
 pub mod interrupt;
 pub mod job;
 pub mod keys;
 pub mod live;
-pub mod masses;
 pub mod memory;
 pub mod pilot;
 pub mod progress;

@@ -68,7 +68,7 @@ fn for_error(job: &Job, target: &RelativeError, stop: &dyn Fn() -> bool) -> Opti
     let mut length = LEAST_PASSES;
     loop {
         let more = job.play(Stage::Pilot, pilot.next_pass(), length, ALL, stop)?;
-        for node in more.gates.nodes() {
+        for node in more.moments.nodes() {
             pilot.push_node(node.level, node.value.clone());
         }
         let moments = pilot.clone().finish().unwrap_or_default();

@@ -34,7 +34,7 @@ pub fn replay(
         estimator: estimator.into(),
         passes: end,
         recorded: digest(&finished.batches[..batches as usize]),
-        replayed: digest(&all.gates.batches()),
+        replayed: digest(&all.moments.batches()),
     })
 }
 

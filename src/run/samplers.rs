@@ -1,4 +1,4 @@
-//! Runs experiments on samplers: cells and masses from the densities, counts from the draws, the record.
+//! Runs experiments on samplers: bins and masses from the densities, counts from the draws, the record.
 //!
 //! A sampler is the unit of work and of resuming: what one of them gave is kept in `state/`, so that an
 //! interrupted run goes on with the next one, and a run that is repeated draws nothing.
@@ -13,12 +13,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::Options;
-use super::cells::{self, Extra, Partition};
+use super::chi_square::bins::{self, Extra, Partition};
+use super::chi_square::count::{Counting, Counts};
+use super::chi_square::quadrature::{Mass, Quadrature, ROUNDING};
 use super::clock::thread_cpu_time;
-use super::count::{Counting, Counts};
 use super::interrupt::Interrupt;
 use super::keys::{KEY_VERSION, Stage};
-use super::masses::{Mass, Quadrature, ROUNDING};
 use super::progress::Progress;
 use crate::error::{Error, Result};
 use crate::experiment::SamplerExperiment;
@@ -29,7 +29,7 @@ use crate::results::json::{canonical, hash_bytes, hash_hex, hash_json};
 use crate::results::npy::Array;
 use crate::results::provenance::{self, Provenance, fingerprint};
 use crate::results::record::{Record, SCHEMA_VERSION};
-use crate::results::sampler::{ContrastRun, Delta, NullMass, SamplerRun, cells_path};
+use crate::results::sampler::{ContrastRun, Delta, NullMass, SamplerRun, bins_path};
 use crate::results::store::{Arrays, RecordFolder, Stored};
 use crate::results::timing::{Cost, Timing};
 use crate::samplers::{Draw, Null, Sampler};
@@ -304,7 +304,7 @@ fn draw(job: &Job, threads: usize, claims: &[String], interrupt: &Interrupt) -> 
         Null::Never => {}
         Null::Stated(mass) => extras.push((Extra::Null, mass)),
         Null::Remainder => {
-            let continuous: f64 = cells::shares(&mut quadrature).iter().sum();
+            let continuous: f64 = bins::shares(&mut quadrature).iter().sum();
             extras.push((Extra::Null, (1.0 - discrete - continuous).max(0.0)));
         }
     }
@@ -329,7 +329,7 @@ fn draw(job: &Job, threads: usize, claims: &[String], interrupt: &Interrupt) -> 
     let coarse = sums(&partition.coarse, partition.coarse_count, &masses);
     let centres = centres(&partition, &quadrature);
     let pairs = (job.samples / 2) as f64;
-    let (groups, group_count) = cells::groups(&centres, &coarse, pairs);
+    let (groups, group_count) = bins::groups(&centres, &coarse, pairs);
     let counting = Counting {
         sampler,
         contrasts: sampler.contrasts(),
@@ -354,18 +354,18 @@ fn draw(job: &Job, threads: usize, claims: &[String], interrupt: &Interrupt) -> 
     Some(Drawn { run, arrays, cost: Some(cost), claims: claims.to_vec() })
 }
 
-fn sums(cell_of: &[usize], count: usize, masses: &[Mass]) -> Vec<Mass> {
+fn sums(bin_of: &[usize], count: usize, masses: &[Mass]) -> Vec<Mass> {
     let mut sums = vec![Mass::default(); count];
-    cell_of.iter().zip(masses).for_each(|(&cell, mass)| sums[cell].add(*mass));
+    bin_of.iter().zip(masses).for_each(|(&bin, mass)| sums[bin].add(*mass));
     sums
 }
 
-/// Centres of the coarse cells: of the first leaf of each; what is no box comes after all pieces.
+/// Centres of the coarse bins: of the first leaf of each; what is no box comes after all pieces.
 fn centres(partition: &Partition, quadrature: &Quadrature) -> Vec<(usize, [f64; 2])> {
     let pieces = quadrature.pieces();
     let mut centres = vec![(pieces.len(), [0.5; 2]); partition.coarse_count];
-    for (area, &cell) in partition.leaves.iter().zip(&partition.coarse).rev() {
-        centres[cell] = (area.piece, cells::centre(area, &pieces[area.piece].axes));
+    for (area, &bin) in partition.leaves.iter().zip(&partition.coarse).rev() {
+        centres[bin] = (area.piece, bins::centre(area, &pieces[area.piece].axes));
     }
     centres
 }
@@ -405,15 +405,15 @@ impl Assembly<'_> {
     ) -> (SamplerRun, Arrays) {
         let Assembly { job, partition, counts, .. } = self;
         let mut arrays = Arrays::new();
-        let coarse = cells_path(job.index, "coarse");
-        arrays.insert(coarse.clone(), self.cells(&partition.coarse, partition.coarse_count));
+        let coarse = bins_path(job.index, "coarse");
+        arrays.insert(coarse.clone(), self.bins(&partition.coarse, partition.coarse_count));
         let fine = (partition.fine_count > partition.coarse_count).then(|| {
-            let path = cells_path(job.index, "fine");
-            arrays.insert(path.clone(), self.cells(&partition.fine, partition.fine_count));
+            let path = bins_path(job.index, "fine");
+            arrays.insert(path.clone(), self.bins(&partition.fine, partition.fine_count));
             path
         });
         let serial = (counting.group_count > 0).then(|| {
-            let path = cells_path(job.index, "serial");
+            let path = bins_path(job.index, "serial");
             arrays.insert(path.clone(), self.pairs(counting));
             path
         });
@@ -451,12 +451,12 @@ impl Assembly<'_> {
         (run, arrays)
     }
 
-    /// Counts, masses and bounds by cell; last a cell that nothing may enter.
-    fn cells(&self, cell_of: &[usize], count: usize) -> Array {
+    /// Counts, masses and bounds by bin; last a bin that nothing may enter.
+    fn bins(&self, bin_of: &[usize], count: usize) -> Array {
         let mut observed = vec![0.0; count + 1];
-        cell_of.iter().zip(&self.counts.leaves).for_each(|(&cell, &n)| observed[cell] += n as f64);
+        bin_of.iter().zip(&self.counts.leaves).for_each(|(&bin, &n)| observed[bin] += n as f64);
         observed[count] = self.counts.outside as f64;
-        let mut sums = sums(cell_of, count, self.masses);
+        let mut sums = sums(bin_of, count, self.masses);
         sums.push(Mass::default());
         observed.extend(sums.iter().map(|mass| mass.value));
         observed.extend(sums.iter().map(|mass| mass.bound));

@@ -341,7 +341,7 @@ impl<'a> Collector<'a> {
     fn take(&mut self, job: usize, block: Block) -> Result<bool> {
         let Some(running) = self.running.get_mut(&job) else { return Ok(false) };
         let before = running.done.next_pass();
-        running.early.insert(block.gates.start(), block);
+        running.early.insert(block.moments.start(), block);
         while let Some(next) = running.early.remove(&running.done.next_pass()) {
             running.done.append(next);
         }

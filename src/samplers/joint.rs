@@ -11,7 +11,7 @@ use crate::sampling::stream::Stream;
 /// The directions for one arrival and one point.
 ///
 /// Chart: theta / pi, the angle to the point, and the azimuth from the plane of arrival in turns, d omega =
-/// 2 pi^2 sin(theta) per unit of both. The table's cells are boxes of it.
+/// 2 pi^2 sin(theta) per unit of both. The table's texels are boxes of it.
 pub struct BounceSampler {
     code: JointDirections,
     w_in: DVec3,
@@ -44,7 +44,7 @@ impl Sampler for BounceSampler {
     fn pieces(&self) -> Vec<Piece> {
         let (mut theta, mut azimuth) = (Axis::over(0.0, 1.0), Axis::turns());
         if matches!(self.code, JointDirections::Table(_)) {
-            let [rows, columns] = JointTable::CELLS;
+            let [rows, columns] = JointTable::TEXELS;
             theta.kinks.extend((1..rows).map(|k| k as f64 / rows as f64));
             azimuth.kinks.extend((0..2 * columns).map(|k| k as f64 / (2 * columns) as f64));
         }

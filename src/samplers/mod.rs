@@ -101,7 +101,7 @@ pub struct Axis {
     pub range: [f64; 2],
     /// Values at which the density or its slope jumps, besides the ends.
     pub kinks: Vec<f64>,
-    /// Both ends are the same point (an azimuth): cells may start anywhere.
+    /// Both ends are the same point (an azimuth): bins may start anywhere.
     pub periodic: bool,
 }
 

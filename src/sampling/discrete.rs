@@ -187,17 +187,17 @@ mod tests {
         let weights = [0.2, 0.3, 0.5];
         let tables = (Cumulative::new(&weights).expect("weights"), AliasTable::new(&weights));
         let n = 1u32 << 18;
-        let mut cells = [[[0u32; 16]; 3]; 2];
+        let mut bins = [[[0u32; 16]; 3]; 2];
         for k in 0..n {
             let u = (f64::from(k) + 0.5) / f64::from(n);
             for (table, (index, rest)) in
                 [tables.0.sample(u), tables.1.sample(u)].into_iter().enumerate()
             {
                 assert!((0.0..1.0).contains(&rest));
-                cells[table][index][(rest * 16.0) as usize] += 1;
+                bins[table][index][(rest * 16.0) as usize] += 1;
             }
         }
-        for table in cells {
+        for table in bins {
             for (row, weight) in table.iter().zip(weights) {
                 for &count in row {
                     assert!((f64::from(count) - weight * f64::from(n) / 16.0).abs() <= 4.0);

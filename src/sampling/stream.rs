@@ -199,12 +199,12 @@ mod tests {
     }
 
     fn chi_square_z(pairs: &[(f64, f64)]) -> f64 {
-        let mut cells = [0u32; 256];
+        let mut bins = [0u32; 256];
         for (a, b) in pairs {
-            cells[(a * 16.0) as usize * 16 + (b * 16.0) as usize] += 1;
+            bins[(a * 16.0) as usize * 16 + (b * 16.0) as usize] += 1;
         }
         let expected = pairs.len() as f64 / 256.0;
-        let chi2: f64 = cells.iter().map(|&n| (f64::from(n) - expected).powi(2) / expected).sum();
+        let chi2: f64 = bins.iter().map(|&n| (f64::from(n) - expected).powi(2) / expected).sum();
         (chi2 - 255.0) / 510f64.sqrt()
     }
 

@@ -3,11 +3,11 @@
 //!
 //! Which one: Kolmogorov-Smirnov sees a shift of the middle, Anderson-Darling (which weights by
 //! 1 / (u (1 - u))) the tails too, where errors of a distance sampler sit, and Kuiper is for angles, because it
-//! does not depend on where the circle is cut. None of them tells *where* a distribution is wrong: cells do.
+//! does not depend on where the circle is cut. None of them tells *where* a distribution is wrong: bins do.
 //!
 //! The p-values of Kuiper and of Anderson-Darling are those of the limit of many values; at 1000 values they are
 //! uniform as far as 4000 runs can tell (`tests/calibration.rs`). How well they hold far below 1e-4 at
-//! finite n is not known here, so a decision at 1e-6 should rest on cells.
+//! finite n is not known here, so a decision at 1e-6 should rest on bins.
 
 use std::f64::consts::PI;
 
@@ -31,8 +31,8 @@ impl Sorted {
     /// [`Refusal::Empty`] below [`FEWEST`] values, [`Refusal::NotAProbability`] (with the place of the value)
     /// where one is not in [0, 1].
     pub fn new(mut values: Vec<f64>) -> Result<Sorted, Refusal> {
-        if let Some(cell) = values.iter().position(|u| !(0.0..=1.0).contains(u)) {
-            return Err(Refusal::NotAProbability { cell });
+        if let Some(bin) = values.iter().position(|u| !(0.0..=1.0).contains(u)) {
+            return Err(Refusal::NotAProbability { bin });
         }
         if values.len() < FEWEST {
             return Err(Refusal::Empty);
@@ -219,6 +219,6 @@ mod tests {
         assert_eq!(Sorted::new(vec![0.5; 99]), Err(Refusal::Empty));
         let mut values = vec![0.5; 100];
         values[7] = f64::NAN;
-        assert_eq!(Sorted::new(values), Err(Refusal::NotAProbability { cell: 7 }));
+        assert_eq!(Sorted::new(values), Err(Refusal::NotAProbability { bin: 7 }));
     }
 }

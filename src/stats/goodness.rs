@@ -1,6 +1,6 @@
 //! Tests of samples against known probabilities, and the smallest defect that each would have found.
 //!
-//! K. Pearson's statistic X2 = sum (n_i - N p_i)^2 / (N p_i) over cells whose probabilities p_i come from
+//! K. Pearson's statistic X2 = sum (n_i - N p_i)^2 / (N p_i) over bins whose probabilities p_i come from
 //! quadrature with errors of at most d_i. Three conditions make its chi-square tail an honest one at
 //! levels down to 1e-6, and a test that does not meet them is refused, never passed:
 //!
@@ -8,12 +8,12 @@
 //!   chi-square with noncentrality lambda = N sum d_i^2 / p_i at most. That moves its mean by lambda; one
 //!   standard deviation of X2 is sqrt(2 dof). Required: lambda <= 0.02 sqrt(2 dof), a shift that takes a
 //!   level of 1e-6 to 1.1e-6 at most.
-//! - *No cell is thin*: N p_i >= 25. At 5, the usual rule, rejections at the level 1e-3 are twice too many
-//!   where one cell dominates. The likelihood-ratio statistic G would need 100.
-//! - *The cells are everything*: sum p_i = 1 within the sum of the errors. Failed samples have a cell of
+//! - *No bin is thin*: N p_i >= 25. At 5, the usual rule, rejections at the level 1e-3 are twice too many
+//!   where one bin dominates. The likelihood-ratio statistic G would need 100.
+//! - *The bins are everything*: sum p_i = 1 within the sum of the errors. Failed samples have a bin of
 //!   their own, and so has each discrete direction.
 //!
-//! A sample in a cell of probability exactly 0 refutes the probabilities at once.
+//! A sample in a bin of probability exactly 0 refutes the probabilities at once.
 
 use std::fmt;
 
@@ -23,7 +23,7 @@ use super::tails::{
     binomial_lower, binomial_two_sided, binomial_upper, bisect, chi_square_sf, noncentrality,
 };
 
-/// The least expected count of a cell.
+/// The least expected count of a bin.
 pub const LEAST_EXPECTED: f64 = 25.0;
 
 /// The largest noncentrality from errors of the expectations, in standard deviations of the statistic.
@@ -36,12 +36,12 @@ pub const LARGEST_SKEW: f64 = 0.1;
 /// Why a test says nothing: never a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
-    /// No samples, or fewer than two cells that can hold any.
+    /// No samples, or fewer than two bins that can hold any.
     Empty,
     /// A probability or its error is no number in [0, 1].
     NotAProbability {
-        /// The cell, counted from 0.
-        cell: usize,
+        /// The bin, counted from 0.
+        bin: usize,
     },
     /// The probabilities are not known well enough for so many samples.
     Unresolved {
@@ -50,10 +50,10 @@ pub enum Refusal {
         /// The largest that is allowed.
         limit: f64,
     },
-    /// A cell expects too few samples.
+    /// A bin expects too few samples.
     Thin {
-        /// The cell, counted from 0.
-        cell: usize,
+        /// The bin, counted from 0.
+        bin: usize,
         /// Its expected count.
         expected: f64,
     },
@@ -76,18 +76,18 @@ pub enum Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Refusal::Empty => write!(f, "no samples, or fewer than two cells that can hold any"),
-            Refusal::NotAProbability { cell } => {
-                write!(f, "the mass of cell {cell} or its error is not in [0, 1]")
+            Refusal::Empty => write!(f, "no samples, or fewer than two bins that can hold any"),
+            Refusal::NotAProbability { bin } => {
+                write!(f, "the mass of bin {bin} or its error is not in [0, 1]")
             }
             Refusal::Unresolved { lambda, limit } => write!(
                 f,
                 "the expected masses are not resolved: their errors shift the statistic by {lambda:.3e}, \
                  more than {limit:.3e}; refine the quadrature or test with fewer samples"
             ),
-            Refusal::Thin { cell, expected } => write!(
+            Refusal::Thin { bin, expected } => write!(
                 f,
-                "cell {cell} expects {expected:.3} samples, fewer than {LEAST_EXPECTED}; merge it with a \
+                "bin {bin} expects {expected:.3} samples, fewer than {LEAST_EXPECTED}; merge it with a \
                  neighbour or draw more"
             ),
             Refusal::NotNormalised { sum, bound } => write!(
@@ -103,12 +103,12 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// One cell of a goodness-of-fit test.
+/// One bin of a goodness-of-fit test.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cell {
+pub struct Bin {
     /// Its probability.
     pub mass: f64,
-    /// A bound of the error of `mass`; 0 with `mass` 0 for a cell that nothing may enter.
+    /// A bound of the error of `mass`; 0 with `mass` 0 for a bin that nothing may enter.
     pub error: f64,
     /// The samples that fell into it.
     pub count: u64,
@@ -117,11 +117,11 @@ pub struct Cell {
 /// The outcome of a chi-square test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goodness {
-    /// Pearson's X2; infinite where an impossible cell was entered.
+    /// Pearson's X2; infinite where an impossible bin was entered.
     pub statistic: f64,
-    /// Degrees of freedom: the possible cells less one.
+    /// Degrees of freedom: the possible bins less one.
     pub dof: f64,
-    /// P(X2 at least as large); 0 where an impossible cell was entered.
+    /// P(X2 at least as large); 0 where an impossible bin was entered.
     pub p_value: f64,
     /// The largest noncentrality that errors of the expectations cause.
     pub lambda_err: f64,
@@ -146,40 +146,40 @@ impl Goodness {
     }
 }
 
-/// Pearson's chi-square test of counts against the cells' masses.
+/// Pearson's chi-square test of counts against the bins' masses.
 ///
 /// # Errors
 ///
-/// Every [`Refusal`] but those of means. A sample in an impossible cell is an outcome and comes first.
-pub fn pearson(cells: &[Cell]) -> Result<Goodness, Refusal> {
+/// Every [`Refusal`] but those of means. A sample in an impossible bin is an outcome and comes first.
+pub fn pearson(bins: &[Bin]) -> Result<Goodness, Refusal> {
     let is_probability = |x: f64| (0.0..=1.0).contains(&x);
-    if let Some(cell) = cells.iter().position(|c| !is_probability(c.mass) || !is_probability(c.error)) {
-        return Err(Refusal::NotAProbability { cell });
+    if let Some(bin) = bins.iter().position(|c| !is_probability(c.mass) || !is_probability(c.error)) {
+        return Err(Refusal::NotAProbability { bin });
     }
-    let samples: u64 = cells.iter().map(|c| c.count).sum();
+    let samples: u64 = bins.iter().map(|c| c.count).sum();
     let n = samples as f64;
-    let is_possible = |c: &&Cell| c.mass > 0.0 || c.error > 0.0;
-    let possible = || cells.iter().filter(is_possible);
+    let is_possible = |c: &&Bin| c.mass > 0.0 || c.error > 0.0;
+    let possible = || bins.iter().filter(is_possible);
     let dof = possible().count() as f64 - 1.0;
     let lambda_err: f64 = n * possible().map(|c| c.error * c.error / c.mass).sum::<f64>();
-    if cells.iter().any(|c| !is_possible(&c) && c.count > 0) {
+    if bins.iter().any(|c| !is_possible(&c) && c.count > 0) {
         return Ok(Goodness { statistic: f64::INFINITY, dof, p_value: 0.0, lambda_err, samples });
     }
     if samples == 0 || dof < 1.0 {
         return Err(Refusal::Empty);
     }
-    let sum: f64 = cells.iter().map(|c| c.mass).sum();
-    let rounding = cells.len() as f64 * f64::EPSILON;
-    let bound = cells.iter().map(|c| c.error).sum::<f64>() + rounding;
+    let sum: f64 = bins.iter().map(|c| c.mass).sum();
+    let rounding = bins.len() as f64 * f64::EPSILON;
+    let bound = bins.iter().map(|c| c.error).sum::<f64>() + rounding;
     if (sum - 1.0).abs() > bound {
         return Err(Refusal::NotNormalised { sum, bound });
     }
-    let thin = cells.iter().position(|c| is_possible(&c) && n * c.mass < LEAST_EXPECTED);
-    if let Some(cell) = thin {
-        return Err(Refusal::Thin { cell, expected: n * cells[cell].mass });
+    let thin = bins.iter().position(|c| is_possible(&c) && n * c.mass < LEAST_EXPECTED);
+    if let Some(bin) = thin {
+        return Err(Refusal::Thin { bin, expected: n * bins[bin].mass });
     }
     resolved(lambda_err, dof)?;
-    let term = |c: &Cell| (c.count as f64 - n * c.mass) * (c.count as f64 - n * c.mass) / (n * c.mass);
+    let term = |c: &Bin| (c.count as f64 - n * c.mass) * (c.count as f64 - n * c.mass) / (n * c.mass);
     let statistic = possible().map(term).sum();
     Ok(Goodness { statistic, dof, p_value: chi_square_sf(statistic, dof), lambda_err, samples })
 }
@@ -190,8 +190,8 @@ fn resolved(lambda: f64, dof: f64) -> Result<(), Refusal> {
     if lambda <= limit { Ok(()) } else { Err(Refusal::Unresolved { lambda, limit }) }
 }
 
-/// Pearson's test of k x k counts of pairs of draws (row-major, the first draw's cell is the row) against
-/// the product of the cells' known masses, each with its error: that the two are independent, and that
+/// Pearson's test of k x k counts of pairs of draws (row-major, the first draw's bin is the row) against
+/// the product of the bins' known masses, each with its error: that the two are independent, and that
 /// each has its masses. The pairs must be disjoint: draws 1 and 2, 3 and 4, and so on.
 ///
 /// # Errors
@@ -202,15 +202,15 @@ pub fn independence(masses: &[(f64, f64)], counts: &[u64]) -> Result<Goodness, R
         return Err(Refusal::Empty);
     }
     let pairs = masses.iter().flat_map(|a| masses.iter().map(move |b| (a, b)));
-    let cells: Vec<Cell> = pairs
+    let bins: Vec<Bin> = pairs
         .zip(counts)
-        .map(|((a, b), count)| Cell {
+        .map(|((a, b), count)| Bin {
             mass: a.0 * b.0,
             error: a.0 * b.1 + b.0 * a.1 + a.1 * b.1,
             count: *count,
         })
         .collect();
-    pearson(&cells)
+    pearson(&bins)
 }
 
 /// The outcome of a test of one probability.
@@ -233,11 +233,11 @@ pub struct Proportion {
 /// # Errors
 ///
 /// [`Refusal::Empty`] without samples, [`Refusal::NotAProbability`], [`Refusal::Unresolved`] where
-/// N error^2 / (p q) exceeds the bound that [`pearson`] sets for its two cells.
+/// N error^2 / (p q) exceeds the bound that [`pearson`] sets for its two bins.
 pub fn proportion(count: u64, samples: u64, mass: f64, error: f64) -> Result<Proportion, Refusal> {
     let is_probability = |x: f64| (0.0..=1.0).contains(&x);
     if !is_probability(mass) || !is_probability(error) {
-        return Err(Refusal::NotAProbability { cell: 0 });
+        return Err(Refusal::NotAProbability { bin: 0 });
     }
     if samples == 0 || count > samples {
         return Err(Refusal::Empty);
@@ -329,18 +329,18 @@ mod tests {
         assert!((a - b).abs() <= relative * b.abs(), "{a:e} is not {b:e}");
     }
 
-    fn cells(masses: &[f64], counts: &[u64]) -> Vec<Cell> {
+    fn bins(masses: &[f64], counts: &[u64]) -> Vec<Bin> {
         masses
             .iter()
             .zip(counts)
-            .map(|(mass, count)| Cell { mass: *mass, error: 0.0, count: *count })
+            .map(|(mass, count)| Bin { mass: *mass, error: 0.0, count: *count })
             .collect()
     }
 
-    // scipy 1.x: chisquare([120, 90, 190], [100, 100, 200]); an impossible cell stays out.
+    // scipy 1.x: chisquare([120, 90, 190], [100, 100, 200]); an impossible bin stays out.
     #[test]
     fn pearson_is_pearsons() {
-        let found = pearson(&cells(&[0.25, 0.25, 0.5, 0.0], &[120, 90, 190, 0])).expect("a test");
+        let found = pearson(&bins(&[0.25, 0.25, 0.5, 0.0], &[120, 90, 190, 0])).expect("a test");
         assert_eq!((found.dof, found.samples), (2.0, 400));
         close(found.statistic, 5.5, 1e-14);
         close(found.p_value, 0.06392786120670757, 1e-12);
@@ -348,16 +348,16 @@ mod tests {
 
     #[test]
     fn what_says_nothing_is_refused() {
-        let good = cells(&[0.25, 0.75], &[120, 280]);
+        let good = bins(&[0.25, 0.75], &[120, 280]);
         assert!(pearson(&good).is_ok());
-        let refusal = |change: fn(&mut Vec<Cell>)| {
-            let mut cells = good.clone();
-            change(&mut cells);
-            pearson(&cells).expect_err("a refusal")
+        let refusal = |change: fn(&mut Vec<Bin>)| {
+            let mut bins = good.clone();
+            change(&mut bins);
+            pearson(&bins).expect_err("a refusal")
         };
         assert!(matches!(refusal(|c| c[0].mass = 0.26), Refusal::NotNormalised { .. }));
-        assert!(matches!(refusal(|c| c[0].mass = f64::NAN), Refusal::NotAProbability { cell: 0 }));
-        assert!(matches!(refusal(|c| c[1].error = -1.0), Refusal::NotAProbability { cell: 1 }));
+        assert!(matches!(refusal(|c| c[0].mass = f64::NAN), Refusal::NotAProbability { bin: 0 }));
+        assert!(matches!(refusal(|c| c[1].error = -1.0), Refusal::NotAProbability { bin: 1 }));
         // N d^2 (1/p + 1/q) = 400 * 1e-4 * 5.33 > 0.02 sqrt 2; a tenth of the error is enough.
         assert!(matches!(
             refusal(|c| (c[0].error, c[1].error) = (0.01, 0.01)),
@@ -367,20 +367,20 @@ mod tests {
         (resolved[0].error, resolved[1].error) = (0.001, 0.001);
         close(pearson(&resolved).expect("a test").lambda_err, 400.0 * 1e-6 * (4.0 + 4.0 / 3.0), 1e-12);
         // A mass of 0 that is only known within an error is thin, not impossible.
-        let push = |c: &mut Vec<Cell>| c.push(Cell { mass: 0.0, error: 1e-9, count: 0 });
-        assert!(matches!(refusal(push), Refusal::Thin { cell: 2, .. }));
-        let thin = cells(&[0.06, 0.94], &[24, 376]);
-        assert!(matches!(pearson(&thin), Err(Refusal::Thin { cell: 0, .. })));
+        let push = |c: &mut Vec<Bin>| c.push(Bin { mass: 0.0, error: 1e-9, count: 0 });
+        assert!(matches!(refusal(push), Refusal::Thin { bin: 2, .. }));
+        let thin = bins(&[0.06, 0.94], &[24, 376]);
+        assert!(matches!(pearson(&thin), Err(Refusal::Thin { bin: 0, .. })));
         assert_eq!(pearson(&[]), Err(Refusal::Empty));
-        assert_eq!(pearson(&cells(&[1.0], &[400])), Err(Refusal::Empty));
-        assert_eq!(pearson(&cells(&[0.5, 0.5], &[0, 0])), Err(Refusal::Empty));
+        assert_eq!(pearson(&bins(&[1.0], &[400])), Err(Refusal::Empty));
+        assert_eq!(pearson(&bins(&[0.5, 0.5], &[0, 0])), Err(Refusal::Empty));
     }
 
     #[test]
     fn one_sample_where_none_can_be_is_a_failure() {
         // Whatever else could be said against the test.
         for masses in [[0.5, 0.5, 0.0], [0.01, 0.99, 0.0]] {
-            let found = pearson(&cells(&masses, &[100, 100, 1])).expect("a verdict");
+            let found = pearson(&bins(&masses, &[100, 100, 1])).expect("a verdict");
             assert_eq!((found.p_value, found.statistic), (0.0, f64::INFINITY));
         }
     }
@@ -462,15 +462,15 @@ mod tests {
         assert_eq!(contrast(&Moments::of(1.0), 1.0, 0.0), Err(Refusal::Empty));
     }
 
-    // Doses: the detectable defect, a density wrong by +-r in alternate cells, has the stated noncentrality,
+    // Doses: the detectable defect, a density wrong by +-r in alternate bins, has the stated noncentrality,
     // so that counts at their expectations under it exceed the critical value by about lambda.
     #[test]
     fn the_detectable_defect_is_rejected() {
         let (n, k) = (1_000_000.0, 64);
-        let flat = |r: f64| -> Vec<Cell> {
+        let flat = |r: f64| -> Vec<Bin> {
             let sign = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };
             let count = |i| (n / k as f64 * (1.0 + sign(i) * r)).round() as u64;
-            (0..k).map(|i| Cell { mass: 1.0 / k as f64, error: 0.0, count: count(i) }).collect()
+            (0..k).map(|i| Bin { mass: 1.0 / k as f64, error: 0.0, count: count(i) }).collect()
         };
         let sham = pearson(&flat(0.0)).expect("a test");
         let defect = sham.detectable(1e-6, 0.99);

@@ -38,7 +38,7 @@ impl Moments {
         *self = self.merge(Moments::of(x));
     }
 
-    /// As a record's gate array stores them: `[n, mean, m2, m3, m4]`.
+    /// As a record's observables array'stores them: `[n, mean, m2, m3, m4]`.
     pub fn to_array(&self) -> [f64; 5] {
         [self.n as f64, self.mean, self.m2, self.m3, self.m4]
     }

@@ -286,13 +286,13 @@ impl Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::sample::{self, set_gates, uniform};
+    use crate::results::sample::{self, set_observables, uniform};
 
     #[test]
     fn every_pair_has_a_row_and_a_reason() {
         let mut stored = sample::stored(0.1);
         // `snee` has a quarter of the variance at the same counted cost; no time was measured.
-        set_gates(&mut stored, "snee", |i, o, b| {
+        set_observables(&mut stored, "snee", |i, o, b| {
             1.0 + 0.05 * uniform(i + 7000 + (1000 * (2 * o + b)) as u64)
         });
         sample::set_spread(&mut stored, "snee", sample::pairs(0.05, 7_000_000));
@@ -316,7 +316,7 @@ mod tests {
     #[test]
     fn nothing_is_quoted_where_the_means_differ() {
         let mut stored = sample::stored(0.1);
-        set_gates(&mut stored, "snee", |i, _, _| 1.1 + 0.05 * uniform(i + 7000));
+        set_observables(&mut stored, "snee", |i, _, _| 1.1 + 0.05 * uniform(i + 7000));
         let rows = comparisons(&stored);
         assert!(rows.iter().all(|r| r.note.contains("the means differ") && r.efficiency_ratio.is_nan()));
         assert!(rows.iter().all(|r| r.variance_ratio.is_nan() && !r.resolved));
@@ -326,7 +326,11 @@ mod tests {
     fn silent_classes_have_no_row() {
         let mut stored = sample::stored(0.1);
         for name in ["mis", "snee"] {
-            set_gates(&mut stored, name, |i, o, _| if o == 1 { 0.0 } else { 1.0 + 0.1 * uniform(i) });
+            set_observables(
+                &mut stored,
+                name,
+                |i, o, _| if o == 1 { 0.0 } else { 1.0 + 0.1 * uniform(i) },
+            );
         }
         let rows = comparisons(&stored);
         assert!(!rows.is_empty() && rows.iter().all(|r| r.class == "all"));

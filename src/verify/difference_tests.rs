@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::*;
-use crate::results::sample::{self, set_gates, uniform};
+use crate::results::sample::{self, set_observables, uniform};
 use crate::verify::judge::FAMILY_LEVEL;
 
 const TERMS: Terms = Terms { level: FAMILY_LEVEL, detect: None, max_slowdown: None };
@@ -48,7 +48,7 @@ fn the_same_streams_are_paired() {
     let shifted = |by: f64| {
         let mut b = a.clone();
         let noise = |i, o, band| 0.01 * uniform(900_000 + i + 1000 * (2 * o + band) as u64);
-        set_gates(&mut b, "mis", |i, o, band| score(i, o, band) + by + noise(i, o, band));
+        set_observables(&mut b, "mis", |i, o, band| score(i, o, band) + by + noise(i, o, band));
         b
     };
     let found = compared(&a, &shifted(0.01));
@@ -76,8 +76,8 @@ fn other_numbers_of_passes_add_their_errors() {
     let mut b = a.clone();
     let run = &mut b.record.cells[0].runs[0];
     run.passes = 252;
-    let path = run.gates.clone();
-    let array = b.arrays.get_mut(&path).expect("gates");
+    let path = run.moments.clone();
+    let array = b.arrays.get_mut(&path).expect("moments");
     array.shape[0] -= 1;
     array.data.truncate(array.shape.iter().product());
     // 63 batches are too few for a t test.
@@ -130,7 +130,7 @@ fn work_and_power_are_gates_where_asked() {
     let a = stored();
     let mut b = a.clone();
     b.record.resolved["seed"] = json!(2);
-    set_gates(&mut b, "mis", |i, o, band| score(i + 500_000, o, band));
+    set_observables(&mut b, "mis", |i, o, band| score(i + 500_000, o, band));
     b.record.cells[0].runs[0].cost.insert("rays".into(), 1280);
     let with = |detect, max_slowdown| {
         compare(&a, &b, &Terms { detect, max_slowdown, ..TERMS }).expect("a comparison").exit_code()

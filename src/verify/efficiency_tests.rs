@@ -6,8 +6,8 @@ use super::super::judge::judge_alone;
 use super::super::verdict::Verdict;
 use super::*;
 use crate::results::record::{Against, Bias, Comparison, Observable};
-use crate::results::sample::{pairs, quantity, set_gates, set_spread, stored, uniform};
-use crate::results::store::gates_path;
+use crate::results::sample::{pairs, quantity, set_observables, set_spread, stored, uniform};
+use crate::results::store::observables_path;
 use crate::results::timing::{Batches, Timing};
 
 const BATCHES: usize = 64;
@@ -15,8 +15,10 @@ const BATCHES: usize = 64;
 /// Both estimators score 1 with this standard deviation, on numbers of their own.
 fn scored(mis: f64, snee: f64) -> Stored {
     let mut s = stored(0.1);
-    set_gates(&mut s, "mis", |i, o, b| 1.0 + mis * uniform(i + (1000 * (2 * o + b)) as u64));
-    set_gates(&mut s, "snee", |i, o, b| 1.0 + snee * uniform(i + (9000 + 1000 * (2 * o + b)) as u64));
+    set_observables(&mut s, "mis", |i, o, b| 1.0 + mis * uniform(i + (1000 * (2 * o + b)) as u64));
+    set_observables(&mut s, "snee", |i, o, b| {
+        1.0 + snee * uniform(i + (9000 + 1000 * (2 * o + b)) as u64)
+    });
     s
 }
 
@@ -64,7 +66,7 @@ fn controls_expect_failure_of_the_efficiency_alone() {
         Outcome::Fail
     );
     let mut differing = scored(0.1, 0.05);
-    set_gates(&mut differing, "snee", |i, _, _| 1.2 + 0.05 * uniform(i + 9000));
+    set_observables(&mut differing, "snee", |i, _, _| 1.2 + 0.05 * uniform(i + 9000));
     // With a smaller bound, the means speak louder than the efficiency.
     assert_invalid(
         &claimed(differing, 4.0, CostMeasure::Counters, Some("fails")),
@@ -75,7 +77,7 @@ fn controls_expect_failure_of_the_efficiency_alone() {
 #[test]
 fn energy_that_is_missing_is_no_efficiency() {
     let mut s = scored(0.1, 0.05);
-    set_gates(&mut s, "snee", |i, _, _| 0.9 + 0.05 * uniform(i + 9000));
+    set_observables(&mut s, "snee", |i, _, _| 0.9 + 0.05 * uniform(i + 9000));
     let v = by_counters(s, 1.5);
     assert_eq!(v.outcome, Outcome::Fail);
     assert!(v.note.starts_with("the means differ by -10"), "{}", v.note);
@@ -88,7 +90,7 @@ fn what_an_efficiency_cannot_rest_on_is_invalid() {
     assert_invalid(&by_counters(biased, 1.5), "no mean test: snee is biased");
 
     let mut exact = scored(0.1, 0.05);
-    set_gates(&mut exact, "snee", |_, _, _| 1.0);
+    set_observables(&mut exact, "snee", |_, _, _| 1.0);
     assert_invalid(&by_counters(exact, 1.5), "no variance");
 
     let mut anomalous = scored(0.1, 0.05);
@@ -109,7 +111,7 @@ fn what_an_efficiency_cannot_rest_on_is_invalid() {
 #[test]
 fn a_variance_that_few_passes_make_is_not_resolved() {
     let mut s = scored(0.1, 0.05);
-    set_gates(&mut s, "snee", |i, _, _| match (i % 64, (i / 64) % 2) {
+    set_observables(&mut s, "snee", |i, _, _| match (i % 64, (i / 64) % 2) {
         (5, 0) => 4.0,
         (5, _) => -2.0,
         _ => 1.0 + 0.05 * uniform(i + 9000),
@@ -134,9 +136,9 @@ fn timed(mut s: Stored, seconds: impl Fn(&str, usize) -> f64) -> Stored {
     let mut control = s.record.cells[0].runs[0].clone();
     control.estimator = "mis (control)".into();
     control.control_of = Some("mis".into());
-    control.gates = gates_path(0, "mis (control)");
+    control.moments = observables_path(0, "mis (control)");
     s.record.cells[0].runs.push(control);
-    set_gates(&mut s, "mis (control)", |i, o, b| {
+    set_observables(&mut s, "mis (control)", |i, o, b| {
         1.0 + 0.1 * uniform(i + (50_000 + 1000 * (2 * o + b)) as u64)
     });
     let mut timing = Timing::default();
@@ -235,7 +237,7 @@ fn pixels_have_an_efficiency_of_their_own() {
     set_spread(&mut loud, "mis", |i, _| if i == 77 { 64.0 } else { 0.5 });
     assert_invalid(&of_pixels(loud, 3.0), "not resolved");
     // The means must agree all the same.
-    set_gates(&mut s, "snee", |i, _, _| 1.2 + 0.1 * uniform(i + 9000));
+    set_observables(&mut s, "snee", |i, _, _| 1.2 + 0.1 * uniform(i + 9000));
     let differ = of_pixels(s, 3.0);
     assert_eq!(differ.outcome, Outcome::Fail);
     assert!(differ.note.contains("the means differ"), "{differ:?}");

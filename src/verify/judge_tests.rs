@@ -5,7 +5,7 @@ use serde_json::json;
 use super::super::verdict::{exit_code, to_csv};
 use super::*;
 use crate::results::record::{Against, Bias, Comparison, Quantity};
-use crate::results::sample::{PASSES, judged, quantity, set_gates, stored, uniform};
+use crate::results::sample::{PASSES, judged, quantity, set_observables, stored, uniform};
 
 /// A record with one claim, of this kind and expectation, and one comparison.
 fn with_claim(
@@ -69,8 +69,8 @@ fn a_claim_made_after_the_run_is_not_green() {
 #[test]
 fn two_silences_agree_on_nothing() {
     let mut s = with_claim(stored(0.1), "agree", None, other(false), None);
-    set_gates(&mut s, "mis", |_, _, _| 0.0);
-    set_gates(&mut s, "snee", |_, _, _| 0.0);
+    set_observables(&mut s, "mis", |_, _, _| 0.0);
+    set_observables(&mut s, "snee", |_, _, _| 0.0);
     assert_invalid(&one(&s), "neither side scored anything");
 }
 
@@ -92,7 +92,7 @@ fn power_is_part_of_a_pass() {
 #[test]
 fn an_expected_zero_has_an_absolute_detectable() {
     let mut s = stored(0.1);
-    set_gates(&mut s, "mis", |i, _, _| 0.1 * uniform(i));
+    set_observables(&mut s, "mis", |i, _, _| 0.1 * uniform(i));
     let v = equals(s, 0.0, 0.0, Some(0.1));
     assert_eq!(v.outcome, Outcome::Pass);
     assert!((v.detectable - 0.05).abs() < 0.01, "{}", v.detectable);
@@ -102,7 +102,7 @@ fn an_expected_zero_has_an_absolute_detectable() {
 fn no_variance_passes_only_at_the_value() {
     let exact = |x: f64| {
         let mut s = stored(0.1);
-        set_gates(&mut s, "mis", |_, _, _| x);
+        set_observables(&mut s, "mis", |_, _, _| x);
         s
     };
     let good = equals(exact(0.3), 0.3, 0.0, None);
@@ -120,7 +120,7 @@ fn no_variance_passes_only_at_the_value() {
 #[test]
 fn rounding_noise_is_no_variance() {
     let mut s = stored(0.1);
-    set_gates(&mut s, "mis", |i, _, _| 1.0 + 1e-15 * uniform(i));
+    set_observables(&mut s, "mis", |i, _, _| 1.0 + 1e-15 * uniform(i));
     assert_eq!(equals(s, 1.0, 0.0, None).test, "identity");
 }
 
@@ -132,8 +132,8 @@ fn estimators_agree_and_differ() {
     assert_eq!(good.estimators, "mis vs snee");
     // A defect of 2 % that only pairing can see: both play the same noise.
     let mut s = stored(0.1);
-    set_gates(&mut s, "mis", |i, _, _| 1.0 + 0.1 * uniform(i));
-    set_gates(&mut s, "snee", |i, _, _| 1.02 + 0.1 * uniform(i) + 0.01 * uniform(i + 9999));
+    set_observables(&mut s, "mis", |i, _, _| 1.0 + 0.1 * uniform(i));
+    set_observables(&mut s, "snee", |i, _, _| 1.02 + 0.1 * uniform(i) + 0.01 * uniform(i + 9999));
     assert_eq!(agree(s.clone(), false).outcome, Outcome::Pass);
     assert_eq!(agree(s, true).outcome, Outcome::Fail);
 }
@@ -141,7 +141,7 @@ fn estimators_agree_and_differ() {
 #[test]
 fn identical_paired_runs_are_an_identity() {
     let mut s = stored(0.1);
-    ["mis", "snee"].iter().for_each(|e| set_gates(&mut s, e, |i, _, _| 1.0 + uniform(i)));
+    ["mis", "snee"].iter().for_each(|e| set_observables(&mut s, e, |i, _, _| 1.0 + uniform(i)));
     let v = one(&with_claim(s, "agree", None, other(true), Some(0.1)));
     assert_eq!((v.outcome, v.test.as_str()), (Outcome::Pass, "identity"));
 }
@@ -162,7 +162,7 @@ fn anomalies_invalidate_and_conventions_do_not() {
 #[test]
 fn what_a_test_cannot_rest_on_is_invalid() {
     let mut nan = stored(0.1);
-    set_gates(&mut nan, "mis", |i, _, _| if i == 7 { f64::NAN } else { 1.0 });
+    set_observables(&mut nan, "mis", |i, _, _| if i == 7 { f64::NAN } else { 1.0 });
     assert_invalid(&equals(nan, 1.0, 0.0, None), "not finite");
 
     let mut dropped = stored(0.1);
@@ -170,8 +170,8 @@ fn what_a_test_cannot_rest_on_is_invalid() {
     assert_invalid(&equals(dropped, 1.0, 0.0, None), "256 passes of 260");
 
     let mut few = stored(0.1);
-    let path = few.record.cells[0].runs[0].gates.clone();
-    let array = few.arrays.get_mut(&path).expect("gates");
+    let path = few.record.cells[0].runs[0].moments.clone();
+    let array = few.arrays.get_mut(&path).expect("moments");
     array.shape[0] = 63;
     array.data.truncate(63 * 20);
     few.record.cells[0].runs[0].passes = 252;
@@ -186,12 +186,12 @@ fn what_a_test_cannot_rest_on_is_invalid() {
 fn heavy_tails_are_invalid() {
     // One pass in 256 scores 256: mean 1, skewness 16, far below its true mean in most runs.
     let mut rare = stored(0.1);
-    set_gates(&mut rare, "mis", |i, _, _| if i == 100 { 256.0 } else { 0.0 });
+    set_observables(&mut rare, "mis", |i, _, _| if i == 100 { 256.0 } else { 0.0 });
     assert_invalid(&equals(rare, 1.0, 0.0, None), "|skewness|");
     // +10 four times in one batch, -10 once in each of four others: no skewness, but one batch holds
     // 400 of the 500 between batches.
     let mut share = stored(0.1);
-    set_gates(&mut share, "mis", |i, _, _| match i {
+    set_observables(&mut share, "mis", |i, _, _| match i {
         100..=103 => 10.0,
         8 | 60 | 140 | 200 => -10.0,
         _ => 0.0,
@@ -207,7 +207,7 @@ fn a_biased_estimator_agrees_with_nothing() {
         |s: &Stored, expect| one(&with_claim(s.clone(), "agree", expect, other(false), Some(0.1)));
     assert_invalid(&agree(&s, None), "diffusion");
     assert_eq!(agree(&s, Some("invalid")).outcome, Outcome::Pass);
-    set_gates(&mut s, "snee", |i, _, _| 2.0 + 0.1 * uniform(i));
+    set_observables(&mut s, "snee", |i, _, _| 2.0 + 0.1 * uniform(i));
     assert_eq!(agree(&s, Some("differs")).outcome, Outcome::Pass);
 }
 
@@ -234,14 +234,16 @@ fn many_tests_share_one_level() {
 /// A table: 30 cells, each with its own noise and `off` standard errors away from its value.
 fn table(off: f64) -> Stored {
     let mut s = with_claim(stored(0.1), "equals", None, value(1.0, 0.0), None);
-    let (cell, path) = (s.record.cells[0].clone(), s.record.cells[0].runs[0].gates.clone());
+    let (cell, path) = (s.record.cells[0].clone(), s.record.cells[0].runs[0].moments.clone());
     s.record.comparisons.clear();
     for c in 0..30 {
         let mut cell = cell.clone();
         let sign = if c % 2 == 0 { 1.0 } else { -1.0 };
-        set_gates(&mut s, "mis", |i, _, _| 1.0 + sign * off * 0.1 / 16.0 + 0.1 * uniform(i + 1000 * c));
+        set_observables(&mut s, "mis", |i, _, _| {
+            1.0 + sign * off * 0.1 / 16.0 + 0.1 * uniform(i + 1000 * c)
+        });
         let array = s.arrays[&path].clone();
-        cell.runs[0].gates = format!("cell{c}");
+        cell.runs[0].moments = format!("cell{c}");
         s.arrays.insert(format!("cell{c}"), array);
         s.record.cells.push(cell);
         let quantity = Quantity { cell: c as usize + 1, ..quantity("mis", 0) };
@@ -289,11 +291,11 @@ fn exit_codes() {
 fn two_looks(off: f64, second_off: f64) -> (Stored, Stored) {
     let at = |off: f64, salt: u64| {
         let mut s = with_claim(stored(0.1), "equals", None, value(1.0, 0.0), None);
-        set_gates(&mut s, "mis", |i, _, _| 0.1 * uniform(i + salt));
+        set_observables(&mut s, "mis", |i, _, _| 0.1 * uniform(i + salt));
         let now = judge_alone(&s);
         // Moved so that the statistic is exactly `off`.
         let (mean, error) = (now[0].value, now[0].std_error);
-        set_gates(&mut s, "mis", |i, _, _| 1.0 - mean + off * error + 0.1 * uniform(i + salt));
+        set_observables(&mut s, "mis", |i, _, _| 1.0 - mean + off * error + 0.1 * uniform(i + salt));
         s
     };
     (at(off, 0), at(second_off, 70_000))

@@ -71,7 +71,7 @@ fn of_run(
         let Some(own) = run.observables.iter().position(|own| own == observable) else { continue };
         for (band, name) in stored.record.bands.iter().enumerate() {
             let mean = |run: &EstimatorRun, place: usize| {
-                Some(Estimate::of_batches(&stored.gate(run, place, band)?))
+                Some(Estimate::of_batches(&stored.moments(run, place, band)?))
             };
             let (Some(value), Some(expected)) = (mean(run, own), mean(truth, place)) else { continue };
             if value.value == 0.0 || expected.value == 0.0 {

@@ -2,7 +2,7 @@
 //!
 //! | test | statement | judged by |
 //! |---|---|---|
-//! | `chi2 coarse`, `chi2 fine` | draws fall into cells as the density's masses say | Pearson |
+//! | `chi2 coarse`, `chi2 fine` | draws fall into bins as the density's masses say | Pearson |
 //! | `serial` | so do pairs of consecutive draws, as the products of masses say | Pearson |
 //! | `contrast NAME` | the mean of a function of the draw | Student's t |
 //! | `delta NAME` | a discrete outcome has its probability, and its value | exact binomial |
@@ -17,9 +17,9 @@
 use super::trial::{Claim, Evidence, Fit, Item, Trial};
 use super::verdict::Verdict;
 use crate::results::record::Record;
-use crate::results::sampler::{Cells, ContrastRun, Delta, NullMass, OWN_DENSITY, SamplerRun};
+use crate::results::sampler::{Bins, ContrastRun, Delta, NullMass, OWN_DENSITY, SamplerRun};
 use crate::results::store::Stored;
-use crate::stats::goodness::{Cell, contrast, pearson, proportion};
+use crate::stats::goodness::{Bin, contrast, pearson, proportion};
 use crate::stats::hypothesis::Test;
 use crate::stats::moments::Moments;
 
@@ -114,9 +114,9 @@ impl<'a> Rows<'a> {
 
     fn all(mut self) -> Vec<Trial> {
         let run = self.run;
-        self.cells("chi2 coarse", Some(&run.coarse), true);
-        self.cells("chi2 fine", run.fine.as_ref(), true);
-        self.cells("serial", run.serial.as_ref(), false);
+        self.bins("chi2 coarse", Some(&run.coarse), true);
+        self.bins("chi2 fine", run.fine.as_ref(), true);
+        self.bins("serial", run.serial.as_ref(), false);
         let detect = self.stored.record.claims[self.index]["sampler"]["detect"].as_f64();
         if let Some(row) = self.rows.iter_mut().find(|row| row.verdict.test == "chi2 coarse") {
             row.detect = detect;
@@ -130,20 +130,20 @@ impl<'a> Rows<'a> {
         self.rows
     }
 
-    fn cells(&mut self, test: &str, path: Option<&String>, is_everything: bool) {
+    fn bins(&mut self, test: &str, path: Option<&String>, is_everything: bool) {
         let Some(path) = path else { return };
-        let Some(cells) = self.stored.cells(path) else {
-            self.push(test, Evidence::None("the record does not hold its cells".into()));
+        let Some(bins) = self.stored.bins(path) else {
+            self.push(test, Evidence::None("the record does not hold its bins".into()));
             return;
         };
-        if cells.mass.iter().filter(|mass| **mass > 0.0).count() < 2 {
+        if bins.mass.iter().filter(|mass| **mass > 0.0).count() < 2 {
             return; // one outcome has all the mass: its own row says what there is to say
         }
-        let counted: f64 = cells.observed.iter().sum();
+        let counted: f64 = bins.observed.iter().sum();
         let evidence = if is_everything && counted != self.run.samples as f64 {
-            Evidence::None(format!("the cells hold {counted} draws of {}", self.run.samples))
+            Evidence::None(format!("the bins hold {counted} draws of {}", self.run.samples))
         } else {
-            fit(&cells)
+            fit(&bins)
         };
         self.push(test, evidence);
     }
@@ -188,7 +188,7 @@ impl<'a> Rows<'a> {
                 let said = format!("{} draws returned nothing", self.run.nulls);
                 self.push("null", Evidence::Exact { holds: self.run.nulls == 0, said });
             }
-            NullMass::Remainder => {} // a cell like others
+            NullMass::Remainder => {} // a bin like others
         }
     }
 
@@ -241,27 +241,27 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Pearson's test of the cells.
-fn fit(cells: &Cells) -> Evidence {
-    let counted: f64 = cells.observed.iter().sum();
-    let rows = cells.observed.iter().zip(cells.mass).zip(cells.bound);
-    let rows: Vec<Cell> = rows
-        .map(|((count, mass), error)| Cell { mass: *mass, error: *error, count: *count as u64 })
+/// Pearson's test of the bins.
+fn fit(bins: &Bins) -> Evidence {
+    let counted: f64 = bins.observed.iter().sum();
+    let rows = bins.observed.iter().zip(bins.mass).zip(bins.bound);
+    let rows: Vec<Bin> = rows
+        .map(|((count, mass), error)| Bin { mass: *mass, error: *error, count: *count as u64 })
         .collect();
     match pearson(&rows) {
         Ok(found) => {
             let test = Test { statistic: found.statistic, dof: found.dof, p_value: found.p_value };
-            let z = |cell: &Cell| {
-                let expected = cell.mass * counted;
-                if expected > 0.0 { (cell.count as f64 - expected) / expected.sqrt() } else { 0.0 }
+            let z = |bin: &Bin| {
+                let expected = bin.mass * counted;
+                if expected > 0.0 { (bin.count as f64 - expected) / expected.sqrt() } else { 0.0 }
             };
             let worst = (0..rows.len()).max_by(|&a, &b| z(&rows[a]).abs().total_cmp(&z(&rows[b]).abs()));
             let said = worst.map_or(String::new(), |i| {
                 let expected = rows[i].mass * counted;
                 let (count, z) = (rows[i].count, z(&rows[i]));
-                format!("worst is cell {i}: {count}, expected {expected:.1}, {z:+.1} standard errors")
+                format!("worst is bin {i}: {count}, expected {expected:.1}, {z:+.1} standard errors")
             });
-            Evidence::Fit { fit: Fit::Cells(found), test, said }
+            Evidence::Fit { fit: Fit::Bins(found), test, said }
         }
         Err(refusal) => Evidence::None(refusal.to_string()),
     }

@@ -103,8 +103,8 @@ pub(super) enum Evidence {
 /// Counts against probabilities: what knows the smallest defect that it would have found.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Fit {
-    /// Of many cells.
-    Cells(Goodness),
+    /// Of many bins.
+    Bins(Goodness),
     /// Of one outcome.
     Share(Proportion),
 }
@@ -114,7 +114,7 @@ impl Fit {
     /// with probability `power`.
     pub fn detectable(&self, level: f64, power: f64) -> f64 {
         match self {
-            Fit::Cells(found) => found.detectable(level, power).relative,
+            Fit::Bins(found) => found.detectable(level, power).relative,
             Fit::Share(found) => {
                 let (below, above) = found.detectable(level, power);
                 (found.mass - below).max(above - found.mass) / found.mass

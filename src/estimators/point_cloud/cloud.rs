@@ -3,7 +3,7 @@
 //! A point's random numbers are those of its index, so the flux is computed after the hierarchy has put the points
 //! in order, from the same numbers again: nothing but positions is ever moved.
 
-use crate::estimators::emergence::Skin;
+use crate::estimators::emergence::BssrdfScene;
 use crate::geometry::{BodyPoint, BodySampler, Ray};
 use crate::math::DVec3;
 use crate::optics::bssrdf::Entry;
@@ -37,8 +37,8 @@ struct Incidence {
 
 impl Cloud {
     /// Draws `count` points.
-    pub fn new(skin: &Skin, sampler: &BodySampler, count: usize, key: &PassKey) -> Cloud {
-        let scene = &*skin.scene;
+    pub fn new(bssrdf: &BssrdfScene, sampler: &BodySampler, count: usize, key: &PassKey) -> Cloud {
+        let scene = &*bssrdf.scene;
         let point = |index: u32| {
             let mut stream = key.stream(u64::from(index), Purpose::Cloud);
             (sampler.sample(&scene.shape, stream.draw3()), stream)
@@ -48,7 +48,7 @@ impl Cloud {
         drop(positions);
         let bands = scene.bands();
         let several = scene.lights.len() > 1;
-        let directed = skin.models.iter().any(|model| model.needs_directions());
+        let directed = bssrdf.models.iter().any(|model| model.needs_directions());
         let reserve = |needed: bool| if needed { count } else { 0 };
         let mut cloud = Cloud {
             bands,
@@ -61,13 +61,13 @@ impl Cloud {
         };
         for place in 0..count {
             let (drawn, mut stream) = point(cloud.tree.order()[place]);
-            let incidence = cloud.incidence(skin, &drawn, stream.draw3(), count);
+            let incidence = cloud.incidence(bssrdf, &drawn, stream.draw3(), count);
             let light = incidence.as_ref().map_or(0, |incidence| incidence.light);
             let wi = incidence.as_ref().map_or(drawn.normal, |incidence| incidence.wi);
             for band in 0..bands {
                 let flux = incidence.as_ref().map_or(0.0, |i| {
                     let radiance = scene.lights[i.light].sampled_radiance(band, i.wi);
-                    let transmitted = 1.0 - fresnel(i.cos, skin.eta[band]).reflectance;
+                    let transmitted = 1.0 - fresnel(i.cos, bssrdf.eta[band]).reflectance;
                     radiance * transmitted * i.cos * i.scale
                 });
                 cloud.flux.push(flux);
@@ -86,13 +86,13 @@ impl Cloud {
     /// Light that reaches a point; none where the point is turned away or in shadow.
     fn incidence(
         &mut self,
-        skin: &Skin,
+        bssrdf: &BssrdfScene,
         at: &BodyPoint,
         u: [f64; 3],
         count: usize,
     ) -> Option<Incidence> {
-        let scene = &*skin.scene;
-        let (light, choice) = skin.choose_light(u[0])?;
+        let scene = &*bssrdf.scene;
+        let (light, choice) = bssrdf.choose_light(u[0])?;
         let sample = scene.lights[light].sample(0, [u[1], u[2]]);
         let [geometric, cos] = [at.normal, at.shading_normal].map(|normal| normal.dot(sample.wi));
         if (geometric > 0.0) != (cos > 0.0) {
@@ -144,12 +144,12 @@ impl Cloud {
     }
 
     /// The most memory that `count` points take, while they are put in order too, bytes.
-    pub fn bytes(skin: &Skin, count: usize) -> usize {
+    pub fn bytes(bssrdf: &BssrdfScene, count: usize) -> usize {
         // A code, an index and a position; then coordinates, places and about half a node (40 bytes) a point.
         let (sorted, kept) = (16 + 24, 24 + 4 + 20);
-        let light = if skin.scene.lights.len() > 1 { 2 } else { 0 };
-        let directions = if skin.models.iter().any(|model| model.needs_directions()) { 24 } else { 0 };
-        count * (kept + (8 * skin.scene.bands() + light + directions).max(sorted))
+        let light = if bssrdf.scene.lights.len() > 1 { 2 } else { 0 };
+        let directions = if bssrdf.models.iter().any(|model| model.needs_directions()) { 24 } else { 0 };
+        count * (kept + (8 * bssrdf.scene.bands() + light + directions).max(sorted))
     }
 
     /// Memory behind it, bytes.

@@ -19,7 +19,7 @@ use std::sync::Arc;
 use self::cloud::Cloud;
 use super::bssrdf_probe::adds_single;
 use super::bssrdf_single::score_single;
-use super::emergence::{Emergence, Gather, Skin};
+use super::emergence::{BssrdfScene, Emergence, Gather};
 use super::illumination::{Illumination, PathStreams};
 use super::{Anomaly, BandUse, Cost, Estimator, HeavyTail, Scores, TransportClass};
 use crate::error::{Error, Result};
@@ -85,10 +85,10 @@ pub struct PointCloudOptions {
 /// The estimator, for one scene.
 #[derive(Debug)]
 pub struct PointCloud {
-    skin: Skin,
+    bssrdf: BssrdfScene,
     sampler: BodySampler,
     options: PointCloudOptions,
-    /// Per group of the skin: which bands accept by which rule.
+    /// Per group of the bssrdf: which bands accept by which rule.
     rules: Vec<Vec<(Vec<usize>, Rule)>>,
     illumination: Illumination,
     single: bool,
@@ -108,17 +108,17 @@ impl PointCloud {
                 "use a finite body, or bssrdf_probe",
             ));
         };
-        let skin = Skin::new(scene, &options.model, options.straight)?;
-        let rules = rules(&skin, options.acceptance, 2.0 * bounds.radius);
-        let illumination = Illumination::new(&skin.scene);
-        let single = adds_single(&skin, options.single);
-        Ok(PointCloud { skin, sampler, options, rules, illumination, single })
+        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
+        let rules = rules(&bssrdf, options.acceptance, 2.0 * bounds.radius);
+        let illumination = Illumination::new(&bssrdf.scene);
+        let single = adds_single(&bssrdf, options.single);
+        Ok(PointCloud { bssrdf, sampler, options, rules, illumination, single })
     }
 }
 
 /// The rule of each group of bands.
-fn rules(skin: &Skin, acceptance: Acceptance, diameter: f64) -> Vec<Vec<(Vec<usize>, Rule)>> {
-    let sigmas: Vec<f64> = skin.models.iter().map(|model| model.sigma_tr).collect();
+fn rules(bssrdf: &BssrdfScene, acceptance: Acceptance, diameter: f64) -> Vec<Vec<(Vec<usize>, Rule)>> {
+    let sigmas: Vec<f64> = bssrdf.models.iter().map(|model| model.sigma_tr).collect();
     let mean = sigmas.iter().sum::<f64>() / sigmas.len() as f64;
     let common = match acceptance {
         Acceptance::All => Form::All,
@@ -128,26 +128,30 @@ fn rules(skin: &Skin, acceptance: Acceptance, diameter: f64) -> Vec<Vec<(Vec<usi
         }
         Acceptance::MeanOfExponentials => Form::MeanOfExponentials { sigmas: sigmas.clone() },
         Acceptance::Floor(least) => Form::Floor { sigma: mean, least },
-        Acceptance::Kernel => in_proportion(skin, &sigmas, diameter),
+        Acceptance::Kernel => in_proportion(bssrdf, &sigmas, diameter),
     };
     if acceptance == Acceptance::Band {
         let own = |band: usize| (vec![band], Rule::new(Form::Exponential { sigma: sigmas[band] }));
-        return skin.groups.iter().map(|group| group.iter().map(|&band| own(band)).collect()).collect();
+        return bssrdf
+            .groups
+            .iter()
+            .map(|group| group.iter().map(|&band| own(band)).collect())
+            .collect();
     }
     let rule = Rule::new(common);
-    skin.groups.iter().map(|group| vec![(group.clone(), rule.clone())]).collect()
+    bssrdf.groups.iter().map(|group| vec![(group.clone(), rule.clone())]).collect()
 }
 
 /// Accepts in proportion to the kernels, on average over a disc of radius `reach` as many as the mean of exponentials:
 /// int_0^R e^(-s d) 2 d dd / R^2 = 2 (1 - (1 + a) e^(-a)) / a^2 with a = s R.
-fn in_proportion(skin: &Skin, sigmas: &[f64], reach: f64) -> Form {
+fn in_proportion(bssrdf: &BssrdfScene, sigmas: &[f64], reach: f64) -> Form {
     use crate::math::{exp, integrate};
     let mean_of = |sigma: f64| {
         let a = sigma * reach;
         if a < 1e-3 { 1.0 - 2.0 / 3.0 * a } else { 2.0 * (1.0 - (1.0 + a) * exp(-a)) / (a * a) }
     };
     let mean = sigmas.iter().map(|&sigma| mean_of(sigma)).sum::<f64>() / sigmas.len() as f64;
-    let whole: Vec<f64> = skin
+    let whole: Vec<f64> = bssrdf
         .models
         .iter()
         // In x = sqrt(d / R) the profile is smooth at 0 too: d = R x^2, d dd = 2 R^2 x^3 dx.
@@ -155,22 +159,22 @@ fn in_proportion(skin: &Skin, sigmas: &[f64], reach: f64) -> Form {
         .collect();
     let falloff = |d: f64| {
         let d = d.max(1e-6 * reach); // some profiles have a pole
-        skin.models.iter().zip(&whole).map(|(model, whole)| model.falloff(d) / whole).sum::<f64>()
+        bssrdf.models.iter().zip(&whole).map(|(model, whole)| model.falloff(d) / whole).sum::<f64>()
     };
     Form::proportional(falloff, reach, mean.min(1.0))
 }
 
 impl Estimator for PointCloud {
     fn pass(&self, _bands: &[usize], key: &PassKey, scores: &mut Scores) {
-        let cloud = Cloud::new(&self.skin, &self.sampler, self.options.samples, key);
+        let cloud = Cloud::new(&self.bssrdf, &self.sampler, self.options.samples, key);
         scores.cost[Cost::CloudPoints as usize] += cloud.len() as u64;
         scores.cost[Cost::ShadowRays as usize] += cloud.shadow_rays;
         scores.anomalies[Anomaly::WrongSide as usize] += cloud.wrong_side;
-        for (group, rules) in self.skin.groups.iter().zip(&self.rules) {
-            for index in 0..self.skin.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(&self.skin, key, index, group);
+        for (group, rules) in self.bssrdf.groups.iter().zip(&self.rules) {
+            for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
+                let streams = PathStreams::new(&self.bssrdf, key, index, group);
                 let mut sum = CloudSum { estimator: self, cloud: &cloud, rules, streams };
-                self.skin.play(group, index, key, scores, &mut sum);
+                self.bssrdf.play(group, index, key, scores, &mut sum);
             }
         }
     }
@@ -191,8 +195,8 @@ impl Estimator for PointCloud {
             return Vec::new(); // weights of all other rules are bounded by what the kernel loses, or by their floor
         }
         let diameter =
-            self.skin.scene.shape.bounds().map_or(f64::INFINITY, |bounds| 2.0 * bounds.radius);
-        let sigmas = || self.skin.models.iter().map(|model| model.sigma_tr);
+            self.bssrdf.scene.shape.bounds().map_or(f64::INFINITY, |bounds| 2.0 * bounds.radius);
+        let sigmas = || self.bssrdf.models.iter().map(|model| model.sigma_tr);
         let mean = sigmas().sum::<f64>() / sigmas().count() as f64;
         let heavy = sigmas().enumerate().filter(|(_, s)| (mean - 2.0 * s) * diameter > HEAVY);
         heavy
@@ -209,11 +213,11 @@ impl Estimator for PointCloud {
     }
 
     fn notes(&self) -> Vec<String> {
-        self.skin.notes()
+        self.bssrdf.notes()
     }
 
     fn working_bytes(&self) -> usize {
-        Cloud::bytes(&self.skin, self.options.samples)
+        Cloud::bytes(&self.bssrdf, self.options.samples)
     }
 }
 
@@ -227,12 +231,12 @@ struct CloudSum<'a> {
 
 impl Gather for CloudSum<'_> {
     fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let PointCloud { skin, options, illumination, single, .. } = self.estimator;
+        let PointCloud { bssrdf, options, illumination, single, .. } = self.estimator;
         for (bands, rule) in self.rules {
             self.sum(bands, rule, emergence, options.search, scores);
         }
         if *single {
-            score_single(skin, illumination, emergence, &mut self.streams.single, scores);
+            score_single(bssrdf, illumination, emergence, &mut self.streams.single, scores);
         }
     }
 }
@@ -247,9 +251,9 @@ impl CloudSum<'_> {
         search: Search,
         scores: &mut Scores,
     ) {
-        let skin = &self.estimator.skin;
-        let (cloud, models, at) = (self.cloud, &skin.models, emergence.exit.point);
-        let lights = skin.scene.lights.len();
+        let bssrdf = &self.estimator.bssrdf;
+        let (cloud, models, at) = (self.cloud, &bssrdf.models, emergence.exit.point);
+        let lights = bssrdf.scene.lights.len();
         let mut sums = vec![0.0; bands.len() * lights];
         let mut work = Work::default();
         let add = |accepted: Accepted| {

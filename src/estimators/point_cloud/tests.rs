@@ -60,7 +60,7 @@ fn measure(name: &str, scene: &Arc<Scene>, options: PointCloudOptions, passes: u
         let mut scores = Scores::new(layout.clone());
         estimator.pass(&[0, 1, 2], &key.pass(pass), &mut scores);
         for (band, sum) in sums.iter_mut().enumerate() {
-            let x = scores.gates[row * 3 + band];
+            let x = scores.observables[row * 3 + band];
             *sum = (sum.0 + x, sum.1 + x * x);
         }
     }
@@ -123,7 +123,7 @@ fn lights_are_told_apart() {
     let mut scores = Scores::new(layout.clone());
     let key = StreamKey::named("lights_are_told_apart");
     (0..200).for_each(|pass| estimator.pass(&[0, 1, 2], &key.pass(pass), &mut scores));
-    let red = |k: usize| scores.gates[k * 3];
+    let red = |k: usize| scores.observables[k * 3];
     let shares = layout.observables().iter().enumerate().filter(|(_, o)| o.name.contains('@'));
     let shares: Vec<f64> = shares.map(|(k, _)| red(k)).collect();
     assert!((shares.iter().sum::<f64>() / red(0) - 1.0).abs() < 1e-12);
@@ -159,7 +159,7 @@ fn memory_is_foreseen() {
     options.samples = 200_000;
     let estimator = PointCloud::new(scene, options).expect("an estimator");
     let key = StreamKey::named("memory_is_foreseen").pass(0);
-    let cloud = Cloud::new(&estimator.skin, &estimator.sampler, 200_000, &key);
+    let cloud = Cloud::new(&estimator.bssrdf, &estimator.sampler, 200_000, &key);
     let (held, foreseen) = (cloud.heap_bytes() as f64, estimator.working_bytes() as f64);
     println!("{} bytes a point", held / 200_000.0);
     assert!(held < foreseen && foreseen < 2.0 * held, "{held} {foreseen}");

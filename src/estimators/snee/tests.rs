@@ -84,13 +84,13 @@ fn behind_the_gate_it_is_path() {
             let path = played(&scene, &path, "behind_the_gate_it_is_path");
             let snee = Snee::new(scene.clone(), guided()).expect("a scene for it");
             let snee = played(&scene, &snee, "behind_the_gate_it_is_path");
-            let is_same = bits(&path.gates) == bits(&snee.gates) && path.cost == snee.cost;
+            let is_same = bits(&path.observables) == bits(&snee.observables) && path.cost == snee.cost;
             assert_eq!(
                 is_same,
                 !is_open || boundary == Boundary::Matched,
                 "{boundary:?} {concentration}"
             );
-            assert!(path.gates[0] > 0.0);
+            assert!(path.observables[0] > 0.0);
         }
     }
 }
@@ -119,9 +119,9 @@ fn equal_bands_are_equal_to_the_last_bit() {
             let snee = Snee::new(scene.clone(), options).expect("a scene for it");
             let scores = played(&scene, &snee, "equal_bands_are_equal_to_the_last_bit");
             let band = |b: usize| -> Vec<u64> {
-                scores.gates.iter().skip(b).step_by(3).map(|value| value.to_bits()).collect()
+                scores.observables.iter().skip(b).step_by(3).map(|value| value.to_bits()).collect()
             };
-            assert!(scores.gates[0] > 0.0);
+            assert!(scores.observables[0] > 0.0);
             assert_eq!(band(0), band(1));
             assert_ne!(band(0), band(2));
             assert_eq!(scores.cost[Cost::Paths as usize], 20 * 256, "one walk for all");
@@ -156,6 +156,6 @@ fn bodies_without_scattering_are_the_walks() {
         let path = PathTracer::new(scene.clone(), Roulette::Below(0.25));
         let test = "bodies_without_scattering_are_the_walks";
         let [snee, path] = [played(&scene, &snee, test), played(&scene, &path, test)];
-        assert_eq!(bits(&snee.gates), bits(&path.gates));
+        assert_eq!(bits(&snee.observables), bits(&path.observables));
     }
 }

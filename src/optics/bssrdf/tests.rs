@@ -15,7 +15,7 @@ struct Table {
 #[derive(Clone, Copy)]
 struct Row<'a> {
     table: &'a Table,
-    cells: &'a [&'static str],
+    fields: &'a [&'static str],
 }
 
 impl Table {
@@ -29,13 +29,13 @@ impl Table {
     }
 
     fn rows(&self) -> impl Iterator<Item = Row<'_>> {
-        self.rows.iter().map(|cells| Row { table: self, cells })
+        self.rows.iter().map(|fields| Row { table: self, fields })
     }
 }
 
 impl Row<'_> {
     fn text(&self, name: &str) -> &'static str {
-        self.cells[self.table.names.iter().position(|n| *n == name).unwrap()]
+        self.fields[self.table.names.iter().position(|n| *n == name).unwrap()]
     }
 
     fn number(&self, name: &str) -> f64 {
@@ -54,7 +54,7 @@ impl Row<'_> {
         assert!(
             off <= bound + 1e-14 * expected.abs(),
             "{name}: {got:e} is off by {off:e}, may be by {bound:e}: {:?}",
-            self.cells
+            self.fields
         );
     }
 }

@@ -111,18 +111,19 @@ fn of_run(errors: &Errors, name: &str, unit: f64) -> Vec<Series> {
 /// Nothing where the first observable has a band without a mean.
 fn errors(stored: &Stored, run: &EstimatorRun) -> Option<Errors> {
     let bands = 0..stored.record.bands.len();
-    let gates: Vec<Vec<Moments>> = bands.map(|band| stored.gate(run, 0, band)).collect::<Option<_>>()?;
-    let all: Vec<Moments> = gates.iter().cloned().map(total).collect::<Option<_>>()?;
+    let moments: Vec<Vec<Moments>> =
+        bands.map(|band| stored.moments(run, 0, band)).collect::<Option<_>>()?;
+    let all: Vec<Moments> = moments.iter().cloned().map(total).collect::<Option<_>>()?;
     if all.iter().any(|band| band.mean == 0.0 || !band.m2.is_finite()) {
         return None;
     }
-    let count = gates.len() as f64;
+    let count = moments.len() as f64;
     let variances = all.iter().map(|band| band.variance() / (band.mean * band.mean));
     let of_a_pass = (variances.sum::<f64>() / count).sqrt();
     let mut measured = Vec::new();
     let mut size = 1;
-    while gates[0].len() / size >= FEWEST {
-        let groups: Vec<Vec<Moments>> = gates.iter().map(|batches| grouped(batches, size)).collect();
+    while moments[0].len() / size >= FEWEST {
+        let groups: Vec<Vec<Moments>> = moments.iter().map(|batches| grouped(batches, size)).collect();
         let relative = |(groups, all): (&Vec<Moments>, &Moments)| spread(groups) / (all.mean * all.mean);
         let error = (groups.iter().zip(&all).map(relative).sum::<f64>() / count).sqrt();
         // Bands may share their paths: the degrees of freedom are those of one.
@@ -191,7 +192,7 @@ mod tests {
     #[test]
     fn a_drift_is_seen() {
         let mut stored = sample::stored(0.3);
-        sample::set_gates(&mut stored, "mis", |i, _, _| {
+        sample::set_observables(&mut stored, "mis", |i, _, _| {
             1.0 + 0.1 * sample::uniform(i) + 0.005 * i as f64
         });
         let errors = errors(&stored, &stored.record.cells[0].runs[0]).expect("errors");

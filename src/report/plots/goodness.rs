@@ -10,7 +10,7 @@ pub(super) fn section(stored: &Stored) -> Section {
     let runs = stored.record.samplers.iter().enumerate();
     Section {
         heading: "Observed, expected, residual".into(),
-        text: "Coarse cells in the order of their partition, discrete outcomes last. Above: draws counted (points) and expected \
+        text: "Coarse bins in the order of their partition, discrete outcomes last. Above: draws counted (points) and expected \
                (line), per draw. Below: (observed - expected) / sqrt(expected), near normal where the sampler draws from \
                its density; the chi-square statistic is the sum of their squares."
             .into(),
@@ -20,16 +20,15 @@ pub(super) fn section(stored: &Stored) -> Section {
 }
 
 fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> {
-    let cells = stored.cells(&run.coarse)?;
+    let bins = stored.bins(&run.coarse)?;
     let samples = run.samples as f64;
     let expected = |mass: f64| mass * samples;
     // Outcomes that neither can be nor were have no place.
     let is_there = |(_, observed, mass): &(f64, f64, f64)| *observed > 0.0 || *mass > 0.0;
     let places = || {
-        cells
-            .observed
+        bins.observed
             .iter()
-            .zip(cells.mass)
+            .zip(bins.mass)
             .enumerate()
             .map(|(i, (o, m))| (i as f64, *o, *m))
             .filter(is_there)
@@ -44,7 +43,7 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> 
     let largest = residuals.iter().map(|p| p.y.abs()).fold(0.0, f64::max);
     let impossible: f64 =
         places().filter(|(_, _, mass)| *mass <= 0.0).map(|(_, observed, _)| observed).sum();
-    let last = cells.observed.len() as f64 - 0.5;
+    let last = bins.observed.len() as f64 - 0.5;
     let x = |label: &str| Axis { range: Some([-0.5, last]), ..Axis::linear(label) };
     let above = Plot {
         x: x(""),
@@ -61,7 +60,7 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> 
         ..Plot::default()
     };
     let below = Plot {
-        x: x("cell"),
+        x: x("bin"),
         y: Axis::linear("residual"),
         series: vec![
             Series {
@@ -69,16 +68,16 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> 
                 points: vec![Point::bare(-0.5, 0.0), Point::bare(last, 0.0)],
                 style: Style::Guide,
             },
-            // As long a name as above, so that the cells stand below each other.
+            // As long a name as above, so that the bins stand below each other.
             Series { name: "residual".into(), points: residuals, style: Style::Bars },
         ],
         size: Size::Flat,
         ..Plot::default()
     };
     let mut caption =
-        format!("{} draws, {} cells; largest residual {largest:.2}.", run.samples, cells.observed.len());
+        format!("{} draws, {} bins; largest residual {largest:.2}.", run.samples, bins.observed.len());
     if impossible > 0.0 {
-        caption += &format!(" {impossible} draws in cells without mass.");
+        caption += &format!(" {impossible} draws in bins without mass.");
     }
     Some(Drawn {
         name: format!("goodness-{index:03}"),
@@ -94,7 +93,7 @@ mod tests {
     use crate::results::npy::Array;
     use crate::results::sample;
 
-    /// 100 draws in three cells of masses 0.25, 0.75 and 0, and an outcome that neither can be nor was.
+    /// 100 draws in three bins of masses 0.25, 0.75 and 0, and an outcome that neither can be nor was.
     #[test]
     fn residuals_are_in_standard_deviations_and_the_impossible_is_said() {
         let mut stored = sample::stored(0.1);
@@ -105,8 +104,8 @@ mod tests {
             "exhausted": false, "contrasts": [],
         });
         stored.record.samplers = vec![serde_json::from_value(run).expect("a sampler")];
-        let cells = [[30.0, 69.0, 1.0, 0.0], [0.25, 0.75, 0.0, 0.0], [0.0; 4]].concat();
-        stored.arrays.insert("c".into(), Array::new(vec![3, 4], cells));
+        let bins = [[30.0, 69.0, 1.0, 0.0], [0.25, 0.75, 0.0, 0.0], [0.0; 4]].concat();
+        stored.arrays.insert("c".into(), Array::new(vec![3, 4], bins));
         let section = section(&stored);
         let Content::Plots(plots) = &section.drawn[0].content else { panic!("plots") };
         let values = |plot: usize, series: usize| {
@@ -116,7 +115,7 @@ mod tests {
         // (30 - 25) / 5 and (69 - 75) / sqrt(75).
         assert_eq!(values(1, 1), [1.0, -6.0 / 75f64.sqrt()]);
         assert!(
-            section.drawn[0].caption.contains("largest residual 1.00. 1 draws in cells without mass")
+            section.drawn[0].caption.contains("largest residual 1.00. 1 draws in bins without mass")
         );
     }
 }

@@ -34,7 +34,7 @@ pub(super) fn section(stored: &Stored) -> Section {
 fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [Drawn; 2] {
     let means = |run: &EstimatorRun| -> Vec<Estimate> {
         let bands = 0..stored.record.bands.len();
-        bands.filter_map(|band| Some(Estimate::of_batches(&stored.gate(run, 0, band)?))).collect()
+        bands.filter_map(|band| Some(Estimate::of_batches(&stored.moments(run, 0, band)?))).collect()
     };
     let runs: Vec<(&EstimatorRun, Vec<Estimate>)> = runs(cell).map(|run| (run, means(run))).collect();
     let line = |(run, means): &(&EstimatorRun, Vec<Estimate>)| {
@@ -81,18 +81,19 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [Drawn; 2] {
 /// Linear sRGB of a run's spectrum. Its error is that of the sums over bands in each batch: bands may share their paths.
 fn colour(stored: &Stored, run: &EstimatorRun) -> Option<[Estimate; 3]> {
     let bands = &stored.record.bands;
-    let gates: Vec<Vec<Moments>> =
-        (0..bands.len()).map(|band| stored.gate(run, 0, band)).collect::<Option<_>>()?;
+    let moments: Vec<Vec<Moments>> =
+        (0..bands.len()).map(|band| stored.moments(run, 0, band)).collect::<Option<_>>()?;
     let channel = |c: usize| {
         let batch = |batch: usize| {
-            let part = |(gate, band): (&Vec<Moments>, &Band)| gate[batch].mean * band.display_rgb[c];
+            let part =
+                |(moments, band): (&Vec<Moments>, &Band)| moments[batch].mean * band.display_rgb[c];
             Moments {
-                n: gates[0][batch].n,
-                mean: gates.iter().zip(bands).map(part).sum(),
+                n: moments[0][batch].n,
+                mean: moments.iter().zip(bands).map(part).sum(),
                 ..Moments::default()
             }
         };
-        let batches: Vec<Moments> = (0..gates[0].len()).map(batch).collect();
+        let batches: Vec<Moments> = (0..moments[0].len()).map(batch).collect();
         Estimate::of_batches(&batches)
     };
     Some([0, 1, 2].map(channel))

@@ -70,17 +70,17 @@ impl Form {
     /// c makes the mean of p over the disc of radius `reach` equal to `mean` (at most 1), so that two rules can be
     /// compared at equal numbers of accepted points.
     pub fn proportional(f: impl Fn(f64) -> f64, reach: f64, mean: f64) -> Form {
-        const CELLS: usize = 2048;
-        let at = |k: usize| reach * square(k as f64 / CELLS as f64);
-        let values: Vec<f64> = (0..=CELLS).map(|k| f(at(k))).collect();
+        const INTERVALS: usize = 2048;
+        let at = |k: usize| reach * square(k as f64 / INTERVALS as f64);
+        let values: Vec<f64> = (0..=INTERVALS).map(|k| f(at(k))).collect();
         // Simpson's rule is wasted on a kink: the trapezoidal rule on the grid itself, int p 2 d dd / reach^2.
         let mean_of = |c: f64| {
             let p = |k: usize| (c * values[k]).min(1.0);
-            let cell = |k: usize| (square(at(k + 1)) - square(at(k))) * 0.5 * (p(k) + p(k + 1));
-            (0..CELLS).map(cell).sum::<f64>() / (reach * reach)
+            let interval = |k: usize| (square(at(k + 1)) - square(at(k))) * 0.5 * (p(k) + p(k + 1));
+            (0..INTERVALS).map(interval).sum::<f64>() / (reach * reach)
         };
         // Bisection in the exponent: from c f = 1 nowhere to everywhere.
-        let [mut lo, mut hi] = [values[0], values[CELLS]].map(|value| -crate::math::log2(value));
+        let [mut lo, mut hi] = [values[0], values[INTERVALS]].map(|value| -crate::math::log2(value));
         for _ in 0..60 {
             let middle = 0.5 * (lo + hi);
             if mean_of(crate::math::pow(2.0, middle)) < mean {
@@ -104,13 +104,13 @@ impl Form {
             }
             Form::Floor { sigma, least } => exp(-sigma * d).max(*least),
             Form::Table { values, reach } => {
-                let cells = values.len() - 1;
-                let at = cells as f64 * (d / reach).sqrt();
+                let intervals = values.len() - 1;
+                let at = intervals as f64 * (d / reach).sqrt();
                 let k = at as usize;
-                if k >= cells {
-                    return values[cells];
+                if k >= intervals {
+                    return values[intervals];
                 }
-                let [from, to] = [k, k + 1].map(|k| square(k as f64 / cells as f64));
+                let [from, to] = [k, k + 1].map(|k| square(k as f64 / intervals as f64));
                 let share = (d / reach - from) / (to - from);
                 values[k] + share.clamp(0.0, 1.0) * (values[k + 1] - values[k])
             }

@@ -164,7 +164,7 @@ fn chi2(counts: &[u32], p: impl Fn(usize) -> f64, queries: usize) -> (f64, f64) 
         let p = p(i);
         if p == 1.0 { 0.0 } else { square(f64::from(count) - n * p) / (n * p * (1.0 - p)) }
     });
-    terms.fold((0.0, 0.0), |(sum, cells), z2| (sum + z2, cells + 1.0))
+    terms.fold((0.0, 0.0), |(sum, bins), z2| (sum + z2, bins + 1.0))
 }
 
 /// The law of independent Bernoulli(p_i), for hierarchy and scan: per point, in pairs of neighbours, and the mean and
@@ -180,10 +180,10 @@ fn acceptances_are_independent_with_their_probability() {
                 (0..tree.len()).map(|i| rule.probability((tree.point(i) - at).length())).collect();
             let pair = |i: usize| p[i] * p[(i + 1) % p.len()];
             // The variance of a squared z is 2 + excess kurtosis 1/(n p): at most 2.2.
-            for (sum, cells) in
+            for (sum, bins) in
                 [chi2(&counts.single, |i| p[i], queries), chi2(&counts.pair, pair, queries)]
             {
-                assert!((sum - cells).abs() < 5.0 * (2.2 * cells).sqrt(), "{key}: {sum} of {cells}");
+                assert!((sum - bins).abs() < 5.0 * (2.2 * bins).sqrt(), "{key}: {sum} of {bins}");
             }
             let n = queries as f64;
             let mean = p.iter().sum::<f64>();

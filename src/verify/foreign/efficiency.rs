@@ -95,7 +95,7 @@ fn seeds_error(band: &Band, pixels: &[usize]) -> f64 {
 /// the same for all and left out.
 fn batches_error(stored: &Stored, run: &EstimatorRun, band: usize) -> f64 {
     let tiles = run.observables.iter().enumerate().filter(|(_, o)| o.name.starts_with("tile_"));
-    let tiles: Vec<Vec<Moments>> = tiles.filter_map(|(o, _)| stored.gate(run, o, band)).collect();
+    let tiles: Vec<Vec<Moments>> = tiles.filter_map(|(o, _)| stored.moments(run, o, band)).collect();
     let batches = tiles.first().map_or(0, Vec::len);
     let without = |out: usize| {
         let variance = |tile: &Vec<Moments>| {

@@ -8,7 +8,7 @@ use crate::results::exr_file::ExrImage;
 use crate::results::npy::Array;
 use crate::results::record::{Bias, Image};
 use crate::results::sample;
-use crate::results::store::{Arrays, costs_path, gates_path, pixels_path, spread_path};
+use crate::results::store::{Arrays, costs_path, observables_path, pixels_path, spread_path};
 use crate::stats::moments::{ImageMoments, Moments};
 use crate::stats::tree::{Counter, Merge, batch_level};
 
@@ -38,7 +38,7 @@ fn stored(seed: u64, noise: f64) -> Stored {
         .chain((0..TILES * TILES).map(|k| format!("tile_{}_{}", k / TILES, k % TILES)))
         .collect();
     let regions: Vec<Vec<usize>> = names.iter().map(|n| region_pixels(n, SIDE, SIDE)).collect();
-    let mut gates = Counter::new(0, batch_level(PASSES));
+    let mut moments = Counter::new(0, batch_level(PASSES));
     let mut pixels: Option<ImageMoments> = None;
     for pass in 0..PASSES {
         let score = |i: usize| {
@@ -46,7 +46,7 @@ fn stored(seed: u64, noise: f64) -> Stored {
             truth(i) * (1.0 + noise * (x - 1.0))
         };
         let image: Vec<f64> = (0..SIDE * SIDE).map(score).collect();
-        gates.push(regions.iter().map(|r| Moments::of(mean_of(&image, r))).collect::<Vec<_>>());
+        moments.push(regions.iter().map(|r| Moments::of(mean_of(&image, r))).collect::<Vec<_>>());
         let own = ImageMoments::of(image);
         pixels = Some(match pixels {
             None => own,
@@ -55,10 +55,10 @@ fn stored(seed: u64, noise: f64) -> Stored {
     }
     let pixels = pixels.expect("passes");
     let both = pixels.mean.iter().copied().chain(pixels.std_error()).collect();
-    let batches = gates.batches();
+    let batches = moments.batches();
     let data = batches.iter().flatten().flat_map(Moments::to_array).collect();
     let mut arrays = Arrays::new();
-    arrays.insert(gates_path(0, "mis"), Array::new(vec![batches.len(), names.len(), 1, 5], data));
+    arrays.insert(observables_path(0, "mis"), Array::new(vec![batches.len(), names.len(), 1, 5], data));
     arrays.insert(pixels_path(0, "mis"), Array::new(vec![2, SIDE, SIDE, 1], both));
     arrays.insert(spread_path(0, "mis"), Array::new(vec![0, 1, 5], vec![]));
     arrays.insert(costs_path(0, "mis"), Array::new(vec![batches.len(), 0], vec![]));
@@ -74,7 +74,7 @@ fn stored(seed: u64, noise: f64) -> Stored {
         notes: vec![],
         passes: PASSES,
         observables: names.into_iter().map(|name| Observable { name, class: "all".into() }).collect(),
-        gates: gates_path(0, "mis"),
+        moments: observables_path(0, "mis"),
         costs: costs_path(0, "mis"),
         image: Some(Image {
             width: SIDE,

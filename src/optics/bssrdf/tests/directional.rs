@@ -78,7 +78,7 @@ fn every_value_of_the_table() {
             assert!(
                 moved <= 1e-8 * expected.abs() || expected.abs() < 1e-9,
                 "{name} {moved} {:?}",
-                row.cells
+                row.fields
             );
             row.is_within(name, value, half_unit(expected, 12) + moved);
         }

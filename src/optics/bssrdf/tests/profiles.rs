@@ -128,7 +128,7 @@ fn every_value_of_the_dipoles_radial_sampling() {
             let half = half_unit(r, 12);
             // 4 eps: what F itself is computed to.
             let [below, above] = [r - half, r + half].map(distribution);
-            assert!(below <= q + 1e-15 && above >= q - 1e-15, "{name} {:?}", row.cells);
+            assert!(below <= q + 1e-15 && above >= q - 1e-15, "{name} {:?}", row.fields);
         }
     }
 }

@@ -1,14 +1,14 @@
-//! Draws of one sampler, counted in its cells.
+//! Draws of one sampler, counted in its bins.
 //!
 //! Draws come in chunks of 4096, each on a stream of its own, so that threads do not matter: counts are
 //! integers, and the moments of contrasts are merged by the fixed tree over chunks.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::cells::{Extra, Partition};
-use super::clock::thread_cpu_time;
-use super::interrupt::Interrupt;
+use super::bins::{Extra, Partition};
 use crate::results::sampler::OWN_DENSITY;
+use crate::run::clock::thread_cpu_time;
+use crate::run::interrupt::Interrupt;
 use crate::samplers::{Contrast, Draw, Sampler};
 use crate::sampling::stream::{Purpose, Stream, StreamKey};
 use crate::stats::moments::Moments;
@@ -20,7 +20,7 @@ pub const CHUNK: u64 = 4096;
 /// Chunks after which the moments are merged.
 const ROUND: u64 = 4096;
 
-/// Most groups of cells for consecutive draws.
+/// Most groups of bins for consecutive draws.
 const MOST_GROUPS: usize = 16;
 
 /// What is drawn from, and into what.
@@ -29,11 +29,11 @@ pub struct Counting<'a> {
     pub sampler: &'a dyn Sampler,
     /// Its contrasts.
     pub contrasts: Vec<Contrast>,
-    /// Its cells.
+    /// Its bins.
     pub partition: &'a Partition,
     /// The extras of the partition.
     pub extras: &'a [(Extra, f64)],
-    /// Group of each coarse cell.
+    /// Group of each coarse bin.
     pub groups: Vec<usize>,
     /// Number of groups; 0 for none.
     pub group_count: usize,
@@ -162,10 +162,10 @@ impl Counting<'_> {
         moments
     }
 
-    /// One draw; the group of its cell, where it is in one.
+    /// One draw; the group of its bin, where it is in one.
     #[inline]
     fn draw(&self, stream: &mut Stream, counts: &mut Counts, moments: &mut [Moments]) -> Option<usize> {
-        let (cell, point) = match self.sampler.draw(stream) {
+        let (bin, point) = match self.sampler.draw(stream) {
             Draw::Null => {
                 counts.nulls += 1;
                 (self.extra(Extra::Null), None)
@@ -180,7 +180,7 @@ impl Counting<'_> {
                 (self.point(piece, at, density, counts), Some((piece, at)))
             }
         };
-        let point = point.filter(|_| cell.is_some());
+        let point = point.filter(|_| bin.is_some());
         for (contrast, moments) in self.contrasts.iter().zip(moments) {
             let value = point.map_or(0.0, |(piece, at)| (contrast.of)(piece, at));
             if value.is_finite() {
@@ -189,13 +189,13 @@ impl Counting<'_> {
                 counts.senseless += 1;
             }
         }
-        let Some(cell) = cell else {
+        let Some(bin) = bin else {
             // A null that never is has its own count.
             counts.outside += 1;
             return None;
         };
-        counts.leaves[cell] += 1;
-        (self.group_count > 0).then(|| self.groups[self.partition.coarse[cell]])
+        counts.leaves[bin] += 1;
+        (self.group_count > 0).then(|| self.groups[self.partition.coarse[bin]])
     }
 
     /// The leaf of a point where the density is positive.

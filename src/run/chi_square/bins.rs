@@ -1,20 +1,20 @@
-//! Cells in which a sampler's draws are counted, chosen by the density alone and never by the draws.
+//! Bins in which a sampler's draws are counted, chosen by the density alone and never by the draws.
 //!
 //! A piece of two dimensions starts as a grid whose resolution follows the piece's mass; boxes that hold
 //! more than four times their share are quartered, again and again; those that would expect fewer than 25
 //! draws are joined with neighbours. Periodic axes begin at an irrational offset, so that symmetry planes
-//! are no edges. A piece of one dimension has cells of equal mass, and in its upper tail at 1 - 2^-k, and
-//! at both ends of 1e-4. Coarse cells are unions of fine ones; both are unions of leaves, whose masses are
+//! are no edges. A piece of one dimension has bins of equal mass, and in its upper tail at 1 - 2^-k, and
+//! at both ends of 1e-4. Coarse bins are unions of fine ones; both are unions of leaves, whose masses are
 //! integrated.
 
-use super::masses::{Area, Mass, Quadrature, wrap};
+use super::quadrature::{Area, Mass, Quadrature, wrap};
 use crate::samplers::Axis;
 
-/// Least number of draws that a cell expects.
+/// Least number of draws that a bin expects.
 pub const LEAST: f64 = 25.0;
-/// Coarse cells of two dimensions, in all, before boxes are quartered and joined.
+/// Coarse bins of two dimensions, in all, before boxes are quartered and joined.
 const COARSE: f64 = 256.0;
-/// Coarse cells of one dimension.
+/// Coarse bins of one dimension.
 const COARSE_LINE: f64 = 64.0;
 /// Boxes are quartered at most this often.
 const DEPTH: u32 = 8;
@@ -30,19 +30,19 @@ pub enum Extra {
     Null,
 }
 
-/// Leaves, and the cells that they are joined to.
+/// Leaves, and the bins that they are joined to.
 #[derive(Clone, Debug)]
 pub struct Partition {
     maps: Vec<Map>,
     /// Areas of the leaves.
     pub leaves: Vec<Area>,
-    /// Coarse cell of each leaf, then of each extra.
+    /// Coarse bin of each leaf, then of each extra.
     pub coarse: Vec<usize>,
-    /// Fine cell of each leaf, then of each extra.
+    /// Fine bin of each leaf, then of each extra.
     pub fine: Vec<usize>,
-    /// Number of coarse cells.
+    /// Number of coarse bins.
     pub coarse_count: usize,
-    /// Number of fine cells.
+    /// Number of fine bins.
     pub fine_count: usize,
 }
 
@@ -77,7 +77,7 @@ enum Block {
 }
 
 impl Partition {
-    /// Cells for `samples` draws. `extras` are discrete outcomes and a null with their masses.
+    /// Bins for `samples` draws. `extras` are discrete outcomes and a null with their masses.
     pub fn new(quadrature: &mut Quadrature, samples: u64, extras: &[(Extra, f64)]) -> Partition {
         let n = samples as f64;
         let shares = shares(quadrature);
@@ -89,14 +89,14 @@ impl Partition {
             let (map, blocks) =
                 if is_line { builder.line(piece, share) } else { builder.plane(piece, share) };
             maps.push(map);
-            let (cells, rest) = builder.join(blocks);
-            coarse.extend(cells);
+            let (bins, rest) = builder.join(blocks);
+            coarse.extend(bins);
             thin.extend(rest);
         }
         let Builder { leaves, mut masses, .. } = builder;
         let count = leaves.len();
-        // Within a coarse cell: the leaves one by one, thin ones joined.
-        let mass = |cell: &[usize], masses: &[f64]| cell.iter().map(|&i| masses[i]).sum::<f64>();
+        // Within a coarse bin: the leaves one by one, thin ones joined.
+        let mass = |bin: &[usize], masses: &[f64]| bin.iter().map(|&i| masses[i]).sum::<f64>();
         for (i, (_, extra)) in extras.iter().enumerate() {
             masses.push(*extra);
             if n * extra >= LEAST { coarse.push(vec![count + i]) } else { thin.push(count + i) }
@@ -107,7 +107,7 @@ impl Partition {
             let lightest = (0..coarse.len())
                 .min_by(|&a, &b| mass(&coarse[a], &masses).total_cmp(&mass(&coarse[b], &masses)));
             match lightest {
-                Some(cell) => coarse[cell].extend(thin),
+                Some(bin) => coarse[bin].extend(thin),
                 None => coarse.push(thin),
             }
         }
@@ -119,11 +119,11 @@ impl Partition {
             coarse_count: coarse.len(),
             fine_count: 0,
         };
-        for (number, cell) in coarse.into_iter().enumerate() {
-            cell.iter().for_each(|&leaf| partition.coarse[leaf] = number);
-            let single: Vec<Vec<usize>> = cell.iter().map(|&leaf| vec![leaf]).collect();
+        for (number, bin) in coarse.into_iter().enumerate() {
+            bin.iter().for_each(|&leaf| partition.coarse[leaf] = number);
+            let single: Vec<Vec<usize>> = bin.iter().map(|&leaf| vec![leaf]).collect();
             let (fine, rest) = join(single, n, &masses);
-            // What is thin as a whole is one fine cell too.
+            // What is thin as a whole is one fine bin too.
             for group in fine.into_iter().chain((!rest.is_empty()).then_some(rest)) {
                 group.iter().for_each(|&leaf| partition.fine[leaf] = partition.fine_count);
                 partition.fine_count += 1;
@@ -180,7 +180,7 @@ struct Builder<'q, 's> {
 }
 
 impl Builder<'_, '_> {
-    /// How many times finer the fine cells are than `coarse` cells, along a coordinate of two: 4, 2 or 1.
+    /// How many times finer the fine bins are than `coarse` bins, along a coordinate of two: 4, 2 or 1.
     fn finer(&self, coarse: f64) -> usize {
         let fits = |f: &usize| self.n >= 2.0 * LEAST * coarse * (f * f) as f64;
         [4, 2].into_iter().find(fits).unwrap_or(1)
@@ -194,18 +194,18 @@ impl Builder<'_, '_> {
         leaf
     }
 
-    /// Stretches of a line, and the blocks of them that are coarse cells.
+    /// Stretches of a line, and the blocks of them that are coarse bins.
     fn line(&mut self, piece: usize, share: f64) -> (Map, Vec<Vec<usize>>) {
         let range = self.quadrature.pieces()[piece].axes[0].range;
-        let cells = (COARSE_LINE * share).min(self.n * share / (2.0 * LEAST)).round().max(1.0);
-        let finer = self.finer(cells / share.max(1e-300));
+        let bins = (COARSE_LINE * share).min(self.n * share / (2.0 * LEAST)).round().max(1.0);
+        let finer = self.finer(bins / share.max(1e-300));
         let finer = finer * finer;
-        let count = cells as usize * finer;
+        let count = bins as usize * finer;
         let mut marks: Vec<(f64, bool)> =
             (1..count).map(|j| (j as f64 / count as f64, j % finer == 0)).collect();
         let expected = self.n * share;
-        let mut tail = 2.0 / cells;
-        while expected * tail >= LEAST && cells > 1.0 {
+        let mut tail = 2.0 / bins;
+        while expected * tail >= LEAST && bins > 1.0 {
             marks.push((1.0 - tail, true));
             tail *= 0.5;
         }
@@ -265,11 +265,11 @@ impl Builder<'_, '_> {
         marks.iter().map(|(part, _)| find(*part)).collect()
     }
 
-    /// Boxes of a plane, and the blocks of them that are coarse cells, in serpentines.
+    /// Boxes of a plane, and the blocks of them that are coarse bins, in serpentines.
     fn plane(&mut self, piece: usize, share: f64) -> (Map, Vec<Vec<usize>>) {
         let axes = self.quadrature.pieces()[piece].axes.clone();
-        let cells = COARSE.min(self.n / (2.0 * LEAST)) * share;
-        let side = (cells.sqrt().round() as usize).max(1);
+        let bins = COARSE.min(self.n / (2.0 * LEAST)) * share;
+        let side = (bins.sqrt().round() as usize).max(1);
         let total = COARSE.min(self.n / (2.0 * LEAST)).max(1.0);
         let finer = self.finer(total);
         let grid = [side * finer; 2];
@@ -359,25 +359,25 @@ impl Builder<'_, '_> {
 /// one joined before, or with the block before. What is thin as a whole comes back as the rest.
 fn join(blocks: Vec<Vec<usize>>, n: f64, masses: &[f64]) -> (Vec<Vec<usize>>, Vec<usize>) {
     let expected = |block: &[usize]| n * block.iter().map(|&i| masses[i]).sum::<f64>();
-    let mut cells: Vec<Vec<usize>> = Vec::new();
+    let mut bins: Vec<Vec<usize>> = Vec::new();
     let mut thin: Vec<usize> = Vec::new();
     let mut last_joined = None;
     for block in blocks {
         if expected(&block) >= LEAST {
-            cells.push(block);
+            bins.push(block);
             continue;
         }
         thin.extend(block);
         if expected(&thin) >= LEAST {
-            last_joined = Some(cells.len());
-            cells.push(std::mem::take(&mut thin));
+            last_joined = Some(bins.len());
+            bins.push(std::mem::take(&mut thin));
         }
     }
-    let target = last_joined.or(cells.len().checked_sub(1));
-    if let Some(cell) = target {
-        cells[cell].extend(std::mem::take(&mut thin));
+    let target = last_joined.or(bins.len().checked_sub(1));
+    if let Some(bin) = target {
+        bins[bin].extend(std::mem::take(&mut thin));
     }
-    (cells, thin)
+    (bins, thin)
 }
 
 impl Plane {
@@ -448,40 +448,40 @@ impl Plane {
     }
 }
 
-/// Groups of coarse cells for pairs of consecutive draws, about equal in mass: strips along the first
-/// coordinate, cut along the second, 4 by 4. `centres` are of the cells, by piece; `pairs` are to be
-/// counted. Returns the group of each cell and their number, at most 16; 0 where the draws do not suffice
+/// Groups of coarse bins for pairs of consecutive draws, about equal in mass: strips along the first
+/// coordinate, cut along the second, 4 by 4. `centres` are of the bins, by piece; `pairs` are to be
+/// counted. Returns the group of each bin and their number, at most 16; 0 where the draws do not suffice
 /// for two.
 pub fn groups(centres: &[(usize, [f64; 2])], masses: &[Mass], pairs: f64) -> (Vec<usize>, usize) {
     let sides = 4;
     let mut order: Vec<usize> = (0..masses.len()).collect();
     order.sort_by(|&a, &b| key(centres[a], 0).total_cmp(&key(centres[b], 0)));
     let mut number = vec![0; masses.len()];
-    for (strip, cells) in cut(&order, masses, sides).into_iter().enumerate() {
-        let mut cells = cells;
-        cells.sort_by(|&a, &b| key(centres[a], 1).total_cmp(&key(centres[b], 1)));
-        for (part, cells) in cut(&cells, masses, sides).into_iter().enumerate() {
-            cells.into_iter().for_each(|cell| number[cell] = strip * sides + part);
+    for (strip, bins) in cut(&order, masses, sides).into_iter().enumerate() {
+        let mut bins = bins;
+        bins.sort_by(|&a, &b| key(centres[a], 1).total_cmp(&key(centres[b], 1)));
+        for (part, bins) in cut(&bins, masses, sides).into_iter().enumerate() {
+            bins.into_iter().for_each(|bin| number[bin] = strip * sides + part);
         }
     }
     // Empty groups go; then the lightest joins the next lightest until all pairs of groups are thick.
     let mut groups: Vec<(f64, Vec<usize>)> = (0..sides * sides)
-        .map(|g| (0..masses.len()).filter(|&cell| number[cell] == g).collect::<Vec<_>>())
-        .map(|cells| (cells.iter().map(|&cell| masses[cell].value).sum(), cells))
-        .filter(|(_, cells): &(f64, Vec<usize>)| !cells.is_empty())
+        .map(|g| (0..masses.len()).filter(|&bin| number[bin] == g).collect::<Vec<_>>())
+        .map(|bins| (bins.iter().map(|&bin| masses[bin].value).sum(), bins))
+        .filter(|(_, bins): &(f64, Vec<usize>)| !bins.is_empty())
         .collect();
     groups.sort_by(|a, b| b.0.total_cmp(&a.0));
     while groups.len() > 1 && pairs * groups[groups.len() - 1].0 * groups[groups.len() - 1].0 < LEAST {
-        if let Some((mass, cells)) = groups.pop()
+        if let Some((mass, bins)) = groups.pop()
             && let Some(next) = groups.last_mut()
         {
             next.0 += mass;
-            next.1.extend(cells);
+            next.1.extend(bins);
         }
         groups.sort_by(|a, b| b.0.total_cmp(&a.0));
     }
-    for (g, (_, cells)) in groups.iter().enumerate() {
-        cells.iter().for_each(|&cell| number[cell] = g);
+    for (g, (_, bins)) in groups.iter().enumerate() {
+        bins.iter().for_each(|&bin| number[bin] = g);
     }
     (number, if groups.len() < 2 { 0 } else { groups.len() })
 }
@@ -492,16 +492,16 @@ fn key((piece, at): (usize, [f64; 2]), coordinate: usize) -> f64 {
     piece as f64 * 1e6 + at[coordinate].clamp(-1e5, 1e5)
 }
 
-/// Cuts an order of cells into parts of about equal mass.
+/// Cuts an order of bins into parts of about equal mass.
 fn cut(order: &[usize], masses: &[Mass], parts: usize) -> Vec<Vec<usize>> {
-    let all: f64 = order.iter().map(|&cell| masses[cell].value).sum();
+    let all: f64 = order.iter().map(|&bin| masses[bin].value).sum();
     let mut cuts = vec![Vec::new(); parts];
     let mut below = 0.0;
-    for &cell in order {
-        let middle = below + 0.5 * masses[cell].value;
-        below += masses[cell].value;
+    for &bin in order {
+        let middle = below + 0.5 * masses[bin].value;
+        below += masses[bin].value;
         let part = if all > 0.0 { (middle / all * parts as f64) as usize } else { 0 };
-        cuts[part.min(parts - 1)].push(cell);
+        cuts[part.min(parts - 1)].push(bin);
     }
     cuts
 }
@@ -549,15 +549,15 @@ mod tests {
             quadrature.masses(partition.leaves.len()).iter().map(|mass| mass.value).collect();
         masses.extend(extras.iter().map(|(_, mass)| *mass));
         assert!((masses.iter().sum::<f64>() - 1.0).abs() < 1e-6);
-        for (cell_of, count) in
+        for (bin_of, count) in
             [(&partition.coarse, partition.coarse_count), (&partition.fine, partition.fine_count)]
         {
             let mut sums = vec![0.0; count];
-            cell_of.iter().zip(&masses).for_each(|(&cell, mass)| sums[cell] += mass);
+            bin_of.iter().zip(&masses).for_each(|(&bin, mass)| sums[bin] += mass);
             let least = sums.iter().copied().fold(f64::INFINITY, f64::min);
             assert!(least * samples as f64 > 24.9 || count == 1, "{least}");
         }
-        // Fine cells are parts of coarse ones.
+        // Fine bins are parts of coarse ones.
         let mut of_fine = vec![None; partition.fine_count];
         for (&fine, &coarse) in partition.fine.iter().zip(&partition.coarse) {
             assert_eq!(*of_fine[fine].get_or_insert(coarse), coarse);
@@ -578,7 +578,7 @@ mod tests {
         let few = check(&HenyeyGreensteinSampler::new(0.9), 1_000, &[]);
         assert!((4..=20).contains(&few.coarse_count), "{}", few.coarse_count);
         let corner = check(&Two, 1_000_000, &[]);
-        // The peak is one box of 100 x 100: cells within it are far smaller than the grid's.
+        // The peak is one box of 100 x 100: bins within it are far smaller than the grid's.
         let inside =
             corner.leaves.iter().filter(|a| a.piece == 0 && a.high[0] <= 0.0101 && a.high[1] <= -0.979);
         assert!(inside.count() > 16);
