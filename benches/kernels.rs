@@ -21,6 +21,7 @@ use scatterproof::optics::phase::HenyeyGreenstein;
 use scatterproof::sampling::distance::sample_exponential;
 use scatterproof::sampling::stream::{PassKey, Purpose, Stream, StreamKey};
 use scatterproof::sampling::warp::{square_to_cap, square_to_cosine_hemisphere};
+use scatterproof::scene::sensor::Probe;
 use scatterproof::scene::{Emission, Light, Scene, Sensor};
 
 /// Inputs of a kernel; one iteration goes through all of them.
@@ -192,7 +193,7 @@ fn unit_sphere(boundary: Boundary, emission: Emission) -> Scene {
         boundary: vec![boundary],
         medium: vec![Medium { sigma_t: 10.0, albedo: 0.99, phase }],
         lights: vec![Light { name: "light".into(), emission }],
-        sensor: Sensor::Probe { ray, paths: PATHS },
+        sensor: Sensor::Probe(Probe { ray, paths: PATHS }),
     }
 }
 

@@ -15,7 +15,9 @@ use scatterproof::optics::materials;
 use scatterproof::optics::medium::Medium;
 use scatterproof::run::clock::thread_cpu_time;
 use scatterproof::sampling::stream::{Purpose, Stream, StreamKey};
-use scatterproof::sampling::thinning::{Accepted, Form, PointTree, Rule, Work, scan};
+use scatterproof::sampling::thinning::{
+    Accepted, PointTree, ThinningForm, ThinningRule, ThinningWork, scan,
+};
 
 const REPEATS: usize = 7;
 
@@ -46,7 +48,7 @@ fn main() {
 
 struct Bench {
     tree: PointTree,
-    rule: Rule,
+    rule: ThinningRule,
     models: Vec<Bssrdf>,
     at: Vec<DVec3>,
     stream: Stream,
@@ -67,13 +69,13 @@ fn row(name: &str, radius: f64, count: usize) {
     let build = (thread_cpu_time() - start).as_secs_f64();
     let mut bench = Bench {
         tree,
-        rule: Rule::new(Form::Exponential { sigma }),
+        rule: ThinningRule::new(ThinningForm::Exponential { sigma }),
         models,
         at: sphere((2_000_000 / count).clamp(5, 50), radius),
         stream: StreamKey::named(name).pass(0).stream(0, Purpose::Walk),
     };
     let mut ratios = Vec::new();
-    let (mut best, mut work) = ([f64::INFINITY; 3], Work::default());
+    let (mut best, mut work) = ([f64::INFINITY; 3], ThinningWork::default());
     for _ in 0..REPEATS {
         let (tree, done) = bench.time(true, true);
         let (scan, _) = bench.time(false, true);
@@ -103,9 +105,9 @@ fn row(name: &str, radius: f64, count: usize) {
 
 impl Bench {
     /// Nanoseconds a query.
-    fn time(&mut self, by_tree: bool, evaluate: bool) -> (f64, Work) {
+    fn time(&mut self, by_tree: bool, evaluate: bool) -> (f64, ThinningWork) {
         let Bench { tree, rule, models, at, stream } = self;
-        let mut work = Work::default();
+        let mut work = ThinningWork::default();
         let mut sums = [0.0; 3];
         let start = thread_cpu_time();
         for &at in at.iter() {

@@ -215,7 +215,7 @@ fn cost(
     let timing = folder.read_timing()?;
     let cost = timing.as_ref().and_then(|t| t.of(&stored.record.cells[cell].label, &run.estimator));
     let per_pass = cost.and_then(|cost| cost.cpu_seconds_per_pass());
-    Ok(per_pass.map(|ours| ratios(stored, run, planes, [theirs, ours * run.passes as f64])))
+    Ok(per_pass.map(|ours| ratios(stored, cell, run, planes, [theirs, ours * run.passes as f64])))
 }
 
 /// The pictures and the table.

@@ -19,7 +19,7 @@ use crate::math::exp;
 use crate::optics::medium::Medium;
 
 /// What a walk remembers of its bands.
-pub(super) trait Bands: Clone {
+pub(super) trait WalkBands: Clone {
     /// A flight of length `t` in the medium, which ends in a scattering event or at the boundary.
     fn flight(&mut self, media: &[Medium], t: f64, scatters: bool);
 
@@ -33,12 +33,12 @@ pub(super) trait Bands: Clone {
     fn density(&self) -> f64;
 
     /// Adds a contribution of the walk's own band, and to every other that the walk scores what it is there.
-    fn score(&self, scores: &mut Scores, own: Place, value: f64);
+    fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64);
 }
 
 /// Where a contribution counts.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct ScorePlace {
     pub slot: usize,
     pub band: usize,
     pub class: TransportClass,
@@ -49,7 +49,7 @@ pub(super) struct Place {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OneBand;
 
-impl Bands for OneBand {
+impl WalkBands for OneBand {
     #[inline]
     fn flight(&mut self, _: &[Medium], _: f64, _: bool) {}
 
@@ -67,7 +67,7 @@ impl Bands for OneBand {
     }
 
     #[inline]
-    fn score(&self, scores: &mut Scores, own: Place, value: f64) {
+    fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64) {
         scores.add(own.slot, own.band, own.class, own.light, value);
     }
 }
@@ -98,7 +98,7 @@ impl SharedBands {
     }
 }
 
-impl Bands for SharedBands {
+impl WalkBands for SharedBands {
     fn flight(&mut self, media: &[Medium], t: f64, scatters: bool) {
         let hero = media[self.hero].sigma_t;
         for (band, medium) in media.iter().enumerate() {
@@ -131,7 +131,7 @@ impl Bands for SharedBands {
         self.rho[..self.count].iter().sum::<f64>() / self.count as f64
     }
 
-    fn score(&self, scores: &mut Scores, own: Place, value: f64) {
+    fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64) {
         for band in 0..self.count {
             scores.add(own.slot, band, own.class, own.light, self.value[band] * value);
         }

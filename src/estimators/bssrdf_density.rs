@@ -17,10 +17,9 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::bssrdf_probe::adds_single;
-use super::bssrdf_single::score_single;
-use super::emergence::{BssrdfScene, Emergence, Gather};
-use super::illumination::{Entrance, Illumination, PathStreams, groups_among};
+use super::bssrdf_single::{adds_single, score_single};
+use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
+use super::illumination::{Entrance, Illumination};
 use super::{BandUse, Bias, Cost, Estimator, Scores, TransportClass};
 use crate::error::{Error, Result};
 use crate::geometry::{BodyPoint, BodySampler, FaceChoice, Hit, Ray};
@@ -98,7 +97,7 @@ impl BssrdfDensity {
             self.enter(&at, stream.draw3(), entered, scores);
             points.push((at.point, at.normal));
         }
-        scores.cost[Cost::CloudPoints as usize] += self.samples as u64;
+        scores.count_many(Cost::CloudPoints, self.samples as u64);
         if let Some(radius) = self.radius {
             irradiance = self.averaged(&points, &irradiance, stride, radius);
         }
@@ -178,7 +177,7 @@ struct Stored {
 impl Estimator for BssrdfDensity {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         let stored = self.store(key, scores);
-        for group in groups_among(&self.bssrdf, bands) {
+        for group in self.bssrdf.groups_among(bands) {
             for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
                 let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut sum = Sum { estimator: self, stored: &stored, streams };
@@ -237,7 +236,7 @@ impl Gather for Sum<'_> {
                     *sum += kernel * entered[band];
                 }
             }
-            scores.cost[Cost::Evaluations as usize] += points.len() as u64;
+            scores.count_many(Cost::Evaluations, points.len() as u64);
             for (light, sum) in sums.into_iter().enumerate() {
                 let value = throughput * area * sum;
                 scores.add(emergence.slot, band, TransportClass::Multiple, light, value);
@@ -258,6 +257,7 @@ mod tests {
     use crate::optics::medium::Medium;
     use crate::optics::phase::HenyeyGreenstein;
     use crate::sampling::stream::StreamKey;
+    use crate::scene::sensor::Probe;
     use crate::scene::{Emission, Light, Sensor};
 
     const SPHERE: Shape = Shape::Sphere { radius: 1.0 };
@@ -270,7 +270,7 @@ mod tests {
             boundary: vec![Boundary::Smooth { eta: 1.3 }],
             medium: vec![Medium { sigma_t: 2.0, albedo: 0.95, phase: HenyeyGreenstein { g: 0.3 } }],
             lights: vec![Light { name: "light".into(), emission }],
-            sensor: Sensor::Probe { ray, paths: 16 },
+            sensor: Sensor::Probe(Probe { ray, paths: 16 }),
         };
         let model = Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
         let options = DensityOptions { model, samples, radius, single: None, straight: true };
@@ -289,7 +289,7 @@ mod tests {
         for radius in [None, Some(0.3)] {
             let density = estimator(sky(), 512, radius);
             let bssrdf = &density.bssrdf;
-            let Sensor::Probe { ray, .. } = bssrdf.scene.sensor else { unreachable!() };
+            let Sensor::Probe(Probe { ray, .. }) = bssrdf.scene.sensor else { unreachable!() };
             let met = SPHERE.intersect(&ray, Side::Outside, None, f64::INFINITY).expect("a hit");
             let t21 = 1.0 - fresnel(-met.normal.dot(ray.dir), 1.3).reflectance;
             let flux = |mu: f64| 2.0 * PI * mu * (1.0 - fresnel(mu, 1.3).reflectance);

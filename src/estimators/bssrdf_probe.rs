@@ -17,9 +17,9 @@
 
 use std::sync::Arc;
 
-use super::bssrdf_single::score_single;
-use super::emergence::{BssrdfScene, Emergence, Gather};
-use super::illumination::{Illumination, PathStreams, groups_among};
+use super::bssrdf_single::{adds_single, score_single};
+use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
+use super::illumination::Illumination;
 use super::{Anomaly, BandUse, Bias, Cost, Estimator, Scores};
 use crate::error::Result;
 use crate::geometry::{Hit, Lines};
@@ -77,14 +77,9 @@ impl BssrdfProbe {
     }
 }
 
-/// Whether single scattering is added to a model.
-pub(super) fn adds_single(bssrdf: &BssrdfScene, wanted: Option<bool>) -> bool {
-    wanted.unwrap_or_else(|| bssrdf.models.iter().any(|model| model.leaves_out_single))
-}
-
 impl Estimator for BssrdfProbe {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
-        for group in groups_among(&self.bssrdf, bands) {
+        for group in self.bssrdf.groups_among(bands) {
             for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
                 let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut gather = Probing { estimator: self, streams, hits: Vec::new() };
@@ -135,7 +130,7 @@ impl Gather for Probing<'_> {
             }
             self.hits.clear();
             let met = line.cross(&bssrdf.scene.shape, &mut self.hits);
-            scores.cost[Cost::Rays as usize] += met.rays;
+            scores.count_many(Cost::Rays, met.rays);
             if met.is_lost {
                 scores.note(Anomaly::LostRay);
             }

@@ -16,6 +16,7 @@ use crate::optics::fresnel::fresnel;
 use crate::optics::medium::Medium;
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::StreamKey;
+use crate::scene::sensor::Probe;
 use crate::scene::{Emission, Light, Sensor};
 
 const MODEL: Model = Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
@@ -47,7 +48,7 @@ fn scene(shape: Shape, eta: &[f64], medium: &[Medium], light: Light, paths: usiz
         boundary: eta.iter().map(|&eta| Boundary::Smooth { eta }).collect(),
         medium: medium.to_vec(),
         lights: vec![light],
-        sensor: Sensor::Probe { ray: ray(), paths },
+        sensor: Sensor::Probe(Probe { ray: ray(), paths }),
     })
 }
 

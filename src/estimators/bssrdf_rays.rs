@@ -13,10 +13,9 @@
 
 use std::sync::Arc;
 
-use super::bssrdf_probe::adds_single;
-use super::bssrdf_single::score_single;
-use super::emergence::{BssrdfScene, Emergence, Gather};
-use super::illumination::{Illumination, PathStreams, groups_among};
+use super::bssrdf_single::{adds_single, score_single};
+use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
+use super::illumination::Illumination;
 use super::{Anomaly, BandUse, Bias, Cost, Estimator, Scores};
 use crate::error::Result;
 use crate::geometry::{Mesh, Ray, Shape, Side};
@@ -108,7 +107,7 @@ fn is_convex(mesh: &Mesh) -> bool {
 
 impl Estimator for BssrdfRays {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
-        for group in groups_among(&self.bssrdf, bands) {
+        for group in self.bssrdf.groups_among(bands) {
             let depth = self.depth(&group);
             for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
                 let streams = PathStreams::new(&self.bssrdf, key, index, &group);

@@ -25,6 +25,11 @@ use crate::math::DVec3;
 use crate::sampling::distance::{sample_exponential, transmittance};
 use crate::sampling::stream::Stream;
 
+/// Whether single scattering is added to a model.
+pub(super) fn adds_single(bssrdf: &BssrdfScene, wanted: Option<bool>) -> bool {
+    wanted.unwrap_or_else(|| bssrdf.models.iter().any(|model| model.leaves_out_single))
+}
+
 /// Scores the term once per emergence and band.
 pub(super) fn score_single(
     bssrdf: &BssrdfScene,
@@ -111,6 +116,7 @@ mod tests {
     use crate::optics::medium::Medium;
     use crate::optics::phase::HenyeyGreenstein;
     use crate::sampling::distance::pdf_distance_exponential;
+    use crate::scene::sensor::Probe;
     use crate::scene::{Emission, Light, Scene, Sensor};
 
     /// The mean over t, by quadrature, is albedo T12 p cos_i / (eta^2 (mu_i' + mu_o')) on a half-space: a deterministic
@@ -124,7 +130,8 @@ mod tests {
                 let dir = DVec3::new(0.36, 0.48, -0.8);
                 let exit = Exit { point: DVec3::new(0.3, 0.2, 0.0), normal: DVec3::Z };
                 let sun = Emission::Directional { toward: wi, irradiance: vec![2.0] };
-                let sensor = Sensor::Probe { ray: Ray { origin: DVec3::Z, dir: -DVec3::Z }, paths: 1 };
+                let sensor =
+                    Sensor::Probe(Probe { ray: Ray { origin: DVec3::Z, dir: -DVec3::Z }, paths: 1 });
                 let scene = Arc::new(Scene {
                     shape: Arc::new(Shape::HalfSpace),
                     boundary: vec![Boundary::Smooth { eta }],

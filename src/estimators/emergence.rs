@@ -64,6 +64,31 @@ impl Emergence<'_> {
     }
 }
 
+/// The streams of one camera path beside its walk.
+pub(super) struct PathStreams {
+    /// Of light samples at entries.
+    pub lights: Stream,
+    /// Of entries.
+    pub entries: Stream,
+    /// Of the single-scattering term, which then shifts none of the others.
+    pub single: Stream,
+}
+
+/// Sets the streams of single scattering apart from those of entries. Indices stay below it.
+const SINGLE: u64 = 1 << 63;
+
+impl PathStreams {
+    /// For path `index` of a pass and a group of bands.
+    pub fn new(bssrdf: &BssrdfScene, key: &PassKey, index: usize, bands: &[usize]) -> PathStreams {
+        let lane = bssrdf.lane(index, bands);
+        PathStreams {
+            lights: key.stream(lane, Purpose::Light),
+            entries: key.stream(lane, Purpose::Connection),
+            single: key.stream(lane | SINGLE, Purpose::Light),
+        }
+    }
+}
+
 /// Collects light that leaves the body.
 pub(super) trait Gather {
     /// Scores what arrives at the exit from the rest of the surface: the integral of K T12 L |cos|, times the path's
@@ -118,6 +143,14 @@ impl BssrdfScene {
     #[inline]
     pub fn lane(&self, index: usize, bands: &[usize]) -> u64 {
         index as u64 * self.eta.len() as u64 + bands[0] as u64
+    }
+
+    /// The groups of bands, as far as they are among `bands`.
+    pub fn groups_among(&self, bands: &[usize]) -> Vec<Vec<usize>> {
+        let among = |group: &Vec<usize>| -> Vec<usize> {
+            group.iter().copied().filter(|band| bands.contains(band)).collect()
+        };
+        self.groups.iter().map(among).filter(|group| !group.is_empty()).collect()
     }
 
     /// What camera paths cannot find.

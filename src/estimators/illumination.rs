@@ -8,7 +8,6 @@ use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, Frame};
 use crate::optics::bssrdf::Entry;
 use crate::optics::fresnel::fresnel;
-use crate::sampling::stream::{PassKey, Purpose, Stream};
 use crate::scene::Scene;
 
 /// Draws one light of a scene, and a direction from it.
@@ -120,37 +119,4 @@ impl Entrance {
         let shadow_ray = Ray { origin: hit.point, dir: wi };
         (!scene.shape.occluded(&shadow_ray, Some(hit.face))).then_some(entrance)
     }
-}
-
-/// The streams of one camera path beside its walk.
-pub(super) struct PathStreams {
-    /// Of light samples at entries.
-    pub lights: Stream,
-    /// Of entries.
-    pub entries: Stream,
-    /// Of the single-scattering term, which then shifts none of the others.
-    pub single: Stream,
-}
-
-/// Sets the streams of single scattering apart from those of entries. Indices stay below it.
-const SINGLE: u64 = 1 << 63;
-
-impl PathStreams {
-    /// For path `index` of a pass and a group of bands.
-    pub fn new(bssrdf: &BssrdfScene, key: &PassKey, index: usize, bands: &[usize]) -> PathStreams {
-        let lane = bssrdf.lane(index, bands);
-        PathStreams {
-            lights: key.stream(lane, Purpose::Light),
-            entries: key.stream(lane, Purpose::Connection),
-            single: key.stream(lane | SINGLE, Purpose::Light),
-        }
-    }
-}
-
-/// The groups of a bssrdf, as far as they are among `bands`.
-pub(super) fn groups_among(bssrdf: &BssrdfScene, bands: &[usize]) -> Vec<Vec<usize>> {
-    let among = |group: &Vec<usize>| -> Vec<usize> {
-        group.iter().copied().filter(|band| bands.contains(band)).collect()
-    };
-    bssrdf.groups.iter().map(among).filter(|group| !group.is_empty()).collect()
 }

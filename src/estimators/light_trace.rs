@@ -41,7 +41,7 @@ use crate::optics::boundary::{Boundary, Event};
 use crate::optics::medium::Medium;
 use crate::sampling::distance::sample_exponential;
 use crate::sampling::stream::{PassKey, Purpose, Stream};
-use crate::scene::{Scene, Sensor};
+use crate::scene::Scene;
 
 /// The estimator, for one scene.
 #[derive(Debug)]
@@ -61,12 +61,7 @@ impl LightTracer {
     /// A sensor that photons cannot hit, or whose unit does not fit the body; no photons.
     pub fn new(scene: Arc<Scene>, photons: Option<usize>) -> Result<LightTracer> {
         let bounds = scene.shape.bounds();
-        let fits = match (&scene.sensor, bounds) {
-            (Sensor::FaceFlux { .. } | Sensor::Rings(_), bounds) => bounds.is_none(),
-            (sensor, Some(_)) => sensor.receives(),
-            (_, None) => false,
-        };
-        if !fits {
+        if !scene.sensor.receives(bounds.is_some()) {
             return Err(Error::input_help(
                 "light_trace cannot serve this sensor: no photon hits a single point or direction",
                 "it serves `flux`, `rings`, and `orthographic` with `acceptance_sr` (bodies of finite size)",

@@ -9,7 +9,10 @@ use crate::geometry::{Mesh, procedural};
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::StreamKey;
-use crate::scene::{Acceptance, Emission, FluxFace, Light, Screen};
+use crate::scene::sensor::{
+    Accepting, BodyFlux, FaceFlux, FluxFace, Orthographic, Perspective, Probe, Screen,
+};
+use crate::scene::{Emission, Light, Sensor};
 
 const SPHERE: Shape = Shape::Sphere { radius: 1.0 };
 const GGX: Boundary =
@@ -42,13 +45,13 @@ fn flux(shape: &Shape, bins: usize) -> Sensor {
     };
     match (shape, shape.bounds()) {
         (_, Some(bounds)) => {
-            Sensor::BodyFlux { bounds, frame: Frame::about(DVec3::Z), bins, paths: 512 }
+            Sensor::BodyFlux(BodyFlux { bounds, frame: Frame::about(DVec3::Z), bins, paths: 512 })
         }
         (Shape::Slab { thickness }, None) => {
             let faces = vec![face("top", 0.0, DVec3::Z), face("bottom", *thickness, -DVec3::Z)];
-            Sensor::FaceFlux { faces, bins, paths: 512 }
+            Sensor::FaceFlux(FaceFlux { faces, bins, paths: 512 })
         }
-        _ => Sensor::FaceFlux { faces: vec![face("top", 0.0, DVec3::Z)], bins, paths: 512 },
+        _ => Sensor::FaceFlux(FaceFlux { faces: vec![face("top", 0.0, DVec3::Z)], bins, paths: 512 }),
     }
 }
 
@@ -57,13 +60,14 @@ fn image(shape: &Shape, size: f64, height: f64) -> Sensor {
     let screen = Screen {
         width: 8,
         height: 8,
-        origin: DVec3::new(0.125, 0.0, 0.25) * size,
         right: DVec3::X * (0.25 * size),
         down: -DVec3::Y * (0.25 * size),
         view: -DVec3::Z,
         has_tiles: true,
     };
-    Sensor::Accepting(Acceptance::new(screen, height, shape.bounds().expect("a finite body")))
+    let center = DVec3::new(0.125, 0.0, 0.25) * size;
+    let bounds = shape.bounds().expect("a finite body");
+    Sensor::Accepting(Accepting::new(screen, center, height, bounds))
 }
 
 fn tracer(scene: Scene) -> LightTracer {
@@ -367,7 +371,6 @@ fn sensors_without_extent_are_refused() {
     let screen = Screen {
         width: 2,
         height: 2,
-        origin: DVec3::Z * 3.0,
         right: DVec3::X,
         down: -DVec3::Y,
         view: -DVec3::Z,
@@ -375,9 +378,9 @@ fn sensors_without_extent_are_refused() {
     };
     let ray = Ray { origin: DVec3::Z * 3.0, dir: -DVec3::Z };
     for (shape, sensor) in [
-        (SPHERE, Sensor::Orthographic(screen)),
-        (SPHERE, Sensor::Perspective(screen)),
-        (SPHERE, Sensor::Probe { ray, paths: 4 }),
+        (SPHERE, Sensor::Orthographic(Orthographic { screen, center: ray.origin })),
+        (SPHERE, Sensor::Perspective(Perspective { screen, pinhole: ray.origin })),
+        (SPHERE, Sensor::Probe(Probe { ray, paths: 4 })),
         (SPHERE, flux(&Shape::HalfSpace, 1)),
         (Shape::HalfSpace, flux(&SPHERE, 1)),
         (Shape::HalfSpace, image(&SPHERE, 1.0, 0.1)),

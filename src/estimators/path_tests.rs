@@ -10,6 +10,7 @@ use crate::optics::medium::Medium;
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::StreamKey;
+use crate::scene::sensor::Probe;
 use crate::scene::{Emission, Light, Sensor};
 
 fn environment(radiance: f64, toward: DVec3, height: f64, name: &str) -> Light {
@@ -18,7 +19,7 @@ fn environment(radiance: f64, toward: DVec3, height: f64, name: &str) -> Light {
 }
 
 fn scene(shape: Shape, boundary: Boundary, medium: Medium, lights: Vec<Light>, ray: Ray) -> Scene {
-    let sensor = Sensor::Probe { ray, paths: 1000 };
+    let sensor = Sensor::Probe(Probe { ray, paths: 1000 });
     Scene { shape: Arc::new(shape), boundary: vec![boundary], medium: vec![medium], lights, sensor }
 }
 
@@ -261,8 +262,8 @@ fn equal_bands_on_one_key_are_equal() {
 /// absolute length hides anywhere.
 #[test]
 fn scaled_scenes_give_the_same_bits() {
-    type MakeShape = fn(f64) -> Shape;
-    let shapes: [MakeShape; 4] = [
+    type ShapeOfScale = fn(f64) -> Shape;
+    let shapes: [ShapeOfScale; 4] = [
         |s| Shape::Sphere { radius: s },
         |s| Shape::Slab { thickness: s },
         |s| Shape::Box { half: DVec3::new(s, 0.7 * s, 0.9 * s) },
@@ -270,7 +271,7 @@ fn scaled_scenes_give_the_same_bits() {
     ];
     let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.2 };
     let boundaries = [Boundary::Rough { eta: 1.3, facets }, Boundary::Matched];
-    let played = |make: MakeShape, boundary, scale: f64| {
+    let played = |make: ShapeOfScale, boundary, scale: f64| {
         let sun = Light {
             name: "sun".into(),
             emission: Emission::Directional { toward: DVec3::Z, irradiance: vec![1.0] },

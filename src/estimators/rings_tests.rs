@@ -17,7 +17,8 @@ use crate::optics::medium::Medium;
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::StreamKey;
-use crate::scene::{Emission, FluxFace, Light, Rings, Scene, Sensor};
+use crate::scene::sensor::{FaceFlux, FluxFace, Rings};
+use crate::scene::{Emission, Light, Scene, Sensor};
 
 const MODEL: Model = Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
 const SMOOTH: Boundary = Boundary::Smooth { eta: 1.3 };
@@ -163,7 +164,7 @@ fn single_scattering_ring_by_ring() {
 #[test]
 fn all_is_the_flux() {
     let face = FluxFace { name: "top", point: DVec3::ZERO, reach: 1.0, frame: Frame::about(DVec3::Z) };
-    let flux = Sensor::FaceFlux { faces: vec![face], bins: 1, paths: 512 };
+    let flux = Sensor::FaceFlux(FaceFlux { faces: vec![face], bins: 1, paths: 512 });
     let [by_ring, whole] = [rings(512), flux].map(|sensor| {
         let scene = Arc::new(scene(Shape::HalfSpace, GGX, 1.0, sensor));
         let photons = LightTracer::new(Arc::clone(&scene), None).expect("a sensor that it serves");

@@ -4,6 +4,7 @@
 //! (with more than one light) each light's share; for the other regions the total. Pixels beside them.
 
 use super::TransportClass;
+use crate::scene::sensor::SensorRegion;
 use crate::scene::{Scene, Sensor};
 
 /// Deterministic counts of work done.
@@ -105,6 +106,7 @@ pub struct Layout {
     sensor: Sensor,
     bands: usize,
     lights: usize,
+    regions: Vec<SensorRegion>,
     split_regions: usize,
     names: Vec<ObservableName>,
 }
@@ -132,8 +134,14 @@ impl Layout {
             bands: scene.bands(),
             lights: if scene.lights.len() > 1 { scene.lights.len() } else { 0 },
             split_regions: regions.iter().filter(|region| region.split).count(),
+            regions,
             names,
         }
+    }
+
+    /// The regions of the sensor, those that are split first.
+    pub fn regions(&self) -> &[SensorRegion] {
+        &self.regions
     }
 
     /// The observables' names.
@@ -226,7 +234,13 @@ impl Scores {
     /// Counts work.
     #[inline]
     pub fn count(&mut self, cost: Cost) {
-        self.cost[cost as usize] += 1;
+        self.count_many(cost, 1);
+    }
+
+    /// Counts much work at once.
+    #[inline]
+    pub fn count_many(&mut self, cost: Cost, times: u64) {
+        self.cost[cost as usize] += times;
     }
 
     /// Counts an anomaly.

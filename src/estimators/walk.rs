@@ -9,7 +9,7 @@
 
 use std::sync::Arc;
 
-use super::bands::{Bands, Place};
+use super::bands::{ScorePlace, WalkBands};
 use super::choice::{choose_light, light_shares};
 use super::crossing::{other, radiance_scale};
 use super::{Anomaly, Cost, History, Scores, TransportClass};
@@ -63,16 +63,21 @@ pub(super) struct Path<'a> {
 pub(super) trait Rivals: Sized {
     /// At a medium vertex that roulette has spared, before its direction is drawn; the walk's ray holds the
     /// vertex and the direction of arrival. Draws samples and scores them.
-    fn call<B: Bands>(walk: &mut Walk<'_, Self, B>);
+    fn call<B: WalkBands>(walk: &mut Walk<'_, Self, B>);
 
     /// The walk has met the boundary.
     fn meet_surface(&mut self);
 
     /// The walk has met a smooth boundary from outside: scores lights that it reflects by their expectation.
-    fn reflect<B: Bands>(walk: &mut Walk<'_, Self, B>, hit: &Hit, reflected: DVec3, reflectance: f64);
+    fn reflect<B: WalkBands>(
+        walk: &mut Walk<'_, Self, B>,
+        hit: &Hit,
+        reflected: DVec3,
+        reflectance: f64,
+    );
 
     /// Whether [`Self::reflect`] scores a light from this direction.
-    fn has_scored_reflection<B: Bands>(walk: &Walk<'_, Self, B>, light: usize, wi: DVec3) -> bool;
+    fn has_scored_reflection<B: WalkBands>(walk: &Walk<'_, Self, B>, light: usize, wi: DVec3) -> bool;
 
     /// Which of BSDF and light sampling take part at the end of a path that leaves from the walk's latest medium
     /// vertex: 1 or 0 each.
@@ -80,7 +85,12 @@ pub(super) trait Rivals: Sized {
 
     /// Sum over the rivals of their densities of the path that ends at `exit` and goes on towards `wi`, light
     /// `light`, relative to the density of the walk's medium vertices.
-    fn densities<B: Bands>(walk: &mut Walk<'_, Self, B>, exit: &Exit, light: usize, wi: DVec3) -> f64;
+    fn densities<B: WalkBands>(
+        walk: &mut Walk<'_, Self, B>,
+        exit: &WalkExit,
+        light: usize,
+        wi: DVec3,
+    ) -> f64;
 }
 
 /// No techniques but the walk's own.
@@ -89,16 +99,16 @@ pub(super) struct Unrivalled;
 
 impl Rivals for Unrivalled {
     #[inline]
-    fn call<B: Bands>(_: &mut Walk<'_, Self, B>) {}
+    fn call<B: WalkBands>(_: &mut Walk<'_, Self, B>) {}
 
     #[inline]
     fn meet_surface(&mut self) {}
 
     #[inline]
-    fn reflect<B: Bands>(_: &mut Walk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
+    fn reflect<B: WalkBands>(_: &mut Walk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
 
     #[inline]
-    fn has_scored_reflection<B: Bands>(_: &Walk<'_, Self, B>, _: usize, _: DVec3) -> bool {
+    fn has_scored_reflection<B: WalkBands>(_: &Walk<'_, Self, B>, _: usize, _: DVec3) -> bool {
         false
     }
 
@@ -108,14 +118,14 @@ impl Rivals for Unrivalled {
     }
 
     #[inline]
-    fn densities<B: Bands>(_: &mut Walk<'_, Self, B>, _: &Exit, _: usize, _: DVec3) -> f64 {
+    fn densities<B: WalkBands>(_: &mut Walk<'_, Self, B>, _: &WalkExit, _: usize, _: DVec3) -> f64 {
         0.0
     }
 }
 
 /// Where a walk meets the boundary from inside.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Exit {
+pub(super) struct WalkExit {
     pub hit: Hit,
     /// About the shading normal.
     pub frame: Frame,
@@ -128,11 +138,23 @@ const ROUNDING: f64 = 1e-9;
 
 /// How the path's current direction was drawn, as light sampling sees it.
 #[derive(Clone, Copy)]
-enum Drawn {
+enum DirectionDraw {
     /// Only this way: by the sensor or a delta lobe.
     Alone,
     /// Also by light sampling, in competition with this density per solid angle.
     Competing(f64),
+}
+
+/// A light and a direction to it, drawn by light sampling.
+#[derive(Clone, Copy)]
+struct LightDraw {
+    /// Which light.
+    index: usize,
+    /// Probability of choosing it.
+    choice: f64,
+    wi: DVec3,
+    /// Density of the direction per solid angle; none of parallel light.
+    pdf: Option<f64>,
 }
 
 /// One path.
@@ -151,8 +173,8 @@ pub(super) struct Walk<'a, R, B> {
     /// The throughput without radiance's eta^2: what roulette looks at.
     survival: f64,
     pub history: History,
-    drawn: Drawn,
-    exit: Option<Exit>,
+    drawn: DirectionDraw,
+    exit: Option<WalkExit>,
     /// The latest event was a reflection by a smooth boundary, met from outside.
     is_mirrored: bool,
     stream: Stream,
@@ -162,7 +184,7 @@ pub(super) struct Walk<'a, R, B> {
     pub bands: B,
 }
 
-impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
+impl<'a, R: Rivals, B: WalkBands> Walk<'a, R, B> {
     /// Plays a path; returns how many numbers its walk drew.
     pub fn play(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
         let walk = Walk::start(path, scores, rivals, bands);
@@ -217,7 +239,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
             throughput: start.weight,
             survival: 1.0,
             history: History::default(),
-            drawn: Drawn::Alone,
+            drawn: DirectionDraw::Alone,
             exit: None,
             is_mirrored: false,
             stream: key.stream(index as u64, Purpose::Walk),
@@ -253,8 +275,8 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
             match self.scene.shape.intersect(&self.ray, Side::Inside, self.from, t) {
                 Some(hit) => {
                     self.drawn = match self.drawn {
-                        Drawn::Competing(pdf) if self.matched() => {
-                            Drawn::Competing(pdf * transmittance(self.medium.sigma_t, hit.t))
+                        DirectionDraw::Competing(pdf) if self.matched() => {
+                            DirectionDraw::Competing(pdf * transmittance(self.medium.sigma_t, hit.t))
                         }
                         drawn => drawn,
                     };
@@ -316,7 +338,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         let dir = self.medium.phase.sample(self.ray.dir, self.stream.draw2());
         if self.matched() {
             let pdf = self.medium.phase.pdf(self.ray.dir.dot(dir));
-            self.drawn = Drawn::Competing(pdf);
+            self.drawn = DirectionDraw::Competing(pdf);
         }
         self.bands.turn(&self.scene.medium, self.ray.dir.dot(dir));
         self.ray.dir = dir;
@@ -359,7 +381,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         self.scores.count(Cost::BoundaryEvents);
         let frame = Frame::about(hit.shading_normal);
         let local = frame.to_local(wo);
-        self.exit = (side == Side::Inside).then_some(Exit { hit: *hit, frame, wo: local });
+        self.exit = (side == Side::Inside).then_some(WalkExit { hit: *hit, frame, wo: local });
         if (local.z > 0.0) != (side == Side::Outside) {
             self.scores.note(Anomaly::WrongSide);
             return None;
@@ -390,8 +412,8 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         self.survival *= sample.weight * radiance_scale(side, next_side, &self.boundary);
         self.ray.dir = dir;
         self.drawn = match sample.density {
-            Density::Delta => Drawn::Alone,
-            Density::Finite(pdf) => Drawn::Competing(pdf),
+            Density::Delta => DirectionDraw::Alone,
+            Density::Finite(pdf) => DirectionDraw::Competing(pdf),
         };
         Some(next_side)
     }
@@ -410,13 +432,13 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
                     continue;
                 }
                 let weight = match (self.drawn, &self.exit) {
-                    (Drawn::Alone, Some(exit)) if rivals > 0.0 => {
+                    (DirectionDraw::Alone, Some(exit)) if rivals > 0.0 => {
                         // A delta lobe's density is its probability.
                         let own = self.boundary.transmittance_smooth(exit.wo);
                         own / (walks * own + rivals)
                     }
-                    (Drawn::Alone, _) => 1.0 / walks,
-                    (Drawn::Competing(own), _) => {
+                    (DirectionDraw::Alone, _) => 1.0 / walks,
+                    (DirectionDraw::Competing(own), _) => {
                         own / (walks * (own + by_light * (self.choice[index] * pdf)) + rivals)
                     }
                 };
@@ -445,7 +467,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
     #[inline]
     fn score(&mut self, class: TransportClass, light: usize, entry: DVec3, value: f64) {
         let slot = self.scene.sensor.slot_of(self.slot, entry);
-        let place = Place { slot, band: self.band, class, light };
+        let place = ScorePlace { slot, band: self.band, class, light };
         self.bands.score(self.scores, place, value);
     }
 
@@ -453,7 +475,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
     /// here: sensors that ask are not served by techniques that score so.
     #[inline]
     pub fn score_with(&mut self, bands: &B, class: TransportClass, light: usize, value: f64) {
-        let place = Place { slot: self.slot, band: self.band, class, light };
+        let place = ScorePlace { slot: self.slot, band: self.band, class, light };
         bands.score(self.scores, place, value);
     }
 
@@ -465,18 +487,18 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
 
     /// The exit of a path that arrives along `dir`; `None` (and counted) where shading and geometric normal
     /// disagree about the side.
-    pub fn exit_at(&mut self, hit: Hit, dir: DVec3) -> Option<Exit> {
+    pub fn exit_at(&mut self, hit: Hit, dir: DVec3) -> Option<WalkExit> {
         let frame = Frame::about(hit.shading_normal);
         let wo = frame.to_local(-dir);
         if wo.z >= 0.0 {
             self.scores.note(Anomaly::WrongSide);
             return None;
         }
-        Some(Exit { hit, frame, wo })
+        Some(WalkExit { hit, frame, wo })
     }
 
     /// Whether a direction leads outside at an exit; counted where the normals disagree.
-    pub fn leads_outside(&mut self, exit: &Exit, dir: DVec3) -> bool {
+    pub fn leads_outside(&mut self, exit: &WalkExit, dir: DVec3) -> bool {
         let [geometric, shading] = [exit.hit.normal, exit.frame.n].map(|normal| dir.dot(normal) > 0.0);
         if geometric != shading {
             self.scores.note(Anomaly::WrongSide);
@@ -509,7 +531,8 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         }
         let entry = self.ray.origin;
         let value = value * sample.radiance;
-        self.score_connection((index, choice), (sample.wi, sample.pdf), entry, value, pdf);
+        let light = LightDraw { index, choice, wi: sample.wi, pdf: sample.pdf };
+        self.score_connection(light, entry, value, pdf);
     }
 
     /// Samples a light from a medium vertex, straight through a matched boundary.
@@ -524,7 +547,8 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         let Some((through, entry)) = self.transmittance_out(sample.wi) else { return };
         let own = phase * through;
         let value = own * sample.radiance;
-        self.score_connection((index, choice), (sample.wi, sample.pdf), entry, value, own);
+        let light = LightDraw { index, choice, wi: sample.wi, pdf: sample.pdf };
+        self.score_connection(light, entry, value, own);
     }
 
     /// Transmittance from the path's medium vertex to infinity along `dir`, through every part of the
@@ -558,22 +582,16 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
         }
     }
 
-    /// Adds a light sample towards `wi`, whose light comes in at `entry`: `value` is f |cos| (or phase times
-    /// transmittance) times radiance, `own` the density with which the path's own sampling draws the direction. Against
-    /// parallel light it has none.
-    fn score_connection(
-        &mut self,
-        (light, choice): (usize, f64),
-        (wi, pdf): (DVec3, Option<f64>),
-        entry: DVec3,
-        value: f64,
-        own: f64,
-    ) {
+    /// Adds a light sample whose light comes in at `entry`: `value` is f |cos| (or phase times transmittance) times
+    /// radiance, `own` the density with which the path's own sampling draws the direction. Against parallel light it
+    /// has none.
+    fn score_connection(&mut self, light: LightDraw, entry: DVec3, value: f64, own: f64) {
+        let LightDraw { index, choice, wi, pdf } = light;
         let [bsdf, by_light] = self.taking_part();
         if by_light == 0.0 {
             return;
         }
-        let rivals = self.rival_densities(light, wi);
+        let rivals = self.rival_densities(index, wi);
         let walks = self.bands.density();
         let estimate = match pdf {
             Some(pdf) => {
@@ -583,7 +601,7 @@ impl<'a, R: Rivals, B: Bands> Walk<'a, R, B> {
             None => value / choice * (choice / (walks * choice + rivals)),
         };
         let score = self.throughput * estimate;
-        self.score(self.history.class(), light, entry, score);
+        self.score(self.history.class(), index, entry, score);
     }
 
     #[inline]

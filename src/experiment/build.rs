@@ -5,10 +5,11 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::schema::{self, LightEntry, Normals, Spectrum};
+use super::direction::unit;
+use super::schema::{self, BoundaryEntry, LightEntry, NormalsEntry, ShapeEntry, Spectrum};
 use super::{CellSpec, Experiment, resolve, resolve_path};
 use crate::error::{Error, Result};
-use crate::geometry::{Ray, Shape, load_obj, procedural};
+use crate::geometry::{Shape, Side, load_obj, procedural};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 use crate::optics::medium::Medium;
@@ -16,7 +17,7 @@ use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::results::exr_file::{ExrImage, read_exr};
 use crate::results::json::hash_hex;
 use crate::results::record::Band;
-use crate::scene::{Acceptance, Emission, FluxFace, LatLong, Light, Rings, Scene, Screen, Sensor};
+use crate::scene::{Emission, LatLong, Light, Scene};
 
 /// Builds the scenes of an experiment; equal shapes and maps are built once and shared.
 pub struct Builder<'a> {
@@ -56,38 +57,29 @@ impl<'a> Builder<'a> {
         let medium = medium.iter().map(|m| Medium::new(m.sigma_a, m.sigma_s, m.g)).collect();
         let lights = cell.light.iter().enumerate();
         let lights = lights.map(|(i, entry)| self.light(i, entry)).collect::<Result<Vec<Light>>>()?;
-        let sensor = sensor(&cell.sensor, &shape)?;
-        if let Some(point) = sensor_position(&sensor)
-            && shape.covers(point)
-        {
-            return Err(Error::input_help(
+        let sensor = cell.sensor.build(&shape)?;
+        match sensor.position() {
+            Some((point, Side::Outside)) if shape.covers(point) => Err(Error::input_help(
                 format!("the sensor at {point} mm stands inside or on the body (cell `{}`)", cell.label),
                 "move it outside",
-            ));
-        }
-        if let Sensor::Vertex { ray, .. } = &sensor
-            && !shape.contains(ray.origin)
-        {
-            return Err(Error::input_help(
-                format!(
-                    "the vertex at {} mm is not inside the body (cell `{}`)",
-                    ray.origin, cell.label
-                ),
+            )),
+            Some((point, Side::Inside)) if !shape.contains(point) => Err(Error::input_help(
+                format!("the vertex at {point} mm is not inside the body (cell `{}`)", cell.label),
                 "move it inside",
-            ));
+            )),
+            _ => Ok(Scene { shape, boundary, medium, lights, sensor }),
         }
-        Ok(Scene { shape, boundary, medium, lights, sensor })
     }
 
-    fn boundary(&self, words: &schema::Boundary) -> Result<Vec<Boundary>> {
+    fn boundary(&self, words: &BoundaryEntry) -> Result<Vec<Boundary>> {
         let bands = self.experiment.file.bands.list();
         let eta = |eta: &schema::Eta| eta.per_band(&bands).map_err(Error::input);
         Ok(match words {
-            schema::Boundary::Matched {} => vec![Boundary::Matched; bands.len()],
-            schema::Boundary::Smooth { eta: words } => {
+            BoundaryEntry::Matched {} => vec![Boundary::Matched; bands.len()],
+            BoundaryEntry::Smooth { eta: words } => {
                 eta(words)?.into_iter().map(|eta| Boundary::Smooth { eta }).collect()
             }
-            schema::Boundary::Rough { distribution, alpha, eta: words } => {
+            BoundaryEntry::Rough { distribution, alpha, eta: words } => {
                 let kind = match distribution {
                     schema::Distribution::Ggx => MicrofacetKind::Ggx,
                     schema::Distribution::Beckmann => MicrofacetKind::Beckmann,
@@ -98,7 +90,7 @@ impl<'a> Builder<'a> {
         })
     }
 
-    fn shape(&mut self, words: &schema::Shape) -> Result<Arc<Shape>> {
+    fn shape(&mut self, words: &ShapeEntry) -> Result<Arc<Shape>> {
         let name = format!("{words:?}");
         if let Some(shape) = self.shapes.get(&name) {
             return Ok(Arc::clone(shape));
@@ -130,7 +122,7 @@ impl<'a> Builder<'a> {
             match (&words.radiance, &words.map) {
                 (Some(radiance), _) => {
                     let (axis, height) = match words.hemisphere {
-                        Some(axis) => (resolve::unit(axis), 1.0),
+                        Some(axis) => (unit(axis), 1.0),
                         None => (DVec3::Z, 2.0),
                     };
                     let radiance = spectrum(radiance, 1.0);
@@ -191,7 +183,7 @@ impl<'a> Builder<'a> {
 /// makes another experiment. Files that cannot be read are left to the loader's error.
 pub fn inputs(experiment: &Experiment) -> BTreeMap<String, String> {
     let mesh = |cell: &CellSpec| match &cell.object.shape {
-        schema::Shape::Mesh { path, .. } => Some(path.clone()),
+        ShapeEntry::Mesh { path, .. } => Some(path.clone()),
         _ => None,
     };
     let maps = |cell: &CellSpec| -> Vec<String> {
@@ -217,168 +209,31 @@ pub fn bands(words: &schema::Bands) -> Vec<Band> {
     words.list().into_iter().zip(words.display_rgb()).map(band).collect()
 }
 
-fn build_shape(words: &schema::Shape, experiment: &Experiment) -> Result<Shape> {
-    let smooth = |words: &Normals| *words == Normals::Interpolated;
+fn build_shape(words: &ShapeEntry, experiment: &Experiment) -> Result<Shape> {
+    let smooth = |words: &NormalsEntry| *words == NormalsEntry::Interpolated;
     let mesh = match words {
-        schema::Shape::HalfSpace {} => return Ok(Shape::HalfSpace),
-        schema::Shape::Slab { thickness_mm } => return Ok(Shape::Slab { thickness: *thickness_mm }),
-        schema::Shape::Box { size_mm } => return Ok(Shape::Box { half: 0.5 * DVec3::from(*size_mm) }),
-        schema::Shape::Sphere { radius_mm } => return Ok(Shape::Sphere { radius: *radius_mm }),
-        schema::Shape::Mesh { path, longest_side_mm, normals } => {
+        ShapeEntry::HalfSpace {} => return Ok(Shape::HalfSpace),
+        ShapeEntry::Slab { thickness_mm } => return Ok(Shape::Slab { thickness: *thickness_mm }),
+        ShapeEntry::Box { size_mm } => return Ok(Shape::Box { half: 0.5 * DVec3::from(*size_mm) }),
+        ShapeEntry::Sphere { radius_mm } => return Ok(Shape::Sphere { radius: *radius_mm }),
+        ShapeEntry::Mesh { path, longest_side_mm, normals } => {
             load_obj(&resolve_path(&experiment.path, path), *longest_side_mm, smooth(normals))
         }
-        schema::Shape::Icosphere { radius_mm, subdivisions, normals } => {
+        ShapeEntry::Icosphere { radius_mm, subdivisions, normals } => {
             procedural::icosphere(*radius_mm, *subdivisions, smooth(normals))
         }
-        schema::Shape::BumpySphere { radius_mm, subdivisions, amplitude, wavenumber, normals } => {
+        ShapeEntry::BumpySphere { radius_mm, subdivisions, amplitude, wavenumber, normals } => {
             procedural::bumpy_sphere(*radius_mm, *subdivisions, *amplitude, *wavenumber, smooth(normals))
         }
-        schema::Shape::Torus { major_radius_mm, minor_radius_mm, segments, normals } => {
+        ShapeEntry::Torus { major_radius_mm, minor_radius_mm, segments, normals } => {
             procedural::torus(*major_radius_mm, *minor_radius_mm, *segments, smooth(normals))
         }
-        schema::Shape::CavitySphere { radius_mm, cavity_radius_mm, subdivisions, normals } => {
+        ShapeEntry::CavitySphere { radius_mm, cavity_radius_mm, subdivisions, normals } => {
             procedural::cavity_sphere(*radius_mm, *cavity_radius_mm, *subdivisions, smooth(normals))
         }
-        schema::Shape::DrilledBox { size_mm, holes, hole_fraction } => {
+        ShapeEntry::DrilledBox { size_mm, holes, hole_fraction } => {
             procedural::drilled_box(DVec3::from(*size_mm), *holes, *hole_fraction)
         }
     };
     mesh.map(Shape::Mesh)
-}
-
-fn sensor(words: &schema::Sensor, shape: &Shape) -> Result<Sensor> {
-    let screen = |resolution: &[usize; 2],
-                  origin: [f64; 3],
-                  view: DVec3,
-                  up: [f64; 3],
-                  pixel: f64,
-                  has_tiles: bool| {
-        let right = view.cross(DVec3::from(up)).normalize();
-        let down = view.cross(right);
-        let [width, height] = *resolution;
-        Screen {
-            width,
-            height,
-            origin: DVec3::from(origin),
-            right: pixel * right,
-            down: pixel * down,
-            view,
-            has_tiles,
-        }
-    };
-    Ok(match words {
-        schema::Sensor::Orthographic {
-            resolution,
-            center_mm,
-            toward,
-            up,
-            width_mm,
-            acceptance_sr,
-            tiles,
-        } => {
-            let pixel = width_mm / resolution[0] as f64;
-            let screen = screen(resolution, *center_mm, toward.unit(), *up, pixel, *tiles);
-            match (acceptance_sr, shape.bounds()) {
-                (None, _) => Sensor::Orthographic(before(shape, screen)),
-                (Some(solid_angle), Some(bounds)) => {
-                    Sensor::Accepting(Acceptance::new(screen, solid_angle / (2.0 * PI), bounds))
-                }
-                (Some(_), None) => {
-                    return Err(Error::input_help(
-                        "`acceptance_sr` needs a body of finite size",
-                        "leave it out, or measure the `flux` of a half_space or slab",
-                    ));
-                }
-            }
-        }
-        schema::Sensor::Perspective { resolution, position_mm, look_at_mm, up, fov_deg, tiles } => {
-            let view = (DVec3::from(*look_at_mm) - DVec3::from(*position_mm)).normalize();
-            let half = crate::math::tan(0.5 * fov_deg.to_radians());
-            let pixel = 2.0 * half / resolution[1] as f64;
-            Sensor::Perspective(screen(resolution, *position_mm, view, *up, pixel, *tiles))
-        }
-        schema::Sensor::Vertex { point_mm, toward, paths_per_pass } => Sensor::Vertex {
-            ray: Ray { origin: DVec3::from_array(*point_mm), dir: toward.unit() },
-            paths: *paths_per_pass,
-        },
-        schema::Sensor::Probe { point_mm, toward, paths_per_pass } => Sensor::Probe {
-            ray: Ray { origin: DVec3::from(*point_mm), dir: toward.unit() },
-            paths: *paths_per_pass,
-        },
-        schema::Sensor::Flux { bins, axis, paths_per_pass } => match shape.bounds() {
-            Some(bounds) => Sensor::BodyFlux {
-                bounds,
-                frame: Frame::about(resolve::unit(*axis)),
-                bins: *bins,
-                paths: *paths_per_pass,
-            },
-            None => Sensor::FaceFlux { faces: faces(shape), bins: *bins, paths: *paths_per_pass },
-        },
-        schema::Sensor::Rings { edges_mm, paths_per_pass } => {
-            if shape.bounds().is_some() {
-                return Err(Error::input_help(
-                    "the sensor `rings` looks at a plane without end",
-                    "use it with a half_space or a slab",
-                ));
-            }
-            Sensor::Rings(Rings {
-                reach: outside(shape),
-                edges: edges_mm.clone(),
-                paths: *paths_per_pass,
-            })
-        }
-    })
-}
-
-/// The same parallel rays from before the body: where they start does not change what they see, as long
-/// as none starts behind a part of the body. The plane is moved back along the view until the whole of
-/// it is beyond the bounding sphere, or on the viewer's side of a half-space or slab.
-fn before(shape: &Shape, screen: Screen) -> Screen {
-    let half_width = 0.5 * screen.width as f64 * screen.right;
-    let half_height = 0.5 * screen.height as f64 * screen.down;
-    let corners = [half_width + half_height, half_width - half_height];
-    let corners = corners.iter().flat_map(|c| [screen.origin + *c, screen.origin - *c]);
-    let back = match shape.bounds() {
-        // The plane is perpendicular to the view: one distance holds for all of it.
-        Some(bounds) => (screen.origin - bounds.center).dot(screen.view) + 2.0 * bounds.radius,
-        None => {
-            let thickness = if let Shape::Slab { thickness } = shape { *thickness } else { 0.0 };
-            let reach = half_width.length();
-            // Distance along the view to a height `reach` outside the face that is seen.
-            let needed = |corner: DVec3| match screen.view.z {
-                z if z < 0.0 => (reach - corner.z) / -z,
-                z if z > 0.0 => (reach + corner.z + thickness) / z,
-                _ => 0.0,
-            };
-            corners.map(needed).fold(0.0, f64::max)
-        }
-    };
-    Screen { origin: screen.origin - back.max(0.0) * screen.view, ..screen }
-}
-
-/// How far outside a half-space or slab rays start, mm: of the body's own size, so that scaled scenes are the same.
-fn outside(shape: &Shape) -> f64 {
-    if let Shape::Slab { thickness } = shape { *thickness } else { 1.0 }
-}
-
-fn faces(shape: &Shape) -> Vec<FluxFace> {
-    let thickness = if let Shape::Slab { thickness } = shape { *thickness } else { 0.0 };
-    let reach = outside(shape);
-    let top = FluxFace { name: "top", point: DVec3::ZERO, reach, frame: Frame::about(DVec3::Z) };
-    let point = DVec3::new(0.0, 0.0, -thickness);
-    let bottom = FluxFace { name: "bottom", point, reach, frame: Frame::about(-DVec3::Z) };
-    if thickness > 0.0 { vec![top, bottom] } else { vec![top] }
-}
-
-fn sensor_position(sensor: &Sensor) -> Option<DVec3> {
-    match sensor {
-        Sensor::Perspective(screen) => Some(screen.origin),
-        Sensor::Probe { ray, .. } => Some(ray.origin),
-        Sensor::Vertex { .. } => None,
-        Sensor::Orthographic(_)
-        | Sensor::Accepting(_)
-        | Sensor::FaceFlux { .. }
-        | Sensor::Rings(_)
-        | Sensor::BodyFlux { .. } => None,
-    }
 }

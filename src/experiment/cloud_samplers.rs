@@ -10,7 +10,7 @@ use crate::samplers::body::BodySurfaceSampler;
 use crate::samplers::lines::LineSampler;
 use crate::samplers::thinning::{ThinningSampler, View};
 use crate::sampling::radial::Radial;
-use crate::sampling::thinning::{Form, Rule};
+use crate::sampling::thinning::{ThinningForm, ThinningRule};
 
 /// Options of `body_surface`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -98,12 +98,14 @@ impl Thinning {
     /// The sampler.
     pub fn sampler(&self) -> ThinningSampler {
         let form = match &self.rule {
-            RuleWords::Exponential(sigma) => Form::Exponential { sigma: *sigma },
-            RuleWords::MeanOfExponentials(sigmas) => Form::MeanOfExponentials { sigmas: sigmas.clone() },
-            RuleWords::Floor([sigma, least]) => Form::Floor { sigma: *sigma, least: *least },
+            RuleWords::Exponential(sigma) => ThinningForm::Exponential { sigma: *sigma },
+            RuleWords::MeanOfExponentials(sigmas) => {
+                ThinningForm::MeanOfExponentials { sigmas: sigmas.clone() }
+            }
+            RuleWords::Floor([sigma, least]) => ThinningForm::Floor { sigma: *sigma, least: *least },
             RuleWords::Proportional([sigma, mean]) => {
                 let falloff = |d: f64| exp(-sigma * d) / (1.0 + d * d);
-                Form::proportional(falloff, 2.0 * self.radius_mm, *mean)
+                ThinningForm::proportional(falloff, 2.0 * self.radius_mm, *mean)
             }
         };
         let view = match self.view {
@@ -112,7 +114,7 @@ impl Thinning {
             ViewWords::Number => View::Number,
         };
         let by_tree = self.search == SearchWords::Hierarchy;
-        ThinningSampler::new(Rule::new(form), by_tree, view, self.points, self.radius_mm)
+        ThinningSampler::new(ThinningRule::new(form), by_tree, view, self.points, self.radius_mm)
     }
 }
 

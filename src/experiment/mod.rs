@@ -22,6 +22,9 @@ mod claim_words;
 /// Options of the samplers of clouds and bodies.
 pub mod cloud_samplers;
 
+/// Words for directions.
+mod direction;
+
 /// A TOML text as a tree with places.
 pub mod document;
 
@@ -49,7 +52,7 @@ pub mod point_cloud;
 /// The estimators and samplers that a program knows by name.
 pub mod registry;
 
-/// What entries mean: bands, unit directions, coefficients per band.
+/// What entries mean: bands, coefficients per band.
 pub mod resolve;
 
 /// Canonical content of cells and experiments.
@@ -72,6 +75,9 @@ pub mod schema;
 
 /// The JSON Schema of a file.
 pub mod schema_json;
+
+/// Words for sensors.
+mod sensor;
 
 /// Words for skin.
 mod skin;
@@ -98,7 +104,7 @@ pub use registry::{Registry, RegistryEntry};
 pub use sampler_file::SamplerExperiment;
 pub use sweep::resolve_path;
 
-use schema::{ExperimentFile, LightEntry, Object, Sensor};
+use schema::{ExperimentFile, LightEntry, Object, SensorEntry};
 
 /// A validated experiment.
 #[derive(Clone, Debug, PartialEq)]
@@ -138,7 +144,7 @@ pub struct CellSpec {
     /// The body.
     pub object: Object,
     /// What is measured.
-    pub sensor: Sensor,
+    pub sensor: SensorEntry,
     /// The lights.
     pub light: Vec<LightEntry>,
     /// The columns of the rows that the cell took, as texts; where two axes have a column of one

@@ -1,7 +1,6 @@
-//! What the entries of a file mean: values per band, unit directions, coefficients.
+//! What the entries of a file mean: values per band, coefficients.
 
-use super::schema::{Bands, Coefficients, Direction, Eta, EtaFormula, Medium, Spectrum};
-use crate::math::{DVec3, cos, sin};
+use super::schema::{Bands, Coefficients, Eta, EtaFormula, MediumEntry, Spectrum};
 use crate::optics::colour::{self, BandColours};
 use crate::optics::dispersion::{self, Dispersion};
 use crate::optics::materials;
@@ -79,27 +78,6 @@ impl Spectrum {
     }
 }
 
-impl Direction {
-    /// The unit vector; not finite for a vector of length 0.
-    pub fn unit(&self) -> DVec3 {
-        match self {
-            Direction::Vector(v) => unit(*v),
-            Direction::Polar(polar) => {
-                let sin_z = (1.0 - polar.cos_z * polar.cos_z).max(0.0).sqrt();
-                let azimuth = polar.azimuth_deg * (std::f64::consts::PI / 180.0);
-                DVec3::new(sin_z * cos(azimuth), sin_z * sin(azimuth), polar.cos_z)
-            }
-        }
-    }
-}
-
-/// The unit vector along `v`; not finite for length 0. Scaled first, so that no square overflows.
-pub fn unit(v: [f64; 3]) -> DVec3 {
-    let v = DVec3::from_array(v);
-    let v = v / v.abs().max_element();
-    v / v.dot(v).sqrt()
-}
-
 impl Eta {
     /// The index in each band, at the middle wavelength of the band where it disperses.
     ///
@@ -139,13 +117,13 @@ pub fn eta_materials() -> Vec<&'static str> {
     materials::names().into_iter().chain(dispersion::GLASSES.iter().map(|glass| glass.name)).collect()
 }
 
-impl Medium {
+impl MediumEntry {
     /// The coefficients in each band; none where a name is unknown, no pair is whole, or wavelengths are needed and
     /// missing.
     pub fn per_band(&self, bands: &[Band]) -> Option<Vec<BandMedium>> {
         match self {
-            Medium::Coefficients(coefficients) => coefficients.per_band(bands.len()),
-            Medium::Skin(words) => {
+            MediumEntry::Coefficients(coefficients) => coefficients.per_band(bands.len()),
+            MediumEntry::Skin(words) => {
                 let g = words.g.unwrap_or(0.0);
                 let band = |band: &Band| {
                     let (sigma_a, reduced) = Skin::from(words).band(band.range_nm?);
@@ -153,7 +131,7 @@ impl Medium {
                 };
                 bands.iter().map(band).collect()
             }
-            Medium::Preset { name, scale, g } => {
+            MediumEntry::Preset { name, scale, g } => {
                 let material = materials::find(name)?;
                 let g = g.unwrap_or(0.0);
                 let band = |(s, a): (&f64, &f64)| BandMedium {
@@ -219,19 +197,11 @@ mod tests {
         };
         let two = Bands::Rgb {}.list()[..2].to_vec();
         for coefficients in [total, parts, reduced] {
-            assert_eq!(Medium::Coefficients(coefficients).per_band(&two), Some(expected.clone()));
+            assert_eq!(MediumEntry::Coefficients(coefficients).per_band(&two), Some(expected.clone()));
         }
         assert_eq!(none.per_band(2), None);
-        let preset = Medium::Preset { name: "skin1".into(), scale: 2.0, g: Some(0.5) };
+        let preset = MediumEntry::Preset { name: "skin1".into(), scale: 2.0, g: Some(0.5) };
         let red = preset.per_band(&Bands::Rgb {}.list()).unwrap()[0];
         assert_eq!(red, BandMedium { sigma_a: 0.064, sigma_s: 2.96, g: 0.5 });
-    }
-
-    #[test]
-    fn directions_have_unit_length() {
-        let polar = Direction::Polar(super::super::schema::Polar { cos_z: 0.6, azimuth_deg: 90.0 });
-        assert!((polar.unit() - DVec3::new(0.0, 0.8, 0.6)).abs().max_element() < 1e-15);
-        assert_eq!(unit([0.0, 3e200, 4e200]), DVec3::new(0.0, 0.6, 0.8));
-        assert!(!unit([0.0; 3]).is_finite());
     }
 }

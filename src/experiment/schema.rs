@@ -9,8 +9,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use super::claim_words::{Agree, ClaimEntry, Differs, Equals, Expect, Reproduces};
+pub use super::direction::{Direction, Polar};
 pub use super::duel::{CONTROL, CostMeasure, Duel, Faster, NotSlower};
 use super::picture::PictureEntry;
+pub use super::sensor::SensorEntry;
 pub use super::skin::SkinFractions;
 
 /// One experiment.
@@ -36,7 +38,7 @@ pub struct ExperimentFile {
     /// The body.
     pub object: Object,
     /// What is measured.
-    pub sensor: Sensor,
+    pub sensor: SensorEntry,
     /// The lights, all shining at once.
     #[schemars(length(min = 1))]
     pub light: Vec<LightEntry>,
@@ -115,43 +117,22 @@ pub enum Spectrum {
     PerBand(Vec<f64>),
 }
 
-/// A direction: a vector of any length, or its cosine to +z and its azimuth about it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Direction {
-    /// x, y, z; normalised when read.
-    Vector([f64; 3]),
-    /// Spherical.
-    Polar(Polar),
-}
-
-/// A direction by its cosine to +z.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Polar {
-    /// Cosine to the +z axis.
-    #[schemars(range(min = -1.0, max = 1.0))]
-    pub cos_z: f64,
-    /// Angle from +x towards +y, degrees.
-    pub azimuth_deg: f64,
-}
-
 /// The body: a shape, its boundary, the medium in it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Object {
     /// Geometry.
-    pub shape: Shape,
+    pub shape: ShapeEntry,
     /// The refractive surface.
-    pub boundary: Boundary,
+    pub boundary: BoundaryEntry,
     /// The homogeneous medium inside.
-    pub medium: Medium,
+    pub medium: MediumEntry,
 }
 
 /// Geometry, mm. Bodies stand at the origin; the top face of `half_space` and `slab` is z = 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Shape {
+pub enum ShapeEntry {
     /// Everything below z = 0.
     HalfSpace {},
     /// -thickness <= z <= 0.
@@ -181,7 +162,7 @@ pub enum Shape {
         #[schemars(extend("exclusiveMinimum" = 0))]
         longest_side_mm: Option<f64>,
         /// Which normal the boundary sees.
-        normals: Normals,
+        normals: NormalsEntry,
     },
     /// A sphere of 20 * 4^subdivisions triangles.
     Icosphere {
@@ -192,7 +173,7 @@ pub enum Shape {
         #[schemars(range(min = 0, max = 9))]
         subdivisions: u32,
         /// Which normal the boundary sees.
-        normals: Normals,
+        normals: NormalsEntry,
     },
     /// A sphere displaced along its radius by amplitude * sin(kx) sin(ky) sin(kz) of the unit vector.
     BumpySphere {
@@ -209,7 +190,7 @@ pub enum Shape {
         #[schemars(range(min = 0.0, max = 1000.0))]
         wavenumber: f64,
         /// Which normal the boundary sees.
-        normals: Normals,
+        normals: NormalsEntry,
     },
     /// A torus about the z axis.
     Torus {
@@ -223,7 +204,7 @@ pub enum Shape {
         #[schemars(inner(range(min = 3, max = 4096)))]
         segments: [u32; 2],
         /// Which normal the boundary sees.
-        normals: Normals,
+        normals: NormalsEntry,
     },
     /// A sphere with a concentric empty cavity.
     CavitySphere {
@@ -237,7 +218,7 @@ pub enum Shape {
         #[schemars(range(min = 0, max = 9))]
         subdivisions: u32,
         /// Which normal the boundary sees.
-        normals: Normals,
+        normals: NormalsEntry,
     },
     /// A box with square holes through it along z.
     DrilledBox {
@@ -255,7 +236,7 @@ pub enum Shape {
 /// Which normal the boundary of a mesh sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Normals {
+pub enum NormalsEntry {
     /// The triangle's own.
     Flat,
     /// Interpolated between vertex normals (the file's, or else angle-weighted).
@@ -265,7 +246,7 @@ pub enum Normals {
 /// The refractive surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Boundary {
+pub enum BoundaryEntry {
     /// A smooth dielectric.
     Smooth {
         /// Refractive index inside over outside.
@@ -336,7 +317,7 @@ pub enum EtaFormula {
 /// The medium.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Medium {
+pub enum MediumEntry {
     /// Explicit coefficients.
     Coefficients(Coefficients),
     /// A built-in measured material (`scatterproof list`), rgb bands only.
@@ -377,116 +358,6 @@ pub struct Coefficients {
     pub reduced_sigma_s_per_mm: Option<Spectrum>,
     /// Mean cosine of the Henyey-Greenstein phase function, -1 < g < 1; 0 is isotropic.
     pub g: Spectrum,
-}
-
-/// What is measured. Light that reaches the sensor without meeting the body is not scored.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Sensor {
-    /// Parallel rays: radiance per pixel, box filter.
-    Orthographic {
-        /// Columns and rows.
-        #[schemars(inner(range(min = 1, max = 16384)))]
-        resolution: [usize; 2],
-        /// A point in the middle of the image, mm; its place along the view matters only with
-        /// `acceptance_sr`, which makes the image sharp there.
-        center_mm: [f64; 3],
-        /// Direction of the rays.
-        toward: Direction,
-        /// Points up in the image.
-        up: [f64; 3],
-        /// Width of the image plane, mm; the height follows from square pixels.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        width_mm: f64,
-        /// Solid angle of the cap of directions about the view from which a pixel accepts light, sr: its
-        /// value is the mean radiance over pixel and cap, weighed by the cosine to the view. One
-        /// direction without it. For bodies of finite size.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = std::f64::consts::TAU))]
-        acceptance_sr: Option<f64>,
-        /// Whether the means of 4 by 4 tiles are observables too, for claims on parts of the image.
-        #[serde(default = "yes", skip_serializing_if = "is_true")]
-        tiles: bool,
-    },
-    /// A pinhole: radiance per pixel, box filter.
-    Perspective {
-        /// Columns and rows.
-        #[schemars(inner(range(min = 1, max = 16384)))]
-        resolution: [usize; 2],
-        /// The pinhole, mm; outside the body.
-        position_mm: [f64; 3],
-        /// The point at the middle of the image, mm.
-        look_at_mm: [f64; 3],
-        /// Points up in the image.
-        up: [f64; 3],
-        /// Vertical opening angle, degrees.
-        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 180))]
-        fov_deg: f64,
-        /// Whether the means of 4 by 4 tiles are observables too, for claims on parts of the image.
-        #[serde(default = "yes", skip_serializing_if = "is_true")]
-        tiles: bool,
-    },
-    /// Radiance along one ray.
-    Probe {
-        /// Its origin, mm; outside the body.
-        point_mm: [f64; 3],
-        /// Its direction.
-        toward: Direction,
-        /// Independent paths whose mean is one pass.
-        #[serde(default = "default_paths_per_pass")]
-        #[schemars(range(min = 1, max = 1048576))]
-        paths_per_pass: usize,
-    },
-    /// Radiance that arrives at a medium vertex: for estimators of a path's last segments.
-    Vertex {
-        /// The vertex, mm; inside the body.
-        point_mm: [f64; 3],
-        /// Direction of travel of the path that arrives there.
-        toward: Direction,
-        /// Independent paths whose mean is one pass.
-        #[serde(default = "default_paths_per_pass")]
-        #[schemars(range(min = 1, max = 1048576))]
-        paths_per_pass: usize,
-    },
-    /// Flux that leaves the body, by bins of the cosine between exit direction and axis.
-    /// `half_space` and `slab`: radiant exitance per face, observables `top_i`, `bottom_i` (W/mm^2).
-    /// Other shapes: flux of the whole body, observables `flux_i` (W).
-    Flux {
-        /// Number of bins: of equal width in the cosine, over 0..1 on each face, over -1..1 else.
-        #[schemars(range(min = 1, max = 1024))]
-        bins: usize,
-        /// Axis of the cosine; +z on `half_space` and `slab` (the outward normal of each face).
-        axis: [f64; 3],
-        /// Independent paths per bin whose mean is one pass.
-        #[serde(default = "default_paths_per_pass")]
-        #[schemars(range(min = 1, max = 1048576))]
-        paths_per_pass: usize,
-    },
-    /// Radiant exitance of a `half_space` or `slab` by how far from the exit its light came in.
-    ///
-    /// Of the top face, W/mm^2; the distance is taken along the face. Observables `ring_i`, and `all` of every ring and
-    /// beyond.
-    Rings {
-        /// Edges of the rings, mm, increasing from 0 or more.
-        #[schemars(length(min = 2, max = 1025))]
-        edges_mm: Vec<f64>,
-        /// Independent paths whose mean is one pass.
-        #[serde(default = "default_paths_per_pass")]
-        #[schemars(range(min = 1, max = 1048576))]
-        paths_per_pass: usize,
-    },
-}
-
-fn yes() -> bool {
-    true
-}
-
-fn is_true(value: &bool) -> bool {
-    *value
-}
-
-fn default_paths_per_pass() -> usize {
-    1024
 }
 
 /// One light: an optional name and exactly one kind.

@@ -5,7 +5,7 @@ use super::{Hit, Ray, Shape, Side};
 use crate::math::DVec3;
 
 /// A source of uniform numbers in [0, 1).
-pub type Source<'a> = &'a mut dyn FnMut() -> f64;
+pub type Uniforms<'a> = &'a mut dyn FnMut() -> f64;
 
 /// What [`audit_aim`] found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,7 +39,7 @@ pub const PROBE: u64 = 16;
 ///
 /// # Panics
 /// If the shape is unbounded.
-pub fn audit_aim(shape: &Shape, rays: u64, u: Source) -> AimAudit {
+pub fn audit_aim(shape: &Shape, rays: u64, u: Uniforms) -> AimAudit {
     let mut audit = AimAudit { rays, lost: 0 };
     for i in 0..rays {
         let origin = interior_point(shape, u);
@@ -62,7 +62,7 @@ pub fn audit_aim(shape: &Shape, rays: u64, u: Source) -> AimAudit {
 /// volume, in random directions, by flights from 1e-9 of the body's size to unbounded ones.
 ///
 /// In an unbounded shape a flight that meets nothing is lost only if it heads for a face.
-pub fn audit_walk(shape: &Shape, segments: u64, u: Source) -> WalkAudit {
+pub fn audit_walk(shape: &Shape, segments: u64, u: Uniforms) -> WalkAudit {
     let mut audit = WalkAudit { segments, ..WalkAudit::default() };
     let size = shape.bounds().map_or(1.0, |bounds| bounds.radius);
     let mut ray = Ray { origin: interior_point(shape, u), dir: direction(u) };
@@ -96,7 +96,7 @@ pub fn audit_walk(shape: &Shape, segments: u64, u: Source) -> WalkAudit {
 }
 
 /// A point inside, by rejection from the bounding sphere; near the origin of an unbounded shape.
-pub fn interior_point(shape: &Shape, u: Source) -> DVec3 {
+pub fn interior_point(shape: &Shape, u: Uniforms) -> DVec3 {
     match (*shape).bounds() {
         Some(bounds) => loop {
             let cube = DVec3::new(u(), u(), u()) * 2.0 - 1.0;
@@ -113,7 +113,7 @@ pub fn interior_point(shape: &Shape, u: Source) -> DVec3 {
 }
 
 /// A uniform direction: a point of the unit ball, by rejection, put onto its sphere.
-pub fn direction(u: Source) -> DVec3 {
+pub fn direction(u: Uniforms) -> DVec3 {
     loop {
         let cube = DVec3::new(u(), u(), u()) * 2.0 - 1.0;
         let length2 = cube.length_squared();
@@ -124,7 +124,7 @@ pub fn direction(u: Source) -> DVec3 {
 }
 
 /// A uniform direction with `dir . normal < 0`.
-pub fn inward(normal: DVec3, u: Source) -> DVec3 {
+pub fn inward(normal: DVec3, u: Uniforms) -> DVec3 {
     loop {
         let dir = direction(u);
         if dir.dot(normal) < 0.0 {
@@ -139,7 +139,7 @@ fn decades(x: f64) -> f64 {
     (0..whole as u32).fold(1.0, |power, _| 0.1 * power) * (1.0 - 0.9 * (x - whole))
 }
 
-fn pick(n: usize, u: Source) -> usize {
+fn pick(n: usize, u: Uniforms) -> usize {
     (u() * n as f64) as usize
 }
 

@@ -8,7 +8,7 @@
 //! go axis by axis (Saito, Toriwaki, "New algorithms for Euclidean distance transformation of an
 //! n-dimensional digitized picture", Pattern Recognition 27(11), 1994).
 
-use super::tree::{Frame, PAD};
+use super::tree::{MeshFrame, PAD};
 use crate::math::DVec3;
 
 /// Edge of a voxel, units of the frame: 64 voxels along the longest side.
@@ -30,7 +30,7 @@ pub struct Clearance {
 impl Clearance {
     /// The grid of a mesh with the box (`min`, `max`), mm, around its triangles.
     pub fn new<'a>(
-        frame: &Frame,
+        frame: &MeshFrame,
         (min, max): (DVec3, DVec3),
         triangles: impl Iterator<Item = &'a [DVec3; 3]>,
     ) -> Clearance {

@@ -2,7 +2,7 @@
 
 use super::clearance::Clearance;
 use super::normals::Normals;
-use super::tree::{Frame, Tree};
+use super::tree::{BoxTree, MeshFrame};
 use super::triangle::{self, Crossing, Sheared};
 use super::{BoundingSphere, FaceId, Hit, Ray, Side, topology};
 use crate::error::Result;
@@ -17,7 +17,7 @@ pub struct Mesh {
     /// What shading normals are interpolated from; none for flat shading.
     normals: Option<Normals>,
     bounds: BoundingSphere,
-    tree: Tree,
+    tree: BoxTree,
     /// The triangles in the tree's order, their corners at hand.
     leaves: Vec<Leaf>,
     clearance: Clearance,
@@ -103,10 +103,10 @@ impl Mesh {
         let normals = interpolated
             .then(|| normals.unwrap_or_else(|| Normals::angle_weighted(&vertices, &triangles)));
         let corners = |t: &[u32; 3]| t.map(|i| vertices[i as usize]);
-        let extent = extent(vertices.iter().copied());
-        let frame = Frame::new(extent.0, extent.1);
-        let boxes = triangles.iter().map(|t| self::extent(corners(t).into_iter()));
-        let tree = Tree::new(frame, boxes)?;
+        let extent = super::extent(vertices.iter().copied());
+        let frame = MeshFrame::new(extent.0, extent.1);
+        let boxes = triangles.iter().map(|t| super::extent(corners(t).into_iter()));
+        let tree = BoxTree::new(frame, boxes)?;
         let leaves: Vec<Leaf> = tree
             .order()
             .iter()
@@ -268,12 +268,6 @@ impl Mesh {
         let shading_normal = smooth.unwrap_or(normal);
         Hit { t, point, normal, shading_normal, face: FaceId(face) }
     }
-}
-
-/// Least and greatest coordinates of points.
-pub fn extent(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
-    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    points.fold(empty, |(min, max), point| (min.min(point), max.max(point)))
 }
 
 /// About the middle of the box; the radius is rounded up so that it holds every vertex.

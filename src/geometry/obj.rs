@@ -5,8 +5,7 @@ use std::path::Path;
 
 use tobj::LoadOptions;
 
-use super::mesh::extent;
-use super::{Mesh, Normals};
+use super::{Mesh, Normals, extent};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 

@@ -9,12 +9,12 @@ use crate::math::{DVec3, cos, sin};
 
 /// Vertices and triangles on the way to a mesh.
 #[derive(Default)]
-struct Parts {
+struct MeshParts {
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl Parts {
+impl MeshParts {
     /// Two triangles for a quadrilateral that turns counter-clockwise seen from outside.
     fn quad(&mut self, [a, b, c, d]: [u32; 4]) {
         self.triangles.extend([[a, b, c], [a, c, d]]);
@@ -32,9 +32,9 @@ impl Parts {
 /// # Errors
 /// As [`Mesh::new`].
 pub fn icosphere(radius: f64, subdivisions: u32, interpolated: bool) -> Result<Mesh> {
-    let Parts { vertices: normals, triangles } = unit_icosphere(subdivisions);
+    let MeshParts { vertices: normals, triangles } = unit_icosphere(subdivisions);
     let vertices = normals.iter().map(|&n| n * radius).collect();
-    Parts { vertices, triangles }.into_mesh(Some(normals), interpolated)
+    MeshParts { vertices, triangles }.into_mesh(Some(normals), interpolated)
 }
 
 /// An icosphere displaced along its radius: a unit vector n goes to
@@ -49,13 +49,13 @@ pub fn bumpy_sphere(
     wavenumber: f64,
     interpolated: bool,
 ) -> Result<Mesh> {
-    let Parts { vertices, triangles } = unit_icosphere(subdivisions);
+    let MeshParts { vertices, triangles } = unit_icosphere(subdivisions);
     let displaced = |n: DVec3| {
         let [x, y, z] = (n * wavenumber).to_array().map(sin);
         n * (radius * (1.0 + amplitude * x * y * z))
     };
     let vertices = vertices.into_iter().map(displaced).collect();
-    Parts { vertices, triangles }.into_mesh(None, interpolated)
+    MeshParts { vertices, triangles }.into_mesh(None, interpolated)
 }
 
 /// A sphere with a concentric empty cavity, both icospheres of the same subdivisions.
@@ -68,14 +68,14 @@ pub fn cavity_sphere(
     subdivisions: u32,
     interpolated: bool,
 ) -> Result<Mesh> {
-    let Parts { vertices: n, triangles } = unit_icosphere(subdivisions);
+    let MeshParts { vertices: n, triangles } = unit_icosphere(subdivisions);
     let scaled = |r: f64| n.iter().map(move |&n| n * r);
     let count = n.len() as u32;
     let facing_in = triangles.iter().map(|&[a, b, c]| [a + count, c + count, b + count]);
     let vertices = scaled(radius).chain(scaled(cavity_radius)).collect();
     let triangles = triangles.iter().copied().chain(facing_in).collect();
     let normals = scaled(1.0).chain(scaled(-1.0)).collect();
-    Parts { vertices, triangles }.into_mesh(Some(normals), interpolated)
+    MeshParts { vertices, triangles }.into_mesh(Some(normals), interpolated)
 }
 
 /// A torus about the z axis: a ring of radius `major`, a tube of radius `minor`, with the numbers
@@ -90,7 +90,7 @@ pub fn torus(major: f64, minor: f64, segments: [u32; 2], interpolated: bool) -> 
         (0..n).map(|i| (cos(angle(i)), sin(angle(i)))).collect()
     };
     let (ring_points, tube_points) = (circle(ring), circle(tube));
-    let mut parts = Parts::default();
+    let mut parts = MeshParts::default();
     let mut normals = Vec::new();
     for &(cos_phi, sin_phi) in &ring_points {
         for &(cos_theta, sin_theta) in &tube_points {
@@ -127,7 +127,7 @@ pub fn drilled_box(size: DVec3, holes: [u32; 2], hole_fraction: f64) -> Result<M
     let x = lines(size.x, pitch[0], holes[0]);
     let y = lines(size.y, pitch[1], holes[1]);
     let at = |i: usize, j: usize, top: bool| (2 * (i * y.len() + j) + usize::from(top)) as u32;
-    let mut parts = Parts::default();
+    let mut parts = MeshParts::default();
     for &x in &x {
         for &y in &y {
             parts.vertices.extend([-0.5, 0.5].map(|z| DVec3::new(x, y, z * size.z)));
@@ -167,7 +167,7 @@ pub fn drilled_box(size: DVec3, holes: [u32; 2], hole_fraction: f64) -> Result<M
 }
 
 /// The icosahedron, each triangle cut into four at its sides' middles, put onto the unit sphere.
-fn unit_icosphere(subdivisions: u32) -> Parts {
+fn unit_icosphere(subdivisions: u32) -> MeshParts {
     let golden = 0.5 * (1.0 + 5.0f64.sqrt());
     let corner = |axis: usize, one: f64, phi: f64| {
         let mut v = DVec3::ZERO;
@@ -183,7 +183,7 @@ fn unit_icosphere(subdivisions: u32) -> Parts {
         [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9],
         [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1],
     ];
-    let mut parts = Parts { vertices, triangles };
+    let mut parts = MeshParts { vertices, triangles };
     for _ in 0..subdivisions {
         let mut middles = HashMap::new();
         let mut finer = Vec::with_capacity(4 * parts.triangles.len());

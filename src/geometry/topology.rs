@@ -1,9 +1,8 @@
 //! What makes triangles the boundary of a body: closed, consistently oriented, a 2-manifold, and
 //! not inside out.
 
-use super::mesh::extent;
 use super::triangle::Sheared;
-use super::{Ray, Side};
+use super::{Ray, Side, extent};
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::DVec3;
 
@@ -16,7 +15,7 @@ const NAMED: usize = 3;
 /// Findings with counts and the first few positions. Later checks need what earlier ones assure, so
 /// they run in stages: data, then edges and vertices, then orientation of whole components.
 pub fn check(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<()> {
-    let mesh = Surface { vertices, triangles };
+    let mesh = TriangleSoup { vertices, triangles };
     report(mesh.data())?;
     let edges = mesh.edges();
     report(mesh.edge_findings(&edges))?;
@@ -28,7 +27,7 @@ fn report(findings: Vec<Diagnostic>) -> Result<()> {
     if findings.is_empty() { Ok(()) } else { Err(Error::Input(findings)) }
 }
 
-struct Surface<'a> {
+struct TriangleSoup<'a> {
     vertices: &'a [DVec3],
     triangles: &'a [[u32; 3]],
 }
@@ -48,7 +47,7 @@ impl Edge {
     }
 }
 
-impl Surface<'_> {
+impl TriangleSoup<'_> {
     fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.triangles[triangle].map(|i| self.vertices[i as usize])
     }

@@ -53,7 +53,7 @@ const MAX_DEPTH: usize = 32;
 
 /// The normalised units.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame {
+pub struct MeshFrame {
     center: DVec3,
     /// Units per mm, a power of two.
     pub scale: f64,
@@ -61,13 +61,13 @@ pub struct Frame {
     radius: f64,
 }
 
-impl Frame {
+impl MeshFrame {
     /// The frame of an axis-aligned box, mm. Its longest side must be a normal number.
-    pub fn new(min: DVec3, max: DVec3) -> Frame {
+    pub fn new(min: DVec3, max: DVec3) -> MeshFrame {
         let size = max - min;
         let exponent = (size.max_element().to_bits() >> 52) as i64 - 1023;
         let scale = f64::from_bits(((1023 + 10 - exponent) as u64) << 52);
-        Frame { center: (min + max) * 0.5, scale, radius: (size * (0.5 * scale)).length() }
+        MeshFrame { center: (min + max) * 0.5, scale, radius: (size * (0.5 * scale)).length() }
     }
 
     /// A point in units of the frame.
@@ -126,18 +126,18 @@ fn round_up(x: f64) -> f32 {
 
 /// The tree over the boxes of a mesh's triangles.
 #[derive(Clone, Debug)]
-pub struct Tree {
+pub struct BoxTree {
     /// The units that the tree lives in.
-    pub frame: Frame,
+    pub frame: MeshFrame,
     bvh: CwBvh,
 }
 
-impl Tree {
+impl BoxTree {
     /// Builds the tree over boxes (least and greatest corner, mm).
     ///
     /// # Errors
     /// If it gets too deep to be traversed.
-    pub fn new(frame: Frame, boxes: impl Iterator<Item = (DVec3, DVec3)>) -> Result<Tree> {
+    pub fn new(frame: MeshFrame, boxes: impl Iterator<Item = (DVec3, DVec3)>) -> Result<BoxTree> {
         let corner = |point: DVec3, pad: f64| (frame.place(point) + pad).as_vec3().into();
         let boxes: Vec<Aabb> =
             boxes.map(|(min, max)| Aabb::new(corner(min, -PAD), corner(max, PAD))).collect();
@@ -147,7 +147,7 @@ impl Tree {
             let rule = format!("the mesh needs a search tree of {depth} levels, of {MAX_DEPTH} at most");
             return Err(Error::input_help(rule, "remesh it: its triangles differ too much in size"));
         }
-        Ok(Tree { frame, bvh })
+        Ok(BoxTree { frame, bvh })
     }
 
     /// Slot -> box: the order in which a visit finds neighbours close in memory.
@@ -185,8 +185,8 @@ mod tests {
     fn depth_counts_levels() {
         let row = |count: usize| {
             let boxes = (0..count).map(|i| (DVec3::splat(i as f64), DVec3::splat(i as f64 + 1.0)));
-            let frame = Frame::new(DVec3::ZERO, DVec3::splat(count as f64));
-            depth(&Tree::new(frame, boxes).expect("shallow").bvh)
+            let frame = MeshFrame::new(DVec3::ZERO, DVec3::splat(count as f64));
+            depth(&BoxTree::new(frame, boxes).expect("shallow").bvh)
         };
         assert_eq!(row(1), 1);
         // Eight children of three boxes at most.
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn the_longest_side_is_1024_to_2048_units() {
         for side in [1e-60, 0.3, 1.0, 1.0f64.next_down(), 7.0, 1e60] {
-            let frame = Frame::new(DVec3::ZERO, DVec3::new(0.5 * side, side, 0.0));
+            let frame = MeshFrame::new(DVec3::ZERO, DVec3::new(0.5 * side, side, 0.0));
             let length = side * frame.scale;
             assert!((1024.0..2048.0).contains(&length), "{side} {length}");
             assert_eq!(frame.scale.to_bits() << 12, 0, "a power of two");

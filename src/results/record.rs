@@ -86,8 +86,48 @@ pub struct Cell {
     pub axes: BTreeMap<String, String>,
     /// blake3 of the cell's physics in canonical form, hex.
     pub content_hash: String,
+    /// The regions of the sensor, after which observables are named.
+    pub regions: Vec<ObservedRegion>,
     /// What each estimator measured here.
     pub runs: Vec<EstimatorRun>,
+}
+
+impl Cell {
+    /// The region that an observable measures with all lights together; none for one light's share of a region.
+    pub fn region_of(&self, observable: &Observable) -> Option<&ObservedRegion> {
+        self.regions.iter().find(|region| region.name == observable.name)
+    }
+}
+
+/// A region of a sensor.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObservedRegion {
+    /// The name of its observables; that of one light's share has `@light` appended.
+    pub name: String,
+    /// Which part of an image it is the mean of; none where that is the whole, or where there is no image.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tile: Option<Tile>,
+}
+
+/// A rectangle of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tile {
+    /// First column, and the one after the last.
+    pub columns: [usize; 2],
+    /// First row, and the one after the last.
+    pub rows: [usize; 2],
+}
+
+impl ObservedRegion {
+    /// The indices of its pixels, row by row, in an image of this size.
+    pub fn pixels(&self, width: usize, height: usize) -> Vec<usize> {
+        let whole = Tile { columns: [0, width], rows: [0, height] };
+        let Tile { columns, rows } = self.tile.unwrap_or(whole);
+        let row = |row: usize| (columns[0]..columns[1]).map(move |column| row * width + column);
+        (rows[0]..rows[1]).flat_map(row).collect()
+    }
 }
 
 /// One estimator's measurement of one cell.

@@ -24,6 +24,7 @@ pub fn stored(noise: f64) -> Stored {
         label: "smooth".into(),
         axes: BTreeMap::from([("boundary".into(), "smooth".into())]),
         content_hash: "c0".into(),
+        regions: vec![ObservedRegion { name: "mean".into(), tile: None }],
         runs,
     };
     let record = Record {

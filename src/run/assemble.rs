@@ -15,10 +15,11 @@ use crate::results::json::hash_json;
 use crate::results::npy::Array;
 use crate::results::provenance::fingerprint;
 use crate::results::record::{
-    Bias, Cell, EstimatorRun, HeavyTail, Image, Record, Replay, SCHEMA_VERSION,
+    Bias, Cell, EstimatorRun, HeavyTail, Image, ObservedRegion, Record, Replay, SCHEMA_VERSION, Tile,
 };
 use crate::results::store::{Arrays, costs_path, observables_path, pixels_path, spread_path};
 use crate::results::timing::{self, Timing};
+use crate::scene::sensor::{PixelRectangle, SensorRegion};
 
 /// A record before it is written.
 pub struct Assembled {
@@ -44,13 +45,14 @@ pub fn assemble(
 ) -> Result<Assembled> {
     let mut arrays = Arrays::new();
     let mut timing = Timing::default();
-    let empty = |cell: &crate::experiment::CellSpec| Cell {
+    let empty = |(index, cell): (usize, &crate::experiment::CellSpec)| Cell {
         label: cell.label.clone(),
         axes: cell.axes.clone(),
         content_hash: hash_json(&cell.content()),
+        regions: plan.jobs.iter().find(|job| job.cell == index).map_or_else(Vec::new, regions),
         runs: Vec::new(),
     };
-    let mut cells: Vec<Cell> = experiment.cells.iter().map(empty).collect();
+    let mut cells: Vec<Cell> = experiment.cells.iter().enumerate().map(empty).collect();
     let mut post_hoc = BTreeSet::new();
     for (job, block) in plan.jobs.iter().zip(finished) {
         let late = (0..job.claims.len()).filter(|&i| !block.origin.claims.contains(&job.claims[i]));
@@ -87,6 +89,16 @@ pub fn assemble(
         checksums: BTreeMap::new(),
     };
     Ok(Assembled { record, arrays, timing })
+}
+
+/// The regions of the sensor of a job's cell.
+fn regions(job: &Job) -> Vec<ObservedRegion> {
+    let tile = |PixelRectangle { columns, rows }: PixelRectangle| Tile { columns, rows };
+    let region = |region: &SensorRegion| ObservedRegion {
+        name: region.name.clone(),
+        tile: region.tile.map(tile),
+    };
+    job.layout.regions().iter().map(region).collect()
 }
 
 /// CPU time by batch.

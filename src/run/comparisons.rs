@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
-use crate::experiment::schema::{Agree, ClaimEntry, CostMeasure, Differs, Duel, Equals, Sensor};
+use crate::experiment::schema::{Agree, ClaimEntry, CostMeasure, Differs, Duel, Equals};
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::record::{self, Against, Band, Comparison, Observable, Quantity};
 
@@ -158,17 +158,11 @@ impl Scope<'_> {
                 self.experiment.cells[cell].label
             )
         };
-        match self.experiment.cells[cell].sensor {
-            Sensor::Orthographic { .. } | Sensor::Perspective { .. } => {}
-            Sensor::Probe { .. }
-            | Sensor::Vertex { .. }
-            | Sensor::Flux { .. }
-            | Sensor::Rings { .. } => {
-                return Err(Error::input_help(
-                    format!("{}, whose sensor has none", place()),
-                    "leave `observable` out, or take an `orthographic` or a `perspective` sensor",
-                ));
-            }
+        if !self.experiment.cells[cell].sensor.has_pixels() {
+            return Err(Error::input_help(
+                format!("{}, whose sensor has none", place()),
+                "leave `observable` out, or take an `orthographic` or a `perspective` sensor",
+            ));
         }
         match duel.class.as_deref() {
             None | Some("all") => Ok(Observable::pixels()),

@@ -11,7 +11,7 @@
 use super::{Axis, Discrete, Draw, Null, Piece, Sampler};
 use crate::math::{DVec3, integrate, sin_cos_turns};
 use crate::sampling::stream::Stream;
-use crate::sampling::thinning::{Accepted, PointTree, Rule, Work, scan};
+use crate::sampling::thinning::{Accepted, PointTree, ThinningRule, ThinningWork, scan};
 use crate::sampling::warp::square_to_cap;
 
 /// What of a query is looked at.
@@ -28,7 +28,7 @@ pub enum View {
 /// Queries of one cloud by one rule.
 pub struct ThinningSampler {
     tree: PointTree,
-    rule: Rule,
+    rule: ThinningRule,
     by_tree: bool,
     view: View,
     diameter: f64,
@@ -44,7 +44,13 @@ const RARE: f64 = 1e-5;
 
 impl ThinningSampler {
     /// `count` points on a sphere of radius `radius` mm.
-    pub fn new(rule: Rule, by_tree: bool, view: View, count: usize, radius: f64) -> ThinningSampler {
+    pub fn new(
+        rule: ThinningRule,
+        by_tree: bool,
+        view: View,
+        count: usize,
+        radius: f64,
+    ) -> ThinningSampler {
         let points: Vec<DVec3> = (0..count).map(|k| radius * golden(k, count)).collect();
         let tree = PointTree::new(&points);
         let at = radius * DVec3::new(0.36, -0.48, 0.8);
@@ -59,7 +65,7 @@ impl ThinningSampler {
     }
 
     fn query(&self, at: DVec3, stream: &mut Stream, accept: impl FnMut(Accepted)) {
-        let mut work = Work::default();
+        let mut work = ThinningWork::default();
         if self.by_tree {
             self.tree.thin(at, &self.rule, stream, &mut work, accept);
         } else {

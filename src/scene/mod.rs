@@ -2,11 +2,11 @@
 
 mod latlong;
 mod light;
-mod sensor;
+pub mod sensor;
 
 pub use latlong::{Bright, LatLong};
 pub use light::{Emission, Light, LightSample};
-pub use sensor::{Acceptance, FluxFace, Pinhole, Region, Rings, Screen, Sensor, SensorRay};
+pub use sensor::Sensor;
 
 use std::sync::Arc;
 

@@ -64,9 +64,8 @@ fn of_run(
     truth: &EstimatorRun,
 ) -> Vec<ModelError> {
     let mut rows = Vec::new();
-    let is_shown = |observable: &Observable| {
-        !observable.name.starts_with("tile_") && !observable.name.contains('@')
-    };
+    let is_shown =
+        |observable: &Observable| cell.region_of(observable).is_some_and(|region| region.tile.is_none());
     for (place, observable) in truth.observables.iter().enumerate().filter(|(_, o)| is_shown(o)) {
         let Some(own) = run.observables.iter().position(|own| own == observable) else { continue };
         for (band, name) in stored.record.bands.iter().enumerate() {

@@ -11,6 +11,7 @@ use scatterproof::math::{DVec3, Frame};
 use scatterproof::sampling::distance::sample_exponential;
 use scatterproof::sampling::stream::{PassKey, Purpose, Stream};
 use scatterproof::sampling::warp::square_to_disc;
+use scatterproof::scene::sensor::BodyFlux;
 use scatterproof::scene::{Scene, Sensor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -236,7 +237,9 @@ impl Photons {
     /// One photon: power = radiance / density times the disc of the body's sphere across the direction.
     fn play(&self, band: usize, stream: &mut Stream, scores: &mut Scores) -> Option<()> {
         let scene = &*self.scene;
-        let Sensor::BodyFlux { bounds, frame, bins, paths } = &scene.sensor else { return None };
+        let Sensor::BodyFlux(BodyFlux { bounds, frame, bins, paths }) = &scene.sensor else {
+            return None;
+        };
         let [u, v, w] = stream.draw3();
         let light = ((u * scene.lights.len() as f64) as usize).min(scene.lights.len() - 1);
         let sample = scene.lights[light].sample(band, [v, w]);

@@ -17,16 +17,15 @@ mod cloud;
 use std::sync::Arc;
 
 use self::cloud::Cloud;
-use super::bssrdf_probe::adds_single;
-use super::bssrdf_single::score_single;
-use super::emergence::{BssrdfScene, Emergence, Gather};
-use super::illumination::{Illumination, PathStreams};
+use super::bssrdf_single::{adds_single, score_single};
+use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
+use super::illumination::Illumination;
 use super::{Anomaly, BandUse, Cost, Estimator, HeavyTail, Scores, TransportClass};
 use crate::error::{Error, Result};
 use crate::geometry::{BodySampler, FaceChoice};
 use crate::optics::bssrdf::{Entry, Model};
 use crate::sampling::stream::PassKey;
-use crate::sampling::thinning::{Accepted, Form, Rule, Work, scan};
+use crate::sampling::thinning::{Accepted, ThinningForm, ThinningRule, ThinningWork, scan};
 use crate::scene::Scene;
 
 /// How a point's probability of acceptance follows from its distance d.
@@ -89,7 +88,7 @@ pub struct PointCloud {
     sampler: BodySampler,
     options: PointCloudOptions,
     /// Per group of the bssrdf: which bands accept by which rule.
-    rules: Vec<Vec<(Vec<usize>, Rule)>>,
+    rules: Vec<(Vec<usize>, ThinningRule)>,
     illumination: Illumination,
     single: bool,
 }
@@ -116,35 +115,37 @@ impl PointCloud {
     }
 }
 
-/// The rule of each group of bands.
-fn rules(bssrdf: &BssrdfScene, acceptance: Acceptance, diameter: f64) -> Vec<Vec<(Vec<usize>, Rule)>> {
+/// The bands that accept together, and their rule; all of them refract alike.
+fn rules(
+    bssrdf: &BssrdfScene,
+    acceptance: Acceptance,
+    diameter: f64,
+) -> Vec<(Vec<usize>, ThinningRule)> {
     let sigmas: Vec<f64> = bssrdf.models.iter().map(|model| model.sigma_tr).collect();
     let mean = sigmas.iter().sum::<f64>() / sigmas.len() as f64;
     let common = match acceptance {
-        Acceptance::All => Form::All,
-        Acceptance::Mean => Form::Exponential { sigma: mean },
-        Acceptance::Minimum | Acceptance::Band => {
-            Form::Exponential { sigma: sigmas.iter().fold(f64::INFINITY, |least, &s| least.min(s)) }
-        }
-        Acceptance::MeanOfExponentials => Form::MeanOfExponentials { sigmas: sigmas.clone() },
-        Acceptance::Floor(least) => Form::Floor { sigma: mean, least },
+        Acceptance::All => ThinningForm::All,
+        Acceptance::Mean => ThinningForm::Exponential { sigma: mean },
+        Acceptance::Minimum | Acceptance::Band => ThinningForm::Exponential {
+            sigma: sigmas.iter().fold(f64::INFINITY, |least, &s| least.min(s)),
+        },
+        Acceptance::MeanOfExponentials => ThinningForm::MeanOfExponentials { sigmas: sigmas.clone() },
+        Acceptance::Floor(least) => ThinningForm::Floor { sigma: mean, least },
         Acceptance::Kernel => in_proportion(bssrdf, &sigmas, diameter),
     };
     if acceptance == Acceptance::Band {
-        let own = |band: usize| (vec![band], Rule::new(Form::Exponential { sigma: sigmas[band] }));
-        return bssrdf
-            .groups
-            .iter()
-            .map(|group| group.iter().map(|&band| own(band)).collect())
-            .collect();
+        let own = |band: usize| {
+            (vec![band], ThinningRule::new(ThinningForm::Exponential { sigma: sigmas[band] }))
+        };
+        return bssrdf.groups.iter().flatten().map(|&band| own(band)).collect();
     }
-    let rule = Rule::new(common);
-    bssrdf.groups.iter().map(|group| vec![(group.clone(), rule.clone())]).collect()
+    let rule = ThinningRule::new(common);
+    bssrdf.groups.iter().map(|group| (group.clone(), rule.clone())).collect()
 }
 
 /// Accepts in proportion to the kernels, on average over a disc of radius `reach` as many as the mean of exponentials:
 /// int_0^R e^(-s d) 2 d dd / R^2 = 2 (1 - (1 + a) e^(-a)) / a^2 with a = s R.
-fn in_proportion(bssrdf: &BssrdfScene, sigmas: &[f64], reach: f64) -> Form {
+fn in_proportion(bssrdf: &BssrdfScene, sigmas: &[f64], reach: f64) -> ThinningForm {
     use crate::math::{exp, integrate};
     let mean_of = |sigma: f64| {
         let a = sigma * reach;
@@ -161,20 +162,20 @@ fn in_proportion(bssrdf: &BssrdfScene, sigmas: &[f64], reach: f64) -> Form {
         let d = d.max(1e-6 * reach); // some profiles have a pole
         bssrdf.models.iter().zip(&whole).map(|(model, whole)| model.falloff(d) / whole).sum::<f64>()
     };
-    Form::proportional(falloff, reach, mean.min(1.0))
+    ThinningForm::proportional(falloff, reach, mean.min(1.0))
 }
 
 impl Estimator for PointCloud {
-    fn pass(&self, _bands: &[usize], key: &PassKey, scores: &mut Scores) {
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         let cloud = Cloud::new(&self.bssrdf, &self.sampler, self.options.samples, key);
-        scores.cost[Cost::CloudPoints as usize] += cloud.len() as u64;
-        scores.cost[Cost::ShadowRays as usize] += cloud.shadow_rays;
+        scores.count_many(Cost::CloudPoints, cloud.len() as u64);
+        scores.count_many(Cost::ShadowRays, cloud.shadow_rays);
         scores.anomalies[Anomaly::WrongSide as usize] += cloud.wrong_side;
-        for (group, rules) in self.bssrdf.groups.iter().zip(&self.rules) {
+        for group in self.bssrdf.groups_among(bands) {
             for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(&self.bssrdf, key, index, group);
-                let mut sum = CloudSum { estimator: self, cloud: &cloud, rules, streams };
-                self.bssrdf.play(group, index, key, scores, &mut sum);
+                let streams = PathStreams::new(&self.bssrdf, key, index, &group);
+                let mut sum = CloudSum { estimator: self, cloud: &cloud, streams };
+                self.bssrdf.play(&group, index, key, scores, &mut sum);
             }
         }
     }
@@ -225,15 +226,18 @@ impl Estimator for PointCloud {
 struct CloudSum<'a> {
     estimator: &'a PointCloud,
     cloud: &'a Cloud,
-    rules: &'a [(Vec<usize>, Rule)],
     streams: PathStreams,
 }
 
 impl Gather for CloudSum<'_> {
     fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let PointCloud { bssrdf, options, illumination, single, .. } = self.estimator;
-        for (bands, rule) in self.rules {
-            self.sum(bands, rule, emergence, options.search, scores);
+        let PointCloud { bssrdf, options, illumination, single, rules, .. } = self.estimator;
+        for (bands, rule) in rules {
+            let is_here = |band: &usize| emergence.bands.contains(band);
+            let bands: Vec<usize> = bands.iter().copied().filter(is_here).collect();
+            if !bands.is_empty() {
+                self.sum(&bands, rule, emergence, options.search, scores);
+            }
         }
         if *single {
             score_single(bssrdf, illumination, emergence, &mut self.streams.single, scores);
@@ -246,7 +250,7 @@ impl CloudSum<'_> {
     fn sum(
         &mut self,
         bands: &[usize],
-        rule: &Rule,
+        rule: &ThinningRule,
         emergence: &Emergence<'_>,
         search: Search,
         scores: &mut Scores,
@@ -255,7 +259,7 @@ impl CloudSum<'_> {
         let (cloud, models, at) = (self.cloud, &bssrdf.models, emergence.exit.point);
         let lights = bssrdf.scene.lights.len();
         let mut sums = vec![0.0; bands.len() * lights];
-        let mut work = Work::default();
+        let mut work = ThinningWork::default();
         let add = |accepted: Accepted| {
             let place = accepted.index;
             let entry: Entry = cloud.entry(place, emergence.eta);
@@ -279,14 +283,14 @@ impl CloudSum<'_> {
     }
 }
 
-fn count(scores: &mut Scores, search: Search, work: &Work, bands: usize) {
+fn count(scores: &mut Scores, search: Search, work: &ThinningWork, bands: usize) {
     let asked = match search {
         Search::Hierarchy => Cost::Candidates,
         Search::Scan => Cost::Scanned,
     };
-    scores.cost[asked as usize] += work.candidates;
-    scores.cost[Cost::Nodes as usize] += work.nodes;
-    scores.cost[Cost::Evaluations as usize] += work.accepted * bands as u64;
+    scores.count_many(asked, work.candidates);
+    scores.count_many(Cost::Nodes, work.nodes);
+    scores.count_many(Cost::Evaluations, work.accepted * bands as u64);
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use crate::optics::bssrdf::{MomentKind, Outgoing};
 use crate::optics::fresnel::fresnel;
 use crate::optics::medium::Medium;
 use crate::sampling::stream::StreamKey;
+use crate::scene::sensor::Probe;
 use crate::scene::{Emission, Light, Sensor};
 
 const ETA: f64 = 1.3;
@@ -25,7 +26,7 @@ fn scene(lights: Vec<Light>) -> Arc<Scene> {
         boundary: vec![Boundary::Smooth { eta: ETA }; 3],
         medium: bands.map(|(a, s)| Medium::new(a, s, 0.0)).into(),
         lights,
-        sensor: Sensor::Probe { ray: Ray { origin: 10.0 * DVec3::Z, dir: -DVec3::Z }, paths: 4 },
+        sensor: Sensor::Probe(Probe { ray: Ray { origin: 10.0 * DVec3::Z, dir: -DVec3::Z }, paths: 4 }),
     })
 }
 

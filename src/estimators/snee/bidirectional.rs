@@ -12,11 +12,11 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::connections::{End, Middle};
+use super::end::{End, Middle};
 use super::guide::Guide;
 use crate::error::{Error, Result};
-use crate::estimators::bands::{Bands, OneBand};
-use crate::estimators::walk::{Exit, Field, Path, Rivals, Unrivalled, Walk};
+use crate::estimators::bands::{OneBand, WalkBands};
+use crate::estimators::walk::{Field, Path, Rivals, Unrivalled, Walk, WalkExit};
 use crate::estimators::{Cost, Estimator, Roulette, Scores};
 use crate::geometry::{BoundingSphere, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
@@ -71,7 +71,7 @@ impl Estimator for Bidirectional {
                 let mut stream = key.stream(index as u64, Purpose::Connection);
                 let covered = 1.0 / (PI * self.bounds.radius * self.bounds.radius);
                 let light = self.light_path(guides, band, &mut stream, scores);
-                let nowhere = (DVec3::NAN, DVec3::Z);
+                let nowhere = Ray { origin: DVec3::NAN, dir: DVec3::Z };
                 let rivals = OneLightVertex { guides, light, covered, vertices: [nowhere; 2], count: 0 };
                 Walk::play(path, scores, rivals, OneBand);
             }
@@ -87,7 +87,7 @@ impl Estimator for Bidirectional {
 #[derive(Clone, Copy, Debug)]
 struct LightPath<'a> {
     guide: &'a Guide,
-    exit: Exit,
+    exit: WalkExit,
     x_j: DVec3,
     w_l: DVec3,
     radiance: f64,
@@ -129,7 +129,7 @@ impl Bidirectional {
         if scene.shape.intersect(&down, Side::Inside, Some(hit.face), t).is_some() {
             return None;
         }
-        let exit = Exit { hit, frame, wo: inward };
+        let exit = WalkExit { hit, frame, wo: inward };
         Some(LightPath { guide, exit, x_j: down.at(t), w_l: sample.wi, radiance: sample.radiance })
     }
 }
@@ -141,42 +141,43 @@ struct OneLightVertex<'a> {
     /// Density of the points of the disc, 1/mm^2.
     covered: f64,
     /// Point and direction of arrival of the last two medium vertices, the latest last.
-    vertices: [(DVec3, DVec3); 2],
+    vertices: [Ray; 2],
     count: u32,
 }
 
-/// The technique's density over U.
-fn density<B: Bands>(
+/// The technique's density over U of a path that has arrived at x_i along `arrival`.
+fn density<B: WalkBands>(
     walk: &Walk<'_, OneLightVertex<'_>, B>,
     arrival: DVec3,
     middle: &Middle,
-    (exit, wi): (&Exit, DVec3),
-    end: &End,
+    exit: &WalkExit,
+    end: &End<'_>,
 ) -> f64 {
-    let numerator = end.guide * end.reverse * wi.dot(exit.hit.normal) * walk.rivals.covered;
+    let numerator = end.by_guide * end.reverse * end.w_l.dot(exit.hit.normal) * walk.rivals.covered;
     if numerator <= 0.0 {
         return 0.0;
     }
+    let Middle { to_j, to_k, cos_k } = middle;
     let phase = walk.medium.phase;
-    let phases = phase.pdf(arrival.dot(middle.to_j)) * phase.pdf(middle.to_j.dot(middle.to_k));
-    let through = transmittance(walk.medium.sigma_t, middle.d_ij);
-    numerator * (middle.d_ij * middle.d_ij) / (phases * through * middle.cos_k)
+    let phases = phase.pdf(arrival.dot(to_j.dir)) * phase.pdf(to_j.dir.dot(to_k.dir));
+    let through = transmittance(walk.medium.sigma_t, to_j.length);
+    numerator * (to_j.length * to_j.length) / (phases * through * cos_k)
 }
 
 impl Rivals for OneLightVertex<'_> {
-    fn call<B: Bands>(walk: &mut Walk<'_, Self, B>) {
+    fn call<B: WalkBands>(walk: &mut Walk<'_, Self, B>) {
         let state = &mut walk.rivals;
-        let (x_i, arrival) = (walk.ray.origin, walk.ray.dir);
-        state.vertices = [state.vertices[1], (x_i, arrival)];
+        let Ray { origin: x_i, dir: arrival } = walk.ray;
+        state.vertices = [state.vertices[1], walk.ray];
         state.count += 1;
         let Some(light) = state.light else { return };
         let LightPath { guide, exit, x_j, w_l, radiance } = light;
-        let Some(middle) = Middle::new(x_i, x_j, exit.hit.point, exit.hit.normal) else { return };
+        let Some(middle) = Middle::new(x_i, x_j, &exit.hit) else { return };
         let end = End::new(walk, guide, &exit, w_l, [1.0, 1.0], Some(radiance));
         if end.value == 0.0 {
             return;
         }
-        let rivals = density(walk, arrival, &middle, (&exit, w_l), &end);
+        let rivals = density(walk, arrival, &middle, &exit, &end);
         let survival = walk.bands.survival(&walk.medium);
         let value = walk.throughput * survival * end.value / (end.unidirectional + rivals);
         if value == 0.0 || !walk.sees_point(x_i, x_j) {
@@ -192,9 +193,9 @@ impl Rivals for OneLightVertex<'_> {
         self.count = 0;
     }
 
-    fn reflect<B: Bands>(_: &mut Walk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
+    fn reflect<B: WalkBands>(_: &mut Walk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
 
-    fn has_scored_reflection<B: Bands>(_: &Walk<'_, Self, B>, _: usize, _: DVec3) -> bool {
+    fn has_scored_reflection<B: WalkBands>(_: &Walk<'_, Self, B>, _: usize, _: DVec3) -> bool {
         false
     }
 
@@ -202,15 +203,20 @@ impl Rivals for OneLightVertex<'_> {
         [1.0, 1.0]
     }
 
-    fn densities<B: Bands>(walk: &mut Walk<'_, Self, B>, exit: &Exit, light: usize, wi: DVec3) -> f64 {
+    fn densities<B: WalkBands>(
+        walk: &mut Walk<'_, Self, B>,
+        exit: &WalkExit,
+        light: usize,
+        wi: DVec3,
+    ) -> f64 {
         if walk.rivals.count < 2 {
             return 0.0;
         }
         let guides = walk.rivals.guides;
         let Some(guide) = guides.iter().find(|guide| guide.light == light) else { return 0.0 };
-        let [(x_i, arrival), (x_j, _)] = walk.rivals.vertices;
-        let Some(middle) = Middle::new(x_i, x_j, exit.hit.point, exit.hit.normal) else { return 0.0 };
+        let [Ray { origin: x_i, dir: arrival }, Ray { origin: x_j, .. }] = walk.rivals.vertices;
+        let Some(middle) = Middle::new(x_i, x_j, &exit.hit) else { return 0.0 };
         let end = End::new(walk, guide, exit, wi, [1.0, 1.0], None);
-        density(walk, arrival, &middle, (exit, wi), &end)
+        density(walk, arrival, &middle, exit, &end)
     }
 }

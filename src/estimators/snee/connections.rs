@@ -20,226 +20,43 @@
 //!   throughput * albedo * f_k L / (p_B + p_L + sum of rivals / U),
 //! whichever technique it comes from.
 
-use super::guess::Guess;
-use super::guide::Guide;
-use super::{BandSetup, last_vertex, subdivision};
+use super::end::{End, Leg, Middle};
+use super::last_vertex::{self, GuidedEnd};
+use super::state::{Connections, Slot, WalkVertex};
+use super::subdivision::{self, Subdivided};
 use crate::estimators::Cost;
-use crate::estimators::bands::Bands;
-use crate::estimators::walk::{Exit, Rivals, Walk};
-use crate::geometry::{Hit, Ray, Side};
-use crate::math::{DVec3, exp, ln};
-use crate::optics::boundary::Boundary;
-use crate::sampling::discrete::choose_share;
-use crate::sampling::stream::Stream;
-
-/// A medium vertex that connections start from.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Vertex {
-    pub point: DVec3,
-    /// Direction of travel on arrival.
-    pub arrival: DVec3,
-    /// Density of the walk up to here under any hero, over that under its own.
-    pub walks: f64,
-    /// The specular guess for the last guide that was asked for.
-    guess: Option<(usize, Option<Guess>)>,
-}
-
-impl Vertex {
-    pub fn new(point: DVec3, arrival: DVec3, walks: f64) -> Vertex {
-        Vertex { point, arrival, walks, guess: None }
-    }
-
-    /// The specular guess for a guide.
-    pub fn guess<R, B>(&mut self, walk: &mut Walk<'_, R, B>, guide: &Guide) -> Option<Guess> {
-        match self.guess {
-            Some((light, guess)) if light == guide.light => guess,
-            _ => {
-                let guess = Guess::new(walk, self.point, guide.axis);
-                self.guess = Some((guide.light, guess));
-                guess
-            }
-        }
-    }
-}
-
-/// With which probability a technique is called at a vertex: `most` e^(-decay sigma d), d being the distance to
-/// the boundary along the specular guess. It depends on the vertex alone, so that every density can name it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Call {
-    /// Probability at the boundary.
-    pub most: f64,
-    /// How fast it falls with the optical distance that light has to go.
-    pub decay: f64,
-}
-
-impl Call {
-    /// The probability, from the distance of the guess.
-    pub(super) fn probability(&self, sigma: f64, guess: Option<&Guess>) -> f64 {
-        match guess {
-            _ if self.decay == 0.0 => self.most,
-            Some(guess) => self.most * exp(-self.decay * sigma * guess.distance),
-            None => 0.0,
-        }
-    }
-
-    /// The distance up to which the call is made, for one uniform number; `None` if it is not made at all. P(reach
-    /// > d) is [`Self::probability`], and a lower bound of d may decide before d is known.
-    pub(super) fn reach(&self, sigma: f64, u: f64) -> Option<f64> {
-        if u >= self.most {
-            None
-        } else if self.decay == 0.0 {
-            Some(f64::INFINITY)
-        } else {
-            Some(-ln(u / self.most) / (self.decay * sigma))
-        }
-    }
-}
-
-/// What a walk carries.
-pub(super) struct Connections<'a> {
-    pub setup: &'a BandSetup,
-    pub stream: Stream,
-    /// The last two medium vertices, the latest last.
-    pub vertices: [Vertex; 2],
-    /// Medium vertices since the boundary was last met.
-    pub count: u32,
-    /// Only the first edge is subdivided, and only the second vertex is a last one.
-    pub is_edge_alone: bool,
-    /// Whether x_i saw the exit that was last asked for.
-    seen: Option<(DVec3, bool)>,
-}
-
-impl<'a> Connections<'a> {
-    pub fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
-        let nowhere = Vertex::new(DVec3::NAN, DVec3::Z, 1.0);
-        Connections { setup, stream, vertices: [nowhere; 2], count: 0, is_edge_alone: false, seen: None }
-    }
-
-    /// A guide by its probability; without a draw where there is one alone.
-    pub fn choose_guide(&mut self) -> Option<&'a Guide> {
-        let guides = &self.setup.guides;
-        match &guides[..] {
-            [only] => Some(only),
-            _ => {
-                let shares = guides.iter().map(|guide| guide.choice);
-                choose_share(shares, self.stream.draw()).map(|(index, _)| &guides[index])
-            }
-        }
-    }
-
-    /// Which of BSDF and light sampling take part at the end of a path with this many medium vertices since
-    /// the boundary.
-    pub fn takes_part(&self, count: u32) -> [f64; 2] {
-        let strategies = &self.setup.options.strategies;
-        let share = |takes_part: bool| if takes_part { 1.0 } else { 0.0 };
-        if count >= 2 { [share(strategies.bsdf), share(strategies.light)] } else { [1.0, 1.0] }
-    }
-}
-
-/// A direction from a boundary point to a light, as all techniques see it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct End {
-    /// f |cos| times radiance (irradiance for parallel light).
-    pub value: f64,
-    /// Density by BSDF and light sampling.
-    pub unidirectional: f64,
-    /// Density of w_L given w_kj, refraction forced.
-    pub forward: f64,
-    /// Density of w_kj given w_L.
-    pub reverse: f64,
-    /// Density of w_L by the guide, its choice included; 0 where no guide takes part.
-    pub guide: f64,
-}
-
-impl End {
-    /// At an exit, towards `wi`, which lies outside; for a smooth boundary `wi` is the refracted direction. `keep`
-    /// says which of BSDF and light sampling take part.
-    pub fn new<R: Rivals, B: Bands>(
-        walk: &Walk<'_, R, B>,
-        guide: &Guide,
-        exit: &Exit,
-        wi: DVec3,
-        keep: [f64; 2],
-        radiance: Option<f64>,
-    ) -> End {
-        let light = &walk.scene.lights[guide.light];
-        let local = exit.frame.to_local(wi);
-        let parallel = light.is_directional();
-        let (radiance, pdf_light) = match radiance {
-            Some(radiance) if parallel => (radiance, 1.0),
-            _ if parallel => (0.0, 1.0),
-            _ => light.eval(walk.band, wi),
-        };
-        let of_guide = guide.density(light, walk.band, wi);
-        let choice = walk.choice(guide.light);
-        match walk.boundary {
-            Boundary::Rough { .. } => {
-                let (f_cos, pdf) = walk.boundary.eval(exit.wo, local);
-                let reverse = walk.boundary.pdf_refraction(local, exit.wo);
-                let (forward, bsdf) = if parallel {
-                    (0.0, 0.0)
-                } else {
-                    (walk.boundary.pdf_refraction(exit.wo, local), pdf)
-                };
-                let unidirectional = keep[0] * bsdf + keep[1] * (choice * pdf_light);
-                End { value: f_cos * radiance, unidirectional, forward, reverse, guide: of_guide }
-            }
-            Boundary::Smooth { eta } => {
-                let through = walk.boundary.transmittance_smooth(exit.wo);
-                let reverse = eta * eta * (exit.wo.z / local.z).abs();
-                let (forward, bsdf) = if parallel { (0.0, 0.0) } else { (1.0, through) };
-                End {
-                    value: through * eta * eta * radiance,
-                    unidirectional: keep[0] * bsdf,
-                    forward,
-                    reverse,
-                    guide: of_guide,
-                }
-            }
-            Boundary::Matched => {
-                End { value: 0.0, unidirectional: 1.0, forward: 0.0, reverse: 0.0, guide: 0.0 }
-            }
-        }
-    }
-}
-
-/// x_i -> x_j -> x_k, seen from x_j.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Middle {
-    pub to_j: DVec3,
-    pub d_ij: f64,
-    pub to_k: DVec3,
-    pub d_jk: f64,
-    /// Cosine at x_k between the walk and the geometric normal.
-    pub cos_k: f64,
-}
-
-impl Middle {
-    /// `None` where points fall together or x_k is met from behind.
-    pub fn new(x_i: DVec3, x_j: DVec3, x_k: DVec3, normal: DVec3) -> Option<Middle> {
-        let (ij, jk) = (x_j - x_i, x_k - x_j);
-        let (d_ij, d_jk) = (ij.length(), jk.length());
-        let (to_j, to_k) = (ij / d_ij, jk / d_jk);
-        let cos_k = to_k.dot(normal);
-        (d_ij > 0.0 && d_jk > 0.0 && cos_k > 0.0).then_some(Middle { to_j, d_ij, to_k, d_jk, cos_k })
-    }
-}
+use crate::estimators::bands::WalkBands;
+use crate::estimators::walk::{Rivals, Walk, WalkExit};
+use crate::geometry::{Hit, Ray};
+use crate::math::DVec3;
 
 impl Rivals for Connections<'_> {
-    fn call<B: Bands>(walk: &mut Walk<'_, Self, B>) {
-        let vertex = Vertex::new(walk.ray.origin, walk.ray.dir, walk.bands.density());
+    fn call<B: WalkBands>(walk: &mut Walk<'_, Self, B>) {
+        let Ray { origin: point, dir: arrival } = walk.ray;
         let state = &mut walk.rivals;
-        state.vertices = [state.vertices[1], vertex];
-        state.count += 1;
-        let setup = state.setup;
+        state.arrive(WalkVertex { point, arrival, walks: walk.bands.density() });
+        let options = &state.setup.options;
         let (is_first, is_free) = (state.count == 1, !state.is_edge_alone);
-        if let Some(technique) = &setup.options.last_vertex
+        if let Some(technique) = &options.last_vertex
             && (is_free || !is_first)
+            && let Some(found) = last_vertex::draw(walk, technique)
         {
-            last_vertex::call(walk, technique);
+            score_guided(walk, &found);
         }
-        if setup.options.strategies.subdivides() && (is_free || is_first) {
-            subdivision::call(walk);
+        if options.strategies.subdivides()
+            && (is_free || is_first)
+            && let Some(edge) = subdivision::draw_edge(walk)
+        {
+            if options.strategies.top_to_bottom
+                && let Some(found) = subdivision::top_to_bottom(walk, &edge)
+            {
+                score_subdivided(walk, &found);
+            }
+            if options.strategies.bottom_to_top
+                && let Some(found) = subdivision::bottom_to_top(walk, &edge)
+            {
+                score_subdivided(walk, &found);
+            }
         }
     }
 
@@ -247,7 +64,12 @@ impl Rivals for Connections<'_> {
         self.count = 0;
     }
 
-    fn reflect<B: Bands>(walk: &mut Walk<'_, Self, B>, hit: &Hit, reflected: DVec3, reflectance: f64) {
+    fn reflect<B: WalkBands>(
+        walk: &mut Walk<'_, Self, B>,
+        hit: &Hit,
+        reflected: DVec3,
+        reflectance: f64,
+    ) {
         let setup = walk.rivals.setup;
         for guide in &setup.guides {
             if !Self::has_scored_reflection(walk, guide.light, reflected)
@@ -266,7 +88,7 @@ impl Rivals for Connections<'_> {
         }
     }
 
-    fn has_scored_reflection<B: Bands>(walk: &Walk<'_, Self, B>, light: usize, wi: DVec3) -> bool {
+    fn has_scored_reflection<B: WalkBands>(walk: &Walk<'_, Self, B>, light: usize, wi: DVec3) -> bool {
         let setup = walk.rivals.setup;
         let guide = setup.guides.iter().find(|guide| guide.light == light);
         let light = &walk.scene.lights[light];
@@ -279,58 +101,101 @@ impl Rivals for Connections<'_> {
         self.takes_part(self.count)
     }
 
-    fn densities<B: Bands>(walk: &mut Walk<'_, Self, B>, exit: &Exit, light: usize, wi: DVec3) -> f64 {
+    fn densities<B: WalkBands>(
+        walk: &mut Walk<'_, Self, B>,
+        exit: &WalkExit,
+        light: usize,
+        wi: DVec3,
+    ) -> f64 {
         if walk.rivals.count == 0 {
             return 0.0;
         }
         let setup = walk.rivals.setup;
         let Some(guide) = setup.guides.iter().find(|guide| guide.light == light) else { return 0.0 };
         let end = End::new(walk, guide, exit, wi, walk.rivals.unidirectional(), None);
-        if end.guide == 0.0 {
+        if end.by_guide == 0.0 {
             return 0.0;
         }
-        let [mut x_i, mut x_j] = walk.rivals.vertices;
-        let to_k = -exit.frame.to_world(exit.wo);
-        let d_jk = (exit.hit.point - x_j.point).length();
-        let mut sum = last_vertex::density(walk, &mut x_j, guide, (to_k, d_jk), wi, &end);
-        if walk.rivals.count >= 2 && setup.options.strategies.subdivides() && walk.sees(&x_i, exit) {
-            let middle = Middle::new(x_i.point, x_j.point, exit.hit.point, exit.hit.normal);
-            if let Some(middle) = middle {
-                sum += subdivision::density(walk, &mut x_i, guide, &middle, exit, &end);
+        let x_j = walk.rivals.vertex(Slot::Latest);
+        let dir = -exit.frame.to_world(exit.wo);
+        let leg = Leg { dir, length: (exit.hit.point - x_j.point).length() };
+        let mut sum = last_vertex::density(walk, Slot::Latest, &leg, &end);
+        if walk.rivals.count >= 2 && setup.options.strategies.subdivides() && walk.sees(exit) {
+            let x_i = walk.rivals.vertex(Slot::Previous);
+            if let Some(middle) = Middle::new(x_i.point, x_j.point, &exit.hit) {
+                sum += subdivision::density(walk, Slot::Previous, &middle, exit, &end);
             }
         }
-        walk.rivals.vertices = [x_i, x_j];
         sum
     }
 }
 
-/// Part of a leg's length within which two ways of meeting the same point of the boundary may differ.
-const LEG: f64 = 1e-7;
-
-impl<R: Rivals, B: Bands> Walk<'_, R, B> {
-    /// Whether nothing lies between two points of the body; the second may be on the boundary.
-    pub(super) fn sees_point(&mut self, from: DVec3, to: DVec3) -> bool {
-        if self.scene.shape.is_convex() {
-            return true;
-        }
-        let leg = to - from;
-        let length = leg.length();
-        self.scores.count(Cost::ShadowRays);
-        let ray = Ray { origin: from, dir: leg / length };
-        self.scene.shape.intersect(&ray, Side::Inside, None, length * (1.0 - LEG)).is_none()
+/// Scores an end that the light-guided last vertex has drawn at the walk's latest vertex.
+fn score_guided<B: WalkBands>(walk: &mut Walk<'_, Connections<'_>, B>, found: &GuidedEnd<'_>) {
+    let GuidedEnd { guide, exit, leg, w_l, radiance } = found;
+    let setup = walk.rivals.setup;
+    let end = End::new(walk, guide, exit, *w_l, walk.rivals.unidirectional(), *radiance);
+    if !end.counts() {
+        return;
     }
+    let x_j = walk.rivals.vertex(Slot::Latest);
+    let mut rivals = last_vertex::density(walk, Slot::Latest, leg, &end);
+    if walk.rivals.count >= 2 && setup.options.strategies.subdivides() {
+        let x_i = walk.rivals.vertex(Slot::Previous);
+        if let Some(middle) = Middle::new(x_i.point, x_j.point, &exit.hit)
+            && walk.sees_point(x_i.point, exit.hit.point)
+        {
+            rivals += subdivision::density(walk, Slot::Previous, &middle, exit, &end);
+        }
+    }
+    if walk.is_shadowed(exit, *w_l) {
+        return;
+    }
+    let mut bands = walk.bands.clone();
+    bands.turn(&walk.scene.medium, x_j.arrival.dot(leg.dir));
+    bands.flight(&walk.scene.medium, leg.length, false);
+    let score = walk.throughput * end.value / (bands.density() * end.unidirectional + rivals);
+    walk.score_with(&bands, walk.history.class(), guide.light, score);
 }
 
-impl<B: Bands> Walk<'_, Connections<'_>, B> {
-    /// Whether x_i sees an exit: a probe in its direction would have met it first.
-    fn sees(&mut self, x_i: &Vertex, exit: &Exit) -> bool {
-        match self.rivals.seen {
-            Some((point, sees)) if point == exit.hit.point => sees,
-            _ => {
-                let sees = self.sees_point(x_i.point, exit.hit.point);
-                self.rivals.seen = Some((exit.hit.point, sees));
-                sees
-            }
-        }
+/// Scores a path whose edge from the walk's latest vertex is subdivided; the leg along which x_j was drawn is known to
+/// be free.
+fn score_subdivided<B: WalkBands>(walk: &mut Walk<'_, Connections<'_>, B>, found: &Subdivided<'_>) {
+    let Subdivided { guide, x_j, middle, exit, w_l, radiance } = found;
+    let x_i = walk.rivals.vertex(Slot::Latest);
+    let end = End::new(walk, guide, exit, *w_l, walk.rivals.takes_part(2), *radiance);
+    if !end.counts() {
+        return;
+    }
+    let media = &walk.scene.medium;
+    let mut bands = walk.bands.clone();
+    bands.turn(media, x_i.arrival.dot(middle.to_j.dir));
+    bands.flight(media, middle.to_j.length, true);
+    let drawn = WalkVertex { point: *x_j, arrival: middle.to_j.dir, walks: bands.density() };
+    walk.rivals.hold(Slot::Drawn, drawn);
+    bands.turn(media, middle.to_j.dir.dot(middle.to_k.dir));
+    bands.flight(media, middle.to_k.length, false);
+    let rivals = subdivision::density(walk, Slot::Latest, middle, exit, &end)
+        + last_vertex::density(walk, Slot::Drawn, &middle.to_k, &end);
+    let survival = walk.bands.survival(&walk.medium);
+    let value = walk.throughput * survival * end.value / (bands.density() * end.unidirectional + rivals);
+    if value == 0.0 || walk.is_shadowed(exit, *w_l) {
+        return;
+    }
+    // The leg that closes the path: to x_i from the top, to x_k from the bottom; the other one is free.
+    if !walk.sees_point(x_i.point, *x_j) || !walk.sees_point(*x_j, exit.hit.point) {
+        return;
+    }
+    let mut history = walk.history;
+    history.scatter();
+    walk.score_with(&bands, history.class(), guide.light, value);
+}
+
+impl<B: WalkBands> Walk<'_, Connections<'_>, B> {
+    /// Whether something stands between an exit and the light.
+    fn is_shadowed(&mut self, exit: &WalkExit, w_l: DVec3) -> bool {
+        self.scores.count(Cost::ShadowRays);
+        let shadow = Ray { origin: exit.hit.point, dir: w_l };
+        self.scene.shape.occluded(&shadow, Some(exit.hit.face))
     }
 }

@@ -12,13 +12,13 @@
 //! Dirac factor as BSDF sampling. It also covers what subdivision cannot: single scattering, and paths whose last
 //! vertex follows an internal reflection.
 
-use super::connections::{Call, Connections, End, Middle, Vertex};
+use super::end::{Call, End, Leg};
 use super::guess::Guess;
 use super::guide::Guide;
-use super::subdivision;
+use super::state::{Connections, Slot};
 use crate::estimators::Cost;
-use crate::estimators::bands::Bands;
-use crate::estimators::walk::{Rivals, Walk};
+use crate::estimators::bands::WalkBands;
+use crate::estimators::walk::{Walk, WalkExit};
 use crate::geometry::{Ray, Side};
 use crate::math::{DVec3, Frame, tan};
 use crate::optics::boundary::Boundary;
@@ -106,48 +106,60 @@ impl Lobe {
     }
 }
 
-/// The technique's density of an end whose last vertex is `x_j`, over U, times the density of the walk up to x_j.
-pub(super) fn density<B: Bands>(
+/// The technique's density of an end whose last vertex is x_j, over U, times the density of the walk up to x_j.
+pub(super) fn density<B: WalkBands>(
     walk: &mut Walk<'_, Connections<'_>, B>,
-    x_j: &mut Vertex,
-    guide: &Guide,
-    (to_k, d_jk): (DVec3, f64),
-    wi: DVec3,
-    end: &End,
+    x_j: Slot,
+    to_k: &Leg,
+    end: &End<'_>,
 ) -> f64 {
     let setup = walk.rivals.setup;
     let Some(technique) = &setup.options.last_vertex else { return 0.0 };
-    if end.guide == 0.0 {
+    if end.by_guide == 0.0 {
         return 0.0;
     }
-    let Some(guess) = x_j.guess(walk, guide) else { return 0.0 };
-    let Some(lobe) = technique.lobe(&walk.boundary, guide, &guess) else { return 0.0 };
+    let Some(guess) = walk.guess(x_j, end.guide) else { return 0.0 };
+    let Some(lobe) = technique.lobe(&walk.boundary, end.guide, &guess) else { return 0.0 };
     let of_light = match lobe {
-        Lobe::Refraction { .. } => end.guide,
-        Lobe::About { .. } => guide.choice,
+        Lobe::Refraction { .. } => end.by_guide,
+        Lobe::About { .. } => end.guide.choice,
     };
     let q = technique.call.probability(setup.sigma, Some(&guess));
-    let pdf = q * of_light * lobe.pdf(technique.wide_share, wi, to_k);
+    let pdf = q * of_light * lobe.pdf(technique.wide_share, end.w_l, to_k.dir);
     if pdf == 0.0 {
         return 0.0;
     }
-    let phase = walk.medium.phase.pdf(x_j.arrival.dot(to_k));
-    pdf * x_j.walks / (phase * transmittance(walk.medium.sigma_t, d_jk))
+    let x_j = walk.rivals.vertex(x_j);
+    let phase = walk.medium.phase.pdf(x_j.arrival.dot(to_k.dir));
+    pdf * x_j.walks / (phase * transmittance(walk.medium.sigma_t, to_k.length))
 }
 
-/// Draws the technique at the walk's latest vertex and scores what it finds.
-pub(super) fn call<B: Bands>(walk: &mut Walk<'_, Connections<'_>, B>, technique: &LastVertex) {
-    let setup = walk.rivals.setup;
-    let Some(reach) = technique.call.reach(setup.sigma, walk.rivals.stream.draw()) else { return };
-    let [mut x_i, mut x_j] = walk.rivals.vertices;
+/// An end that the technique has drawn.
+pub(super) struct GuidedEnd<'a> {
+    pub guide: &'a Guide,
+    pub exit: WalkExit,
+    /// From x_j to x_k.
+    pub leg: Leg,
+    /// Towards the light.
+    pub w_l: DVec3,
+    /// Of the light, where it is known from the draw.
+    pub radiance: Option<f64>,
+}
+
+/// Draws the technique at the walk's latest vertex.
+pub(super) fn draw<'a, B: WalkBands>(
+    walk: &mut Walk<'_, Connections<'a>, B>,
+    technique: &LastVertex,
+) -> Option<GuidedEnd<'a>> {
+    let sigma = walk.rivals.setup.sigma;
+    let reach = technique.call.reach(sigma, walk.rivals.stream.draw())?;
+    let x_j = walk.rivals.vertex(Slot::Latest);
     if walk.scene.shape.clearance(x_j.point) >= reach {
-        return;
+        return None;
     }
-    let Some(guide) = walk.rivals.choose_guide() else { return };
-    let guess = x_j.guess(walk, guide);
-    walk.rivals.vertices[1] = x_j;
-    let Some(guess) = guess.filter(|guess| guess.distance < reach) else { return };
-    let Some(lobe) = technique.lobe(&walk.boundary, guide, &guess) else { return };
+    let guide = walk.rivals.choose_guide()?;
+    let guess = walk.guess(Slot::Latest, guide).filter(|guess| guess.distance < reach)?;
+    let lobe = technique.lobe(&walk.boundary, guide, &guess)?;
 
     let light = &walk.scene.lights[guide.light];
     let (w_l, radiance) = match lobe {
@@ -157,43 +169,15 @@ pub(super) fn call<B: Bands>(walk: &mut Walk<'_, Connections<'_>, B>, technique:
         }
         Lobe::About { .. } => (guide.axis, None),
     };
-    let u = walk.rivals.stream.draw2();
-    let Some(dir) = lobe.sample(technique.wide_share, w_l, u) else { return };
+    let dir = lobe.sample(technique.wide_share, w_l, walk.rivals.stream.draw2())?;
     walk.scores.count(Cost::Rays);
     let ray = Ray { origin: x_j.point, dir };
-    let Some(hit) = walk.scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY) else { return };
-    let Some(exit) = walk.exit_at(hit, dir) else { return };
+    let hit = walk.scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY)?;
+    let exit = walk.exit_at(hit, dir)?;
     let w_l = match lobe {
         Lobe::Refraction { .. } => w_l,
-        Lobe::About { .. } => match walk.boundary.refract(exit.wo) {
-            Some(local) => exit.frame.to_world(local),
-            None => return,
-        },
+        Lobe::About { .. } => exit.frame.to_world(walk.boundary.refract(exit.wo)?),
     };
-    if !walk.leads_outside(&exit, w_l) {
-        return;
-    }
-    let keep = walk.rivals.unidirectional();
-    let end = End::new(walk, guide, &exit, w_l, keep, radiance);
-    if end.value == 0.0 || end.guide == 0.0 {
-        return;
-    }
-    let mut rivals = density(walk, &mut x_j, guide, (dir, hit.t), w_l, &end);
-    if walk.rivals.count >= 2
-        && setup.options.strategies.subdivides()
-        && let Some(middle) = Middle::new(x_i.point, x_j.point, hit.point, hit.normal)
-        && walk.sees_point(x_i.point, hit.point)
-    {
-        rivals += subdivision::density(walk, &mut x_i, guide, &middle, &exit, &end);
-        walk.rivals.vertices[0] = x_i;
-    }
-    walk.scores.count(Cost::ShadowRays);
-    if walk.scene.shape.occluded(&Ray { origin: hit.point, dir: w_l }, Some(hit.face)) {
-        return;
-    }
-    let mut bands = walk.bands.clone();
-    bands.turn(&walk.scene.medium, x_j.arrival.dot(dir));
-    bands.flight(&walk.scene.medium, hit.t, false);
-    let score = walk.throughput * end.value / (bands.density() * end.unidirectional + rivals);
-    walk.score_with(&bands, walk.history.class(), guide.light, score);
+    let leg = Leg { dir, length: hit.t };
+    walk.leads_outside(&exit, w_l).then_some(GuidedEnd { guide, exit, leg, w_l, radiance })
 }

@@ -13,10 +13,12 @@
 
 mod bidirectional;
 mod connections;
+mod end;
 mod guess;
 mod guide;
 mod last_vertex;
 mod probe;
+mod state;
 mod subdivision;
 mod two_bounce;
 
@@ -31,11 +33,11 @@ use crate::optics::joint::{JointDirections, JointTable};
 use crate::sampling::stream::{PassKey, Purpose};
 use crate::scene::Scene;
 
-use connections::Connections;
 use guide::Guide;
+use state::Connections;
 
 pub use bidirectional::Bidirectional;
-pub use connections::Call;
+pub use end::Call;
 pub use last_vertex::LastVertex;
 pub use probe::ProbeShares;
 pub use two_bounce::TwoBounce;
@@ -223,7 +225,7 @@ fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
 }
 
 impl Snee {
-    fn play<B: super::bands::Bands>(&self, setup: usize, path: Path, scores: &mut Scores, bands: B) {
+    fn play<B: super::bands::WalkBands>(&self, setup: usize, path: Path, scores: &mut Scores, bands: B) {
         let setup = &self.setups[setup];
         if setup.guides.is_empty() {
             Walk::play(path, scores, Unrivalled, bands);

@@ -33,15 +33,15 @@ impl ProbeShares {
 }
 
 /// The mixture at one vertex.
-pub(super) struct Probe {
+pub(super) struct ProbeMixture {
     shares: ProbeShares,
     plane: Option<PlaneLobe>,
     guided: Option<TowardsPoint>,
 }
 
-impl Probe {
+impl ProbeMixture {
     /// At a vertex; lobes that its guess does not allow give their share to the uniform one.
-    pub fn new(shares: ProbeShares, guess: Option<&Guess>, mfp: f64) -> Probe {
+    pub fn new(shares: ProbeShares, guess: Option<&Guess>, mfp: f64) -> ProbeMixture {
         let plane = guess.filter(|_| shares.plane > 0.0).and_then(|guess| {
             let height = guess.distance * guess.dir.dot(guess.normal);
             (height > 0.0).then(|| PlaneLobe::new(guess.normal, height, mfp))
@@ -54,7 +54,7 @@ impl Probe {
             ..shares
         };
         let shares = ProbeShares { uniform: 1.0 - shares.plane - shares.guided, ..shares };
-        Probe { shares, plane, guided }
+        ProbeMixture { shares, plane, guided }
     }
 
     /// A direction from the vertex.

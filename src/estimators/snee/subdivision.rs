@@ -13,13 +13,13 @@
 //! horizon) counts as 0.
 
 use super::SneeOptions;
-use super::connections::{Call, Connections, End, Middle, Vertex};
+use super::end::{Call, End, Middle};
 use super::guide::Guide;
-use super::last_vertex;
-use super::probe::Probe;
+use super::probe::ProbeMixture;
+use super::state::{Connections, Slot};
 use crate::estimators::Cost;
-use crate::estimators::bands::Bands;
-use crate::estimators::walk::{Exit, Walk};
+use crate::estimators::bands::WalkBands;
+use crate::estimators::walk::{Walk, WalkExit};
 use crate::geometry::{FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
@@ -29,7 +29,7 @@ use crate::sampling::distance::{DistanceMixture, Equiangular, transmittance};
 const EXPONENTIAL: f64 = 0.5;
 
 /// How far a ray goes before distances along it end: to the boundary, or without end.
-fn chord<B: Bands>(walk: &mut Walk<'_, Connections<'_>, B>, ray: &Ray, from: Option<FaceId>) -> f64 {
+fn chord<B: WalkBands>(walk: &mut Walk<'_, Connections<'_>, B>, ray: &Ray, from: Option<FaceId>) -> f64 {
     if !walk.rivals.setup.options.truncated {
         return f64::INFINITY;
     }
@@ -39,7 +39,7 @@ fn chord<B: Bands>(walk: &mut Walk<'_, Connections<'_>, B>, ray: &Ray, from: Opt
 }
 
 /// Distances from x_k along `dir`, top to bottom.
-fn from_boundary<B: Bands>(
+fn from_boundary<B: WalkBands>(
     walk: &mut Walk<'_, Connections<'_>, B>,
     x_i: DVec3,
     hit: &Hit,
@@ -52,7 +52,7 @@ fn from_boundary<B: Bands>(
 }
 
 /// Distances from x_i along `dir`, bottom to top.
-fn from_vertex<B: Bands>(
+fn from_vertex<B: WalkBands>(
     walk: &mut Walk<'_, Connections<'_>, B>,
     x_i: DVec3,
     x_k: DVec3,
@@ -64,26 +64,26 @@ fn from_vertex<B: Bands>(
 
 /// The density of both directions of subdivision for an end, over U, times the density of the walk up to x_i.
 /// The caller has seen to it that x_i sees x_k.
-pub(super) fn density<B: Bands>(
+pub(super) fn density<B: WalkBands>(
     walk: &mut Walk<'_, Connections<'_>, B>,
-    x_i: &mut Vertex,
-    guide: &Guide,
+    x_i: Slot,
     middle: &Middle,
-    exit: &Exit,
-    end: &End,
+    exit: &WalkExit,
+    end: &End<'_>,
 ) -> f64 {
     let setup = walk.rivals.setup;
     let options = &setup.options;
-    if end.guide == 0.0 {
+    if end.by_guide == 0.0 {
         return 0.0;
     }
-    let call = options.call_for(&walk.boundary, guide);
+    let call = options.call_for(&walk.boundary, end.guide);
     let needs_guess = call.decay > 0.0 || options.probe.needs_guess();
-    let guess = if needs_guess { x_i.guess(walk, guide) } else { None };
+    let guess = if needs_guess { walk.guess(x_i, end.guide) } else { None };
     let q = call.probability(setup.sigma, guess.as_ref());
     if q == 0.0 {
         return 0.0;
     }
+    let x_i = walk.rivals.vertex(x_i);
     let edge = exit.hit.point - x_i.point;
     let d_ik = edge.length();
     let to_k = edge / d_ik;
@@ -91,30 +91,34 @@ pub(super) fn density<B: Bands>(
     if cos_ik <= 0.0 {
         return 0.0;
     }
-    let probe = Probe::new(options.probe, guess.as_ref(), 1.0 / setup.sigma);
+    let probe = ProbeMixture::new(options.probe, guess.as_ref(), 1.0 / setup.sigma);
     let point = q * probe.pdf(to_k) * cos_ik / (d_ik * d_ik);
 
+    let Middle { to_j, to_k: leg_k, cos_k } = middle;
     let mut sum = 0.0;
     if options.strategies.top_to_bottom && end.reverse > 0.0 {
-        let distances = from_boundary(walk, x_i.point, &exit.hit, -middle.to_k);
-        let pdf_distance = distances.map_or(0.0, |d| d.pdf_distance(middle.d_jk));
-        sum += end.guide * end.reverse * pdf_distance * (middle.d_ij * middle.d_ij);
+        let distances = from_boundary(walk, x_i.point, &exit.hit, -leg_k.dir);
+        let pdf_distance = distances.map_or(0.0, |d| d.pdf_distance(leg_k.length));
+        sum += end.by_guide * end.reverse * pdf_distance * (to_j.length * to_j.length);
     }
     if options.strategies.bottom_to_top && end.forward > 0.0 {
-        let distances = from_vertex(walk, x_i.point, exit.hit.point, middle.to_j);
-        let pdf_distance = distances.map_or(0.0, |d| d.pdf_distance(middle.d_ij));
+        let distances = from_vertex(walk, x_i.point, exit.hit.point, to_j.dir);
+        let pdf_distance = distances.map_or(0.0, |d| d.pdf_distance(to_j.length));
         let directions = setup.joint.towards(x_i.arrival, to_k);
-        let pdf_direction = directions.pdf(middle.to_j);
-        sum += guide.choice * pdf_direction * pdf_distance * end.forward * (middle.d_jk * middle.d_jk);
+        let pdf_direction = directions.pdf(to_j.dir);
+        sum += end.guide.choice
+            * pdf_direction
+            * pdf_distance
+            * end.forward
+            * (leg_k.length * leg_k.length);
     }
     if sum == 0.0 {
         return 0.0;
     }
     let medium = &walk.medium;
-    let phases =
-        medium.phase.pdf(x_i.arrival.dot(middle.to_j)) * medium.phase.pdf(middle.to_j.dot(middle.to_k));
-    let through = transmittance(medium.sigma_t, middle.d_ij + middle.d_jk);
-    point * sum * x_i.walks / (phases * medium.sigma_t * through * middle.cos_k)
+    let phases = medium.phase.pdf(x_i.arrival.dot(to_j.dir)) * medium.phase.pdf(to_j.dir.dot(leg_k.dir));
+    let through = transmittance(medium.sigma_t, to_j.length + leg_k.length);
+    point * sum * x_i.walks / (phases * medium.sigma_t * through * cos_k)
 }
 
 impl SneeOptions {
@@ -125,151 +129,122 @@ impl SneeOptions {
     }
 }
 
-/// Draws both directions of subdivision at the walk's latest vertex and scores what they find.
-pub(super) fn call<B: Bands>(walk: &mut Walk<'_, Connections<'_>, B>) {
-    let setup = walk.rivals.setup;
-    let options = &setup.options;
-    let Some(guide) = walk.rivals.choose_guide() else { return };
-    let call = options.call_for(&walk.boundary, guide);
-    let Some(reach) = call.reach(setup.sigma, walk.rivals.stream.draw()) else { return };
-    let mut x_i = walk.rivals.vertices[1];
-    if reach < f64::INFINITY && walk.scene.shape.clearance(x_i.point) >= reach {
-        return;
-    }
-    let needs_guess = call.decay > 0.0 || options.probe.needs_guess();
-    let guess = if needs_guess { x_i.guess(walk, guide) } else { None };
-    walk.rivals.vertices[1] = x_i;
-    if reach < f64::INFINITY && guess.is_none_or(|guess| guess.distance >= reach) {
-        return;
-    }
-    let probe = Probe::new(options.probe, guess.as_ref(), 1.0 / setup.sigma);
-    let to_k = probe.sample(walk.rivals.stream.draw2());
-    walk.scores.count(Cost::Rays);
-    let ray = Ray { origin: x_i.point, dir: to_k };
-    let Some(hit) = walk.scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY) else { return };
-    if options.strategies.top_to_bottom {
-        top_to_bottom(walk, &mut x_i, guide, &hit);
-    }
-    if options.strategies.bottom_to_top {
-        bottom_to_top(walk, &mut x_i, guide, &hit);
-    }
-    walk.rivals.vertices[1] = x_i;
+/// An edge from the walk's latest vertex to a boundary point.
+pub(super) struct ProbedEdge<'a> {
+    guide: &'a Guide,
+    hit: Hit,
 }
 
-fn top_to_bottom<B: Bands>(
-    walk: &mut Walk<'_, Connections<'_>, B>,
-    x_i: &mut Vertex,
-    guide: &Guide,
-    hit: &Hit,
-) {
+/// A subdivided edge and the direction to the light at its end.
+pub(super) struct Subdivided<'a> {
+    pub guide: &'a Guide,
+    pub x_j: DVec3,
+    pub middle: Middle,
+    pub exit: WalkExit,
+    /// Towards the light.
+    pub w_l: DVec3,
+    /// Of the light, where it is known from the draw.
+    pub radiance: Option<f64>,
+}
+
+/// Draws an edge at the walk's latest vertex.
+pub(super) fn draw_edge<'a, B: WalkBands>(
+    walk: &mut Walk<'_, Connections<'a>, B>,
+) -> Option<ProbedEdge<'a>> {
+    let setup = walk.rivals.setup;
+    let options = &setup.options;
+    let guide = walk.rivals.choose_guide()?;
+    let call = options.call_for(&walk.boundary, guide);
+    let reach = call.reach(setup.sigma, walk.rivals.stream.draw())?;
+    let x_i = walk.rivals.vertex(Slot::Latest);
+    if reach < f64::INFINITY && walk.scene.shape.clearance(x_i.point) >= reach {
+        return None;
+    }
+    let needs_guess = call.decay > 0.0 || options.probe.needs_guess();
+    let guess = if needs_guess { walk.guess(Slot::Latest, guide) } else { None };
+    if reach < f64::INFINITY && guess.is_none_or(|guess| guess.distance >= reach) {
+        return None;
+    }
+    let probe = ProbeMixture::new(options.probe, guess.as_ref(), 1.0 / setup.sigma);
+    let dir = probe.sample(walk.rivals.stream.draw2());
+    walk.scores.count(Cost::Rays);
+    let ray = Ray { origin: x_i.point, dir };
+    let hit = walk.scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY)?;
+    Some(ProbedEdge { guide, hit })
+}
+
+/// Subdivides an edge from the light's end.
+pub(super) fn top_to_bottom<'a, B: WalkBands>(
+    walk: &mut Walk<'_, Connections<'a>, B>,
+    edge: &ProbedEdge<'a>,
+) -> Option<Subdivided<'a>> {
+    let &ProbedEdge { guide, hit } = edge;
+    let x_i = walk.rivals.vertex(Slot::Latest);
     let light = &walk.scene.lights[guide.light];
     let sample = guide.sample(light, walk.band, walk.rivals.stream.draw2());
     let [u, v, w] = walk.rivals.stream.draw3();
     let frame = Frame::about(hit.shading_normal);
     let from = frame.to_local(sample.wi);
-    let exit = Exit { hit: *hit, frame, wo: DVec3::ZERO };
+    let exit = WalkExit { hit, frame, wo: DVec3::ZERO };
     if !walk.leads_outside(&exit, sample.wi) {
-        return;
+        return None;
     }
     let inward = match walk.boundary {
         Boundary::Rough { .. } => walk.boundary.sample_refraction(from, [u, v]),
         _ => walk.boundary.refract(from),
     };
-    let Some(dir) = inward.map(|inward| frame.to_world(inward)) else { return };
+    let dir = frame.to_world(inward?);
     if dir.dot(hit.normal) >= 0.0 {
-        return;
+        return None;
     }
-    let Some(distances) = from_boundary(walk, x_i.point, hit, dir) else { return };
+    let distances = from_boundary(walk, x_i.point, &hit, dir)?;
     let t = distances.sample(w);
     let down = Ray { origin: hit.point, dir };
     let x_j = down.at(t);
-    let Some(middle) = Middle::new(x_i.point, x_j, hit.point, hit.normal) else { return };
-    let exit = Exit { wo: frame.to_local(dir), ..exit };
+    let middle = Middle::new(x_i.point, x_j, &hit)?;
+    let exit = WalkExit { wo: frame.to_local(dir), ..exit };
     // The leg from x_k to x_j, unless the chord has measured it.
     if distances.t_max == f64::INFINITY {
         walk.scores.count(Cost::ShadowRays);
         if walk.scene.shape.intersect(&down, Side::Inside, Some(hit.face), t).is_some() {
-            return;
+            return None;
         }
     }
-    score(walk, x_i, guide, &middle, x_j, &exit, (sample.wi, Some(sample.radiance)));
+    Some(Subdivided { guide, x_j, middle, exit, w_l: sample.wi, radiance: Some(sample.radiance) })
 }
 
-fn bottom_to_top<B: Bands>(
-    walk: &mut Walk<'_, Connections<'_>, B>,
-    x_i: &mut Vertex,
-    guide: &Guide,
-    hit: &Hit,
-) {
+/// Subdivides an edge from the walk's end.
+pub(super) fn bottom_to_top<'a, B: WalkBands>(
+    walk: &mut Walk<'_, Connections<'a>, B>,
+    edge: &ProbedEdge<'a>,
+) -> Option<Subdivided<'a>> {
+    let &ProbedEdge { guide, hit } = edge;
+    let x_i = walk.rivals.vertex(Slot::Latest);
     if walk.scene.lights[guide.light].is_directional() {
-        return; // refraction never finds the one direction
+        return None; // refraction never finds the one direction
     }
     let [a, b, c] = walk.rivals.stream.draw3();
     let [u, v] = walk.rivals.stream.draw2();
     let to_k = (hit.point - x_i.point).normalize();
     let dir = walk.rivals.setup.joint.towards(x_i.arrival, to_k).sample([a, b]);
-    let Some(distances) = from_vertex(walk, x_i.point, hit.point, dir) else { return };
-    let s = distances.sample(c);
+    let s = from_vertex(walk, x_i.point, hit.point, dir)?.sample(c);
     let leg = Ray { origin: x_i.point, dir };
     let x_j = leg.at(s);
-    let Some(middle) = Middle::new(x_i.point, x_j, hit.point, hit.normal) else { return };
-    let Some(exit) = walk.exit_at(*hit, middle.to_k) else { return };
+    let middle = Middle::new(x_i.point, x_j, &hit)?;
+    let exit = walk.exit_at(hit, middle.to_k.dir)?;
     let outward = match walk.boundary {
         Boundary::Rough { .. } => walk.boundary.sample_refraction(exit.wo, [u, v]),
         _ => walk.boundary.refract(exit.wo),
     };
-    let Some(w_l) = outward.map(|outward| exit.frame.to_world(outward)) else { return };
+    let w_l = exit.frame.to_world(outward?);
     if !walk.leads_outside(&exit, w_l) {
-        return;
+        return None;
     }
     if !walk.rivals.setup.options.truncated {
         walk.scores.count(Cost::ShadowRays);
         if walk.scene.shape.intersect(&leg, Side::Inside, None, s).is_some() {
-            return;
+            return None;
         }
     }
-    score(walk, x_i, guide, &middle, x_j, &exit, (w_l, None));
-}
-
-/// Scores a subdivided path; the leg along which x_j was drawn is known to be free.
-fn score<B: Bands>(
-    walk: &mut Walk<'_, Connections<'_>, B>,
-    x_i: &mut Vertex,
-    guide: &Guide,
-    middle: &Middle,
-    x_j: DVec3,
-    exit: &Exit,
-    (w_l, radiance): (DVec3, Option<f64>),
-) {
-    let keep = walk.rivals.takes_part(2);
-    let end = End::new(walk, guide, exit, w_l, keep, radiance);
-    if end.value == 0.0 || end.guide == 0.0 {
-        return;
-    }
-    let media = &walk.scene.medium;
-    let mut bands = walk.bands.clone();
-    bands.turn(media, x_i.arrival.dot(middle.to_j));
-    bands.flight(media, middle.d_ij, true);
-    let mut x_j = Vertex::new(x_j, middle.to_j, bands.density());
-    bands.turn(media, middle.to_j.dot(middle.to_k));
-    bands.flight(media, middle.d_jk, false);
-    let rivals = density(walk, x_i, guide, middle, exit, &end)
-        + last_vertex::density(walk, &mut x_j, guide, (middle.to_k, middle.d_jk), w_l, &end);
-    let survival = walk.bands.survival(&walk.medium);
-    let value = walk.throughput * survival * end.value / (bands.density() * end.unidirectional + rivals);
-    if value == 0.0 {
-        return;
-    }
-    walk.scores.count(Cost::ShadowRays);
-    let shadow = Ray { origin: exit.hit.point, dir: w_l };
-    if walk.scene.shape.occluded(&shadow, Some(exit.hit.face)) {
-        return;
-    }
-    // The leg that closes the path: to x_i from the top, to x_k from the bottom; the other one is free.
-    if !walk.sees_point(x_i.point, x_j.point) || !walk.sees_point(x_j.point, exit.hit.point) {
-        return;
-    }
-    let mut history = walk.history;
-    history.scatter();
-    walk.score_with(&bands, history.class(), guide.light, value);
+    Some(Subdivided { guide, x_j, middle, exit, w_l, radiance: None })
 }

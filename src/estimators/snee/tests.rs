@@ -11,6 +11,7 @@ use crate::optics::medium::Medium;
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::StreamKey;
+use crate::scene::sensor::Probe;
 use crate::scene::{Emission, LatLong, Light, Sensor};
 
 const ROUGH: Boundary =
@@ -53,7 +54,7 @@ fn scene(boundary: Boundary, media: &[(f64, f64, f64)], light: Light) -> Arc<Sce
             .map(|&(sigma_t, albedo, g)| Medium { sigma_t, albedo, phase: HenyeyGreenstein { g } })
             .collect(),
         lights: vec![light],
-        sensor: Sensor::Probe { ray, paths: 256 },
+        sensor: Sensor::Probe(Probe { ray, paths: 256 }),
     })
 }
 

@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use super::connections::Connections;
+use super::state::Connections;
 use super::{Snee, SneeOptions};
 use crate::error::{Error, Result};
 use crate::estimators::bands::OneBand;
@@ -27,7 +27,7 @@ impl TwoBounce {
     /// # Errors
     /// Another sensor; bands that share walks.
     pub fn new(scene: Arc<Scene>, options: SneeOptions) -> Result<TwoBounce> {
-        if !matches!(scene.sensor, Sensor::Vertex { .. }) {
+        if !matches!(scene.sensor, Sensor::Vertex(_)) {
             return Err(Error::input(
                 "two_bounce starts at a medium vertex: its sensor must be a `vertex`",
             ));
@@ -58,9 +58,5 @@ impl Estimator for TwoBounce {
                 }
             }
         }
-    }
-
-    fn notes(&self) -> Vec<String> {
-        Vec::new()
     }
 }

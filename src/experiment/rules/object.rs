@@ -3,7 +3,8 @@
 use super::{At, one_per_band, spectrum, value_rule};
 use crate::experiment::resolve::{Band, BandMedium, eta_materials};
 use crate::experiment::schema::{
-    Bands, Boundary, Coefficients, Eta, EtaFormula, Medium, Shape, SkinFractions, Spectrum,
+    Bands, BoundaryEntry, Coefficients, Eta, EtaFormula, MediumEntry, ShapeEntry, SkinFractions,
+    Spectrum,
 };
 use crate::experiment::suggest;
 use crate::optics::materials;
@@ -11,7 +12,7 @@ use crate::optics::materials;
 /// The rules of the body in the bands.
 pub fn object(at: At, bands: &Bands) {
     let list = bands.list();
-    let body: Option<Shape> = at.typed("shape");
+    let body: Option<ShapeEntry> = at.typed("shape");
     if let Some(body) = &body {
         shape(at.to("shape"), body);
     }
@@ -20,21 +21,21 @@ pub fn object(at: At, bands: &Bands) {
     }
     if let Some(inside) = at.typed("medium") {
         medium(at.to("medium"), &inside, bands);
-        if matches!(body, Some(Shape::HalfSpace {})) {
+        if matches!(body, Some(ShapeEntry::HalfSpace {})) {
             conservative(at.to("medium"), &inside, &list);
         }
     }
 }
 
-fn shape(at: At, shape: &Shape) {
+fn shape(at: At, shape: &ShapeEntry) {
     match shape {
-        Shape::Box { size_mm } => positive(at.to("box").to("size_mm"), size_mm),
-        Shape::DrilledBox { size_mm, .. } => positive(at.to("drilled_box").to("size_mm"), size_mm),
-        Shape::Torus { major_radius_mm, minor_radius_mm, .. } => {
+        ShapeEntry::Box { size_mm } => positive(at.to("box").to("size_mm"), size_mm),
+        ShapeEntry::DrilledBox { size_mm, .. } => positive(at.to("drilled_box").to("size_mm"), size_mm),
+        ShapeEntry::Torus { major_radius_mm, minor_radius_mm, .. } => {
             let at = at.to("torus").to("minor_radius_mm");
             less(at, *minor_radius_mm, "major_radius_mm", *major_radius_mm);
         }
-        Shape::CavitySphere { radius_mm, cavity_radius_mm, .. } => {
+        ShapeEntry::CavitySphere { radius_mm, cavity_radius_mm, .. } => {
             let at = at.to("cavity_sphere").to("cavity_radius_mm");
             less(at, *cavity_radius_mm, "radius_mm", *radius_mm);
         }
@@ -54,10 +55,10 @@ fn positive(at: At, values: &[f64]) {
     }
 }
 
-fn boundary(at: At, boundary: &Boundary, bands: &[Band]) {
+fn boundary(at: At, boundary: &BoundaryEntry, bands: &[Band]) {
     match boundary {
-        Boundary::Smooth { eta: index } => eta(at.to("smooth").to("eta"), index, bands),
-        Boundary::Rough { eta: index, .. } => {
+        BoundaryEntry::Smooth { eta: index } => eta(at.to("smooth").to("eta"), index, bands),
+        BoundaryEntry::Rough { eta: index, .. } => {
             let at = at.to("rough").to("eta");
             eta(at, index, bands);
             // Without refraction no facet is told from another: the half-vector has no direction.
@@ -66,7 +67,7 @@ fn boundary(at: At, boundary: &Boundary, bands: &[Band]) {
                 at.report_help("a rough boundary needs an index other than 1", help);
             }
         }
-        Boundary::Matched {} => {}
+        BoundaryEntry::Matched {} => {}
     }
 }
 
@@ -93,11 +94,13 @@ fn eta(at: At, index: &Eta, bands: &[Band]) {
     }
 }
 
-fn medium(at: At, medium: &Medium, bands: &Bands) {
+fn medium(at: At, medium: &MediumEntry, bands: &Bands) {
     match medium {
-        Medium::Coefficients(given) => coefficients(at.to("coefficients"), given, bands.list().len()),
-        Medium::Skin(words) => skin(at.to("skin"), words, &bands.list()),
-        Medium::Preset { name, .. } => {
+        MediumEntry::Coefficients(given) => {
+            coefficients(at.to("coefficients"), given, bands.list().len())
+        }
+        MediumEntry::Skin(words) => skin(at.to("skin"), words, &bands.list()),
+        MediumEntry::Preset { name, .. } => {
             let at = at.to("preset");
             if materials::find(name).is_none() {
                 let help = suggest::help(name, &materials::names(), "materials");
@@ -159,9 +162,9 @@ fn coefficients(at: At, given: &Coefficients, bands: usize) {
 }
 
 /// Without absorption a walk in a half-space returns surely, but after infinitely many steps on average.
-fn conservative(at: At, medium: &Medium, bands: &[Band]) {
+fn conservative(at: At, medium: &MediumEntry, bands: &[Band]) {
     let key = match medium {
-        Medium::Coefficients(given) if given.albedo.is_some() => "albedo",
+        MediumEntry::Coefficients(given) if given.albedo.is_some() => "albedo",
         _ => "sigma_a_per_mm",
     };
     let Some(coefficients) = medium.per_band(bands) else { return };

@@ -3,7 +3,7 @@
 use super::At;
 use super::claims::{Known, axis, band, estimator};
 use crate::experiment::picture::{PictureEntry, Split};
-use crate::experiment::schema::Sensor;
+use crate::experiment::schema::SensorEntry;
 
 /// The rules of one picture.
 pub fn picture(at: At, picture: &PictureEntry, known: &Known) {
@@ -43,10 +43,10 @@ fn split(at: At, words: &Split, known: &Known) {
 }
 
 /// Split pictures need pixels: `at` is the list of pictures, `sensor` that of a cell.
-pub fn has_pixels(at: At, sensor: &Sensor) {
+pub fn has_pixels(at: At, sensor: &SensorEntry) {
     let first = (0..at.count()).find(|i| at.item(*i).has("split"));
     let Some(first) = first else { return };
-    if matches!(sensor, Sensor::Probe { .. } | Sensor::Flux { .. } | Sensor::Rings { .. }) {
+    if !sensor.has_pixels() {
         at.item(first).report_help(
             "a split picture needs pixels, and the sensor has none",
             "take an `orthographic` or a `perspective` sensor in every cell, or drop the picture",

@@ -1,8 +1,8 @@
 //! Rules of `sensor`.
 
 use super::{At, nonzero};
-use crate::experiment::resolve::unit;
-use crate::experiment::schema::{Direction, Sensor, Shape};
+use crate::experiment::direction::{Direction, unit};
+use crate::experiment::schema::{SensorEntry, ShapeEntry};
 use crate::math::DVec3;
 
 /// Sines of the angle between view and `up` below this leave the image's turn undefined.
@@ -10,10 +10,10 @@ const PARALLEL: f64 = 1e-9;
 
 /// Directions are directions, `up` is not along the view, fluxes of planes are about +z, and
 /// caps of directions look at finite bodies, rings lie on planes and widen.
-pub fn sensor(at: At, sensor: &Sensor, shape: Option<&Shape>) {
-    let is_planar = matches!(shape, Some(Shape::HalfSpace {} | Shape::Slab { .. }));
+pub fn sensor(at: At, sensor: &SensorEntry, shape: Option<&ShapeEntry>) {
+    let is_planar = matches!(shape, Some(ShapeEntry::HalfSpace {} | ShapeEntry::Slab { .. }));
     match sensor {
-        Sensor::Orthographic { toward, up, acceptance_sr, .. } => {
+        SensorEntry::Orthographic { toward, up, acceptance_sr, .. } => {
             let at = at.to("orthographic");
             if acceptance_sr.is_some() && is_planar {
                 at.to("acceptance_sr").report(
@@ -25,7 +25,7 @@ pub fn sensor(at: At, sensor: &Sensor, shape: Option<&Shape>) {
                 upright(at.to("up"), *up, toward.unit());
             }
         }
-        Sensor::Perspective { position_mm, look_at_mm, up, .. } => {
+        SensorEntry::Perspective { position_mm, look_at_mm, up, .. } => {
             let at = at.to("perspective");
             let view = DVec3::from_array(*look_at_mm) - DVec3::from_array(*position_mm);
             if view == DVec3::ZERO {
@@ -34,19 +34,19 @@ pub fn sensor(at: At, sensor: &Sensor, shape: Option<&Shape>) {
                 upright(at.to("up"), *up, unit(view.to_array()));
             }
         }
-        Sensor::Probe { toward, .. } => {
+        SensorEntry::Probe { toward, .. } => {
             direction(at.to("probe").to("toward"), toward);
         }
-        Sensor::Vertex { toward, .. } => {
+        SensorEntry::Vertex { toward, .. } => {
             direction(at.to("vertex").to("toward"), toward);
         }
-        Sensor::Flux { axis, .. } => {
+        SensorEntry::Flux { axis, .. } => {
             let at = at.to("flux").to("axis");
             if nonzero(at, *axis) && is_planar && !(axis[..2] == [0.0, 0.0] && axis[2] > 0.0) {
                 at.report("the axis must be +z on a half_space and on a slab");
             }
         }
-        Sensor::Rings { edges_mm, .. } => {
+        SensorEntry::Rings { edges_mm, .. } => {
             if shape.is_some() && !is_planar {
                 at.to("rings").report_help(
                     "rings lie on the top face of a half_space or slab",

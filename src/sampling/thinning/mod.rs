@@ -22,8 +22,8 @@ use crate::math::exp;
 
 /// The probability of acceptance by distance (mm), and what makes deciding cheap.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rule {
-    form: Form,
+pub struct ThinningRule {
+    form: ThinningForm,
     /// Square of the distance beyond which p is at most 2^-k, for each k; a uniform number in [2^-k, 2^(1-k)) can only
     /// accept what is nearer.
     reach_squared: [f64; LEVELS],
@@ -34,7 +34,7 @@ const LEVELS: usize = 64;
 
 /// Forms of p(d).
 #[derive(Clone, Debug, PartialEq)]
-pub enum Form {
+pub enum ThinningForm {
     /// 1.
     All,
     /// e^(-sigma d).
@@ -63,13 +63,13 @@ pub enum Form {
     },
 }
 
-impl Form {
+impl ThinningForm {
     /// min(1, c f(d)) as a table, for a function that does not increase. What is tabulated is the probability by
     /// definition: tables coarser than `f` cost variance, not bias.
     ///
     /// c makes the mean of p over the disc of radius `reach` equal to `mean` (at most 1), so that two rules can be
     /// compared at equal numbers of accepted points.
-    pub fn proportional(f: impl Fn(f64) -> f64, reach: f64, mean: f64) -> Form {
+    pub fn proportional(f: impl Fn(f64) -> f64, reach: f64, mean: f64) -> ThinningForm {
         const INTERVALS: usize = 2048;
         let at = |k: usize| reach * square(k as f64 / INTERVALS as f64);
         let values: Vec<f64> = (0..=INTERVALS).map(|k| f(at(k))).collect();
@@ -90,20 +90,20 @@ impl Form {
             }
         }
         let c = crate::math::pow(2.0, 0.5 * (lo + hi));
-        Form::Table { values: values.iter().map(|value| (c * value).min(1.0)).collect(), reach }
+        ThinningForm::Table { values: values.iter().map(|value| (c * value).min(1.0)).collect(), reach }
     }
 
     /// p(d).
     #[inline]
     pub fn probability(&self, d: f64) -> f64 {
         match self {
-            Form::All => 1.0,
-            Form::Exponential { sigma } => exp(-sigma * d),
-            Form::MeanOfExponentials { sigmas } => {
+            ThinningForm::All => 1.0,
+            ThinningForm::Exponential { sigma } => exp(-sigma * d),
+            ThinningForm::MeanOfExponentials { sigmas } => {
                 sigmas.iter().map(|sigma| exp(-sigma * d)).sum::<f64>() / sigmas.len() as f64
             }
-            Form::Floor { sigma, least } => exp(-sigma * d).max(*least),
-            Form::Table { values, reach } => {
+            ThinningForm::Floor { sigma, least } => exp(-sigma * d).max(*least),
+            ThinningForm::Table { values, reach } => {
                 let intervals = values.len() - 1;
                 let at = intervals as f64 * (d / reach).sqrt();
                 let k = at as usize;
@@ -118,14 +118,14 @@ impl Form {
     }
 }
 
-impl Rule {
+impl ThinningRule {
     /// With everything that depends on p alone.
-    pub fn new(form: Form) -> Rule {
+    pub fn new(form: ThinningForm) -> ThinningRule {
         let reach_squared = std::array::from_fn(|k| {
             let reach = reach(&form, crate::math::pow(2.0, -(k as f64)));
             reach * reach
         });
-        Rule { form, reach_squared }
+        ThinningRule { form, reach_squared }
     }
 
     /// p(d), in (0, 1] but for underflow.
@@ -144,9 +144,9 @@ impl Rule {
     #[inline]
     fn varies(&self, factor: f64, [near, far]: [f64; 2], most: f64) -> bool {
         match self.form {
-            Form::All => false,
+            ThinningForm::All => false,
             // Without another exponential: e^x > 1 + x + x^2/2 says yes too rarely by what does not matter here.
-            Form::Exponential { sigma } => {
+            ThinningForm::Exponential { sigma } => {
                 let x = sigma * (far - near);
                 1.0 + x + 0.5 * x * x > factor
             }
@@ -164,7 +164,7 @@ impl Rule {
 }
 
 /// A distance beyond which p is at most `least`, from above; infinite where there is none.
-fn reach(form: &Form, least: f64) -> f64 {
+fn reach(form: &ThinningForm, least: f64) -> f64 {
     let (mut lo, mut hi) = (0.0, 1.0);
     while form.probability(hi) > least {
         lo = hi;
@@ -201,7 +201,7 @@ pub struct Accepted {
 
 /// Counts of what a query did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Work {
+pub struct ThinningWork {
     /// Nodes of the hierarchy.
     pub nodes: u64,
     /// Points that a random number was spent on.
@@ -212,7 +212,7 @@ pub struct Work {
 
 /// Decides about the point at squared distance `squared`.
 #[inline]
-fn decide(rule: &Rule, u: f64, squared: f64) -> Option<(f64, f64)> {
+fn decide(rule: &ThinningRule, u: f64, squared: f64) -> Option<(f64, f64)> {
     if !rule.may_accept(u, squared) {
         return None;
     }

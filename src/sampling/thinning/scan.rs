@@ -1,6 +1,6 @@
 //! Thinning by asking every point: the oracle, and what the hierarchy does where nearly all are accepted.
 
-use super::{Accepted, Rule, Work, decide};
+use super::{Accepted, ThinningRule, ThinningWork, decide};
 use crate::math::DVec3;
 use crate::sampling::stream::Stream;
 
@@ -12,9 +12,9 @@ pub fn scan(
     points: [&[f64]; 3],
     range: std::ops::Range<usize>,
     at: DVec3,
-    rule: &Rule,
+    rule: &ThinningRule,
     stream: &mut Stream,
-    work: &mut Work,
+    work: &mut ThinningWork,
     mut accept: impl FnMut(Accepted),
 ) {
     let mut squared = [0.0; CHUNK];

@@ -12,16 +12,16 @@ fn stream(name: &str) -> Stream {
 const SKIN: [f64; 3] = [0.27224, 0.73178, 1.46479];
 const MEAN: f64 = 0.82293;
 
-fn rules() -> Vec<(&'static str, Rule)> {
+fn rules() -> Vec<(&'static str, ThinningRule)> {
     let falloff = |d: f64| exp(-0.5 * d) / (1.0 + d * d);
     [
-        ("all", Form::All),
-        ("exponential", Form::Exponential { sigma: MEAN }),
-        ("mean of exponentials", Form::MeanOfExponentials { sigmas: SKIN.to_vec() }),
-        ("floor", Form::Floor { sigma: MEAN, least: 1e-3 }),
-        ("proportional", Form::proportional(falloff, 40.0, 0.02)),
+        ("all", ThinningForm::All),
+        ("exponential", ThinningForm::Exponential { sigma: MEAN }),
+        ("mean of exponentials", ThinningForm::MeanOfExponentials { sigmas: SKIN.to_vec() }),
+        ("floor", ThinningForm::Floor { sigma: MEAN, least: 1e-3 }),
+        ("proportional", ThinningForm::proportional(falloff, 40.0, 0.02)),
     ]
-    .map(|(name, form)| (name, Rule::new(form)))
+    .map(|(name, form)| (name, ThinningRule::new(form)))
     .into()
 }
 
@@ -75,7 +75,7 @@ const BANDS: [f64; 12] = [
 
 #[test]
 fn probability_times_weight_is_one() {
-    let bands = BANDS.map(|sigma| ("a band", Rule::new(Form::Exponential { sigma })));
+    let bands = BANDS.map(|sigma| ("a band", ThinningRule::new(ThinningForm::Exponential { sigma })));
     for (name, rule) in rules().into_iter().chain(bands) {
         for k in 0..2000 {
             let d = 0.05 * f64::from(k);
@@ -88,7 +88,7 @@ fn probability_times_weight_is_one() {
 /// The probability in proportion to a function has the mean that was asked for.
 #[test]
 fn proportional_rule_accepts_as_many_as_asked() {
-    let rule = Rule::new(Form::proportional(|d| exp(-0.7 * d), 12.0, 0.05));
+    let rule = ThinningRule::new(ThinningForm::proportional(|d| exp(-0.7 * d), 12.0, 0.05));
     let mean = crate::math::integrate(|d| rule.probability(d) * 2.0 * d / 144.0, 0.0, 12.0, 1e-9);
     assert!((mean.value - 0.05).abs() < 1e-6, "{mean:?}");
 }
@@ -110,8 +110,8 @@ fn the_tree_partitions_the_points() {
     points.extend([points[17]; 100]); // coincident points share a code
     let tree = PointTree::new(&points);
     let mut seen = vec![0; points.len()];
-    let (mut work, mut stream) = (Work::default(), stream("the_tree_partitions_the_points"));
-    tree.thin(points[40], &Rule::new(Form::All), &mut stream, &mut work, |accepted| {
+    let (mut work, mut stream) = (ThinningWork::default(), stream("the_tree_partitions_the_points"));
+    tree.thin(points[40], &ThinningRule::new(ThinningForm::All), &mut stream, &mut work, |accepted| {
         let point = points[tree.order()[accepted.index] as usize];
         assert_eq!(point, tree.point(accepted.index));
         assert!((accepted.distance - (point - points[40]).length()).abs() < 1e-12);
@@ -121,24 +121,38 @@ fn the_tree_partitions_the_points() {
     assert!(seen.iter().all(|&count| count == 1));
     assert_eq!((work.accepted, work.candidates), (5100, 5100));
     let none = PointTree::new(&[]);
-    none.thin(DVec3::ZERO, &Rule::new(Form::All), &mut stream, &mut work, |_| unreachable!());
+    none.thin(
+        DVec3::ZERO,
+        &ThinningRule::new(ThinningForm::All),
+        &mut stream,
+        &mut work,
+        |_| unreachable!(),
+    );
     assert!(none.is_empty());
 }
 
 /// How often the tree or the scan accepts: per point, in pairs of neighbours, and in number.
-struct Counts {
+struct AcceptanceCounts {
     single: Vec<u32>,
     pair: Vec<u32>,
     number: Vec<f64>,
 }
 
-fn count(name: &str, rule: &Rule, queries: usize, by_tree: bool) -> (PointTree, DVec3, Counts) {
+fn count(
+    name: &str,
+    rule: &ThinningRule,
+    queries: usize,
+    by_tree: bool,
+) -> (PointTree, DVec3, AcceptanceCounts) {
     let points = sphere(2000, 10.0);
     let tree = PointTree::new(&points);
     let at = DVec3::new(0.0, 6.0, 8.0);
-    let mut counts =
-        Counts { single: vec![0; points.len()], pair: vec![0; points.len()], number: Vec::new() };
-    let (mut stream, mut work) = (stream(name), Work::default());
+    let mut counts = AcceptanceCounts {
+        single: vec![0; points.len()],
+        pair: vec![0; points.len()],
+        number: Vec::new(),
+    };
+    let (mut stream, mut work) = (stream(name), ThinningWork::default());
     let mut is_in = vec![false; points.len()];
     for _ in 0..queries {
         is_in.fill(false);
@@ -206,8 +220,8 @@ fn visits_follow_acceptances() {
     let points = sphere(1_000_000, 20.0);
     let tree = PointTree::new(&points);
     for (name, sigma) in [("skin", 0.82293), ("ketchup", 1.49566)] {
-        let rule = Rule::new(Form::Exponential { sigma });
-        let (mut work, mut stream) = (Work::default(), stream(name));
+        let rule = ThinningRule::new(ThinningForm::Exponential { sigma });
+        let (mut work, mut stream) = (ThinningWork::default(), stream(name));
         let at = sphere(50, 20.0);
         at.iter().for_each(|&at| tree.thin(at, &rule, &mut stream, &mut work, |_| {}));
         let [nodes, candidates, accepted] =
@@ -239,11 +253,11 @@ fn cost() {
             let start = std::time::Instant::now();
             let tree = PointTree::new(&points);
             let build = start.elapsed().as_secs_f64();
-            let rule = Rule::new(Form::Exponential { sigma });
+            let rule = ThinningRule::new(ThinningForm::Exponential { sigma });
             let at = sphere(20.max(2_000_000 / count), radius);
             let mut sum = 0.0;
             let mut time = |by_tree: bool| {
-                let (mut work, mut stream) = (Work::default(), stream(name));
+                let (mut work, mut stream) = (ThinningWork::default(), stream(name));
                 let start = std::time::Instant::now();
                 for &at in &at {
                     let accept = |accepted: Accepted| sum += accepted.weight;

@@ -18,7 +18,7 @@
 
 use std::ops::Range;
 
-use super::{Accepted, Rule, Work, decide};
+use super::{Accepted, ThinningRule, ThinningWork, decide};
 use crate::math::{DVec3, ln_1p};
 use crate::sampling::stream::Stream;
 
@@ -109,9 +109,9 @@ impl PointTree {
     pub fn thin(
         &self,
         at: DVec3,
-        rule: &Rule,
+        rule: &ThinningRule,
         stream: &mut Stream,
-        work: &mut Work,
+        work: &mut ThinningWork,
         mut accept: impl FnMut(Accepted),
     ) {
         let mut stack = [0u32; 128]; // a Morton code halves at most 63 times, equal codes 32 times more
@@ -144,9 +144,9 @@ impl PointTree {
 struct Query<'a> {
     tree: &'a PointTree,
     at: DVec3,
-    rule: &'a Rule,
+    rule: &'a ThinningRule,
     stream: &'a mut Stream,
-    work: &'a mut Work,
+    work: &'a mut ThinningWork,
 }
 
 impl Query<'_> {

@@ -4,7 +4,7 @@ use super::images::Planes;
 use super::pixels::Band;
 use crate::math::ln;
 use crate::results::image::Picture;
-use crate::results::record::EstimatorRun;
+use crate::results::record::{Cell, EstimatorRun, Observable};
 use crate::results::store::Stored;
 use crate::stats::efficiency::{LogRatio, jackknife_log_error};
 use crate::stats::hypothesis::Estimate;
@@ -36,13 +36,20 @@ pub struct Ratio {
     pub unresolved: Option<String>,
 }
 
-/// The ratio in every band. `seconds` are CPU seconds of all the images, and of the record's run.
+/// The ratio in every band, for a run of a cell. `seconds` are CPU seconds of all the images, and of the record's run.
 ///
 /// log V of the images is the pooled variance of their pixels, its error by a jackknife over seeds; of the
 /// record's, that of its pixels, its error by a jackknife over batches of the sum of its tiles' variances,
 /// which is the same sum of pixels. Seconds are taken as exact. t has K - 1 degrees of freedom.
-pub fn ratios(stored: &Stored, run: &EstimatorRun, planes: &Planes, seconds: [f64; 2]) -> Vec<Ratio> {
+pub fn ratios(
+    stored: &Stored,
+    cell: usize,
+    run: &EstimatorRun,
+    planes: &Planes,
+    seconds: [f64; 2],
+) -> Vec<Ratio> {
     let Some(picture) = Picture::of(stored, run) else { return vec![] };
+    let cell = &stored.record.cells[cell];
     let bands = stored.record.bands.iter().enumerate();
     bands
         .map(|(index, about)| {
@@ -52,7 +59,7 @@ pub fn ratios(stored: &Stored, run: &EstimatorRun, planes: &Planes, seconds: [f6
             let theirs: f64 = pixels.iter().map(|&i| band.variance(i)).sum();
             let ours: f64 = band.ours_error.iter().map(|e| e * e).sum();
             let theirs = (theirs * seconds[0], seeds_error(&band, &pixels));
-            let ours = (ours * seconds[1], batches_error(stored, run, index));
+            let ours = (ours * seconds[1], batches_error(stored, cell, run, index));
             let log = Estimate {
                 value: ln(theirs.0 / ours.0),
                 std_error: (theirs.1 * theirs.1 + ours.1 * ours.1).sqrt(),
@@ -93,8 +100,9 @@ fn seeds_error(band: &Band, pixels: &[usize]) -> f64 {
 
 /// The same of the record, by leaving out a batch at a time. A tile's factor, pixels squared, is nearly
 /// the same for all and left out.
-fn batches_error(stored: &Stored, run: &EstimatorRun, band: usize) -> f64 {
-    let tiles = run.observables.iter().enumerate().filter(|(_, o)| o.name.starts_with("tile_"));
+fn batches_error(stored: &Stored, cell: &Cell, run: &EstimatorRun, band: usize) -> f64 {
+    let is_tile = |o: &Observable| cell.region_of(o).is_some_and(|region| region.tile.is_some());
+    let tiles = run.observables.iter().enumerate().filter(|(_, o)| is_tile(o));
     let tiles: Vec<Vec<Moments>> = tiles.filter_map(|(o, _)| stored.moments(run, o, band)).collect();
     let batches = tiles.first().map_or(0, Vec::len);
     let without = |out: usize| {

@@ -6,7 +6,7 @@ use super::images::planes;
 use super::*;
 use crate::results::exr_file::ExrImage;
 use crate::results::npy::Array;
-use crate::results::record::{Bias, Image};
+use crate::results::record::{Bias, Image, Tile};
 use crate::results::sample;
 use crate::results::store::{Arrays, costs_path, observables_path, pixels_path, spread_path};
 use crate::stats::moments::{ImageMoments, Moments};
@@ -32,12 +32,21 @@ fn base(name: &str) -> u64 {
     u64::from_le_bytes([hash[0], hash[1], hash[2], hash[3], hash[4], hash[5], hash[6], hash[7]])
 }
 
+/// A tile of 4 x 4.
+fn tile(row: usize, column: usize) -> ObservedRegion {
+    let ends = |tile: usize| [tile * SIDE / 4, (tile + 1) * SIDE / 4];
+    let tile = Some(Tile { columns: ends(column), rows: ends(row) });
+    ObservedRegion { name: format!("tile_{row}_{column}"), tile }
+}
+
 /// A record of exponential scores; with `noise` 0 of the truth itself.
 fn stored(seed: u64, noise: f64) -> Stored {
-    let names: Vec<String> = std::iter::once("mean".to_string())
-        .chain((0..TILES * TILES).map(|k| format!("tile_{}_{}", k / TILES, k % TILES)))
-        .collect();
-    let regions: Vec<Vec<usize>> = names.iter().map(|n| region_pixels(n, SIDE, SIDE)).collect();
+    let observed: Vec<ObservedRegion> =
+        std::iter::once(ObservedRegion { name: "mean".into(), tile: None })
+            .chain((0..16).map(|k| tile(k / 4, k % 4)))
+            .collect();
+    let names: Vec<String> = observed.iter().map(|region| region.name.clone()).collect();
+    let regions: Vec<Vec<usize>> = observed.iter().map(|region| region.pixels(SIDE, SIDE)).collect();
     let mut moments = Counter::new(0, batch_level(PASSES));
     let mut pixels: Option<ImageMoments> = None;
     for pass in 0..PASSES {
@@ -64,6 +73,7 @@ fn stored(seed: u64, noise: f64) -> Stored {
     arrays.insert(costs_path(0, "mis"), Array::new(vec![batches.len(), 0], vec![]));
     let mut stored = sample::stored(0.1);
     stored.record.bands.truncate(1);
+    stored.record.cells[0].regions = observed;
     stored.record.cells[0].runs = vec![EstimatorRun {
         estimator: "mis".into(),
         control_of: None,
@@ -180,7 +190,7 @@ fn a_bias_is_found_and_its_size_is_what_was_promised() {
     assert_eq!(of(&few, "mean").outcome, Outcome::Underpowered);
 
     // One tile, and a pattern whose mean is 1 in every tile.
-    let tile = region_pixels("tile_3_0", SIDE, SIDE);
+    let tile = tile(3, 0).pixels(SIDE, SIDE);
     let in_tile =
         answer(&stored, &images(!seed, 8, 1.0, |i| if tile.contains(&i) { 1.4 } else { 1.0 }), true);
     assert_eq!(of(&in_tile, "tile_3_0").outcome, Outcome::Fail);

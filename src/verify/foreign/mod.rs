@@ -1,7 +1,7 @@
 //! Images rendered elsewhere, with two or more seeds, against a record of the same scene.
 //!
 //! What is tested, at one family-wise level over all bands (Holm):
-//! - the image mean and the 4 x 4 tiles: the seeds' means against the record's batches, both with their
+//! - the image mean and the tiles: the seeds' means against the record's batches, both with their
 //!   errors. By default a seed is one observation; where a user vouches for independent pixels, the
 //!   pixels' own spread says what a region's mean is worth, which has far more degrees of freedom;
 //! - the squared bias of all pixels, from products of different seeds (`pixels::squared_bias`).
@@ -14,7 +14,7 @@ use super::trial::{Arm, SHARE_LIMIT};
 use super::verdict::{Outcome, Verdict};
 use crate::error::{Error, Result};
 use crate::results::image::Picture;
-use crate::results::record::{EstimatorRun, Observable, Quantity};
+use crate::results::record::{EstimatorRun, Observable, ObservedRegion, Quantity};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::{Estimate, Spread};
 use crate::stats::tails::{chi_square_sf, normal_two_sided};
@@ -34,9 +34,6 @@ pub const LEVEL: f64 = 1e-4;
 
 /// One pixel of fewer than this many may well hold half of their spread.
 const FEW_PIXELS: usize = 64;
-
-/// Tiles per side.
-const TILES: usize = 4;
 
 /// The record disowns the user's word on independent pixels where their seeds' spread is less likely.
 const SPREAD_LEVEL: f64 = 1e-6;
@@ -116,12 +113,10 @@ pub fn judge(question: &Question, planes: &Planes) -> Result<Answer> {
     let Some(picture) = Picture::of(question.stored, run) else {
         return Err(Error::input("the record has no image"));
     };
-    let regions: Vec<&Observable> = run
-        .observables
-        .iter()
-        .filter(|o| o.class == question.class && (o.name == "mean" || o.name.starts_with("tile_")))
-        .filter(|o| !o.name.contains('@'))
-        .collect();
+    let cell = &question.stored.record.cells[question.cell];
+    let of_class = run.observables.iter().filter(|o| o.class == question.class);
+    let regions: Vec<(&Observable, &ObservedRegion)> =
+        of_class.filter_map(|o| Some((o, cell.region_of(o)?))).collect();
     if regions.is_empty() {
         let mut classes: Vec<&str> = run.observables.iter().map(|o| o.class.as_str()).collect();
         classes.sort_unstable();
@@ -138,8 +133,8 @@ pub fn judge(question: &Question, planes: &Planes) -> Result<Answer> {
         let band = Band::of(planes, &picture, index, run.passes);
         let asked = Asked { question, band: &band, index };
         let objection = band.not_finite();
-        for region in &regions {
-            findings.push(asked.region(region, objection.as_deref(), has_pixels));
+        for (observable, region) in &regions {
+            findings.push(asked.region(observable, region, objection.as_deref(), has_pixels));
         }
         if has_pixels {
             findings.push(asked.pixels(objection.as_deref()));
@@ -231,12 +226,18 @@ impl Asked<'_> {
     }
 
     /// The mean of a region.
-    fn region(&self, observable: &Observable, objection: Option<&str>, has_pixels: bool) -> Finding {
+    fn region(
+        &self,
+        observable: &Observable,
+        region: &ObservedRegion,
+        objection: Option<&str>,
+        has_pixels: bool,
+    ) -> Finding {
         let name = &observable.name;
         let Some(arm) = Arm::of(self.question.stored, &self.quantity(observable)) else {
             return self.finding(name, Shown::Nothing("the record does not hold this region".into()));
         };
-        let pixels = region_pixels(name, self.band.width, self.band.height);
+        let pixels = region.pixels(self.band.width, self.band.height);
         let theirs = self.theirs(&pixels);
         let mut finding = self.finding(name, Shown::Nothing(String::new()));
         (finding.verdict.value, finding.verdict.std_error) = (theirs.value, theirs.std_error);
@@ -250,7 +251,7 @@ impl Asked<'_> {
             Some(reason) => Shown::Nothing(reason),
             None => self.weigh(&theirs, &arm, &pixels, &mut finding.verdict),
         };
-        if name == "mean" {
+        if region.tile.is_none() {
             finding.detect = Some(self.question.detect);
             if arm.mean.value == 0.0 && !matches!(finding.shown, Shown::Nothing(_)) {
                 finding.shown = Shown::Nothing("the record's image is black: nothing to hold".into());
@@ -379,14 +380,6 @@ impl Asked<'_> {
 
 fn mean_of(values: &[f64], pixels: &[usize]) -> f64 {
     pixels.iter().map(|&i| values[i]).sum::<f64>() / pixels.len() as f64
-}
-
-/// The pixels of `mean` or `tile_ROW_COLUMN`: pixel x of n lies in tile 4 x / n, rounded down.
-fn region_pixels(name: &str, width: usize, height: usize) -> Vec<usize> {
-    let tile = |pixel: usize| {
-        format!("tile_{}_{}", pixel / width * TILES / height, pixel % width * TILES / width)
-    };
-    (0..width * height).filter(|&pixel| name == "mean" || tile(pixel) == name).collect()
 }
 
 #[cfg(test)]

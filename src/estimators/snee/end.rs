@@ -1,0 +1,159 @@
+//! The end of a path as connections see it.
+
+use super::guess::Guess;
+use super::guide::Guide;
+use crate::estimators::Cost;
+use crate::estimators::bands::WalkBands;
+use crate::estimators::walk::{Rivals, Walk, WalkExit};
+use crate::geometry::{Hit, Ray, Side};
+use crate::math::{DVec3, exp, ln};
+use crate::optics::boundary::Boundary;
+
+/// With which probability a technique is called at a vertex: `most` e^(-decay sigma d), d being the distance to
+/// the boundary along the specular guess. It depends on the vertex alone, so that every density can name it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Call {
+    /// Probability at the boundary.
+    pub most: f64,
+    /// How fast it falls with the optical distance that light has to go.
+    pub decay: f64,
+}
+
+impl Call {
+    /// The probability, from the distance of the guess.
+    pub(super) fn probability(&self, sigma: f64, guess: Option<&Guess>) -> f64 {
+        match guess {
+            _ if self.decay == 0.0 => self.most,
+            Some(guess) => self.most * exp(-self.decay * sigma * guess.distance),
+            None => 0.0,
+        }
+    }
+
+    /// The distance up to which the call is made, for one uniform number; `None` if it is not made at all. P(reach
+    /// > d) is [`Self::probability`], and a lower bound of d may decide before d is known.
+    pub(super) fn reach(&self, sigma: f64, u: f64) -> Option<f64> {
+        if u >= self.most {
+            None
+        } else if self.decay == 0.0 {
+            Some(f64::INFINITY)
+        } else {
+            Some(-ln(u / self.most) / (self.decay * sigma))
+        }
+    }
+}
+
+/// A boundary point and a direction to a light, as all techniques see them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct End<'a> {
+    pub guide: &'a Guide,
+    /// Towards the light.
+    pub w_l: DVec3,
+    /// f |cos| times radiance (irradiance for parallel light).
+    pub value: f64,
+    /// Density by BSDF and light sampling.
+    pub unidirectional: f64,
+    /// Density of w_L given w_kj, refraction forced.
+    pub forward: f64,
+    /// Density of w_kj given w_L.
+    pub reverse: f64,
+    /// Density of w_L by the guide, its choice included; 0 where no guide takes part.
+    pub by_guide: f64,
+}
+
+impl<'a> End<'a> {
+    /// At an exit, towards `w_l`, which lies outside; for a smooth boundary `w_l` is the refracted direction. `keep`
+    /// says which of BSDF and light sampling take part.
+    pub fn new<R: Rivals, B: WalkBands>(
+        walk: &Walk<'_, R, B>,
+        guide: &'a Guide,
+        exit: &WalkExit,
+        w_l: DVec3,
+        keep: [f64; 2],
+        radiance: Option<f64>,
+    ) -> End<'a> {
+        let light = &walk.scene.lights[guide.light];
+        let local = exit.frame.to_local(w_l);
+        let parallel = light.is_directional();
+        let (radiance, pdf_light) = match radiance {
+            Some(radiance) if parallel => (radiance, 1.0),
+            _ if parallel => (0.0, 1.0),
+            _ => light.eval(walk.band, w_l),
+        };
+        let by_guide = guide.density(light, walk.band, w_l);
+        let choice = walk.choice(guide.light);
+        match walk.boundary {
+            Boundary::Rough { .. } => {
+                let (f_cos, pdf) = walk.boundary.eval(exit.wo, local);
+                let reverse = walk.boundary.pdf_refraction(local, exit.wo);
+                let (forward, bsdf) = if parallel {
+                    (0.0, 0.0)
+                } else {
+                    (walk.boundary.pdf_refraction(exit.wo, local), pdf)
+                };
+                let unidirectional = keep[0] * bsdf + keep[1] * (choice * pdf_light);
+                End { guide, w_l, value: f_cos * radiance, unidirectional, forward, reverse, by_guide }
+            }
+            Boundary::Smooth { eta } => {
+                let through = walk.boundary.transmittance_smooth(exit.wo);
+                let reverse = eta * eta * (exit.wo.z / local.z).abs();
+                let (forward, bsdf) = if parallel { (0.0, 0.0) } else { (1.0, through) };
+                let value = through * eta * eta * radiance;
+                End { guide, w_l, value, unidirectional: keep[0] * bsdf, forward, reverse, by_guide }
+            }
+            Boundary::Matched => {
+                let (value, unidirectional) = (0.0, 1.0);
+                End { guide, w_l, value, unidirectional, forward: 0.0, reverse: 0.0, by_guide: 0.0 }
+            }
+        }
+    }
+
+    /// Whether a sample with this end scores anything, and a guided technique might have drawn it.
+    pub fn counts(&self) -> bool {
+        !(self.value == 0.0 || self.by_guide == 0.0)
+    }
+}
+
+/// From one vertex to the next.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leg {
+    pub dir: DVec3,
+    pub length: f64,
+}
+
+/// x_i -> x_j -> x_k, seen from x_j.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Middle {
+    pub to_j: Leg,
+    pub to_k: Leg,
+    /// Cosine at x_k between the walk and the geometric normal.
+    pub cos_k: f64,
+}
+
+impl Middle {
+    /// With x_k at `hit`; `None` where points fall together or x_k is met from behind.
+    pub fn new(x_i: DVec3, x_j: DVec3, hit: &Hit) -> Option<Middle> {
+        let (ij, jk) = (x_j - x_i, hit.point - x_j);
+        let (d_ij, d_jk) = (ij.length(), jk.length());
+        let to_j = Leg { dir: ij / d_ij, length: d_ij };
+        let to_k = Leg { dir: jk / d_jk, length: d_jk };
+        let cos_k = to_k.dir.dot(hit.normal);
+        (d_ij > 0.0 && d_jk > 0.0 && cos_k > 0.0).then_some(Middle { to_j, to_k, cos_k })
+    }
+}
+
+/// Part of a leg's length within which two ways of meeting the same point of the boundary may differ.
+const LEG: f64 = 1e-7;
+
+impl<R: Rivals, B: WalkBands> Walk<'_, R, B> {
+    /// Whether nothing lies between two points of the body; the second may be on the boundary.
+    pub(super) fn sees_point(&mut self, from: DVec3, to: DVec3) -> bool {
+        if self.scene.shape.is_convex() {
+            return true;
+        }
+        let leg = to - from;
+        let length = leg.length();
+        self.scores.count(Cost::ShadowRays);
+        let ray = Ray { origin: from, dir: leg / length };
+        self.scene.shape.intersect(&ray, Side::Inside, None, length * (1.0 - LEG)).is_none()
+    }
+}

@@ -1,0 +1,126 @@
+//! What a walk carries for connections.
+
+use super::BandSetup;
+use super::guess::Guess;
+use super::guide::Guide;
+use crate::estimators::bands::WalkBands;
+use crate::estimators::walk::{Walk, WalkExit};
+use crate::math::DVec3;
+use crate::sampling::discrete::choose_share;
+use crate::sampling::stream::Stream;
+
+/// A medium vertex that connections start from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WalkVertex {
+    pub point: DVec3,
+    /// Direction of travel on arrival.
+    pub arrival: DVec3,
+    /// Density of the walk up to here under any hero, over that under its own.
+    pub walks: f64,
+}
+
+/// Which of the vertices that are held.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Slot {
+    /// The walk's last but one.
+    Previous,
+    /// The walk's last.
+    Latest,
+    /// The one by which subdivision goes on from the walk's last.
+    Drawn,
+}
+
+/// A vertex and what was found out about it.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    vertex: WalkVertex,
+    /// The specular guess for the last guide that was asked for.
+    guess: Option<(usize, Option<Guess>)>,
+}
+
+/// What a walk carries.
+pub(super) struct Connections<'a> {
+    pub setup: &'a BandSetup,
+    pub stream: Stream,
+    /// By [`Slot`].
+    held: [Held; 3],
+    /// Medium vertices since the boundary was last met.
+    pub count: u32,
+    /// Only the first edge is subdivided, and only the second vertex is a last one.
+    pub is_edge_alone: bool,
+    /// Whether the vertex before the last saw the exit that was last asked for.
+    seen: Option<(DVec3, bool)>,
+}
+
+impl<'a> Connections<'a> {
+    pub fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
+        let nowhere = WalkVertex { point: DVec3::NAN, arrival: DVec3::Z, walks: 1.0 };
+        let held = [Held { vertex: nowhere, guess: None }; 3];
+        Connections { setup, stream, held, count: 0, is_edge_alone: false, seen: None }
+    }
+
+    /// The walk has come to a new medium vertex.
+    pub fn arrive(&mut self, vertex: WalkVertex) {
+        self.held[Slot::Previous as usize] = self.held[Slot::Latest as usize];
+        self.hold(Slot::Latest, vertex);
+        self.count += 1;
+    }
+
+    /// Puts a vertex, of which nothing is known yet, into a slot.
+    pub fn hold(&mut self, slot: Slot, vertex: WalkVertex) {
+        self.held[slot as usize] = Held { vertex, guess: None };
+    }
+
+    #[inline]
+    pub fn vertex(&self, slot: Slot) -> WalkVertex {
+        self.held[slot as usize].vertex
+    }
+
+    /// A guide by its probability; without a draw where there is one alone.
+    pub fn choose_guide(&mut self) -> Option<&'a Guide> {
+        let guides = &self.setup.guides;
+        match &guides[..] {
+            [only] => Some(only),
+            _ => {
+                let shares = guides.iter().map(|guide| guide.choice);
+                choose_share(shares, self.stream.draw()).map(|(index, _)| &guides[index])
+            }
+        }
+    }
+
+    /// Which of BSDF and light sampling take part at the end of a path with this many medium vertices since
+    /// the boundary.
+    pub fn takes_part(&self, count: u32) -> [f64; 2] {
+        let strategies = &self.setup.options.strategies;
+        let share = |takes_part: bool| if takes_part { 1.0 } else { 0.0 };
+        if count >= 2 { [share(strategies.bsdf), share(strategies.light)] } else { [1.0, 1.0] }
+    }
+}
+
+impl<B: WalkBands> Walk<'_, Connections<'_>, B> {
+    /// The specular guess at a vertex for a guide, found once.
+    pub(super) fn guess(&mut self, slot: Slot, guide: &Guide) -> Option<Guess> {
+        let Held { vertex, guess } = self.rivals.held[slot as usize];
+        match guess {
+            Some((light, guess)) if light == guide.light => guess,
+            _ => {
+                let guess = Guess::new(self, vertex.point, guide.axis);
+                self.rivals.held[slot as usize].guess = Some((guide.light, guess));
+                guess
+            }
+        }
+    }
+
+    /// Whether the vertex before the last sees an exit: a probe in its direction would have met it first.
+    pub(super) fn sees(&mut self, exit: &WalkExit) -> bool {
+        match self.rivals.seen {
+            Some((point, sees)) if point == exit.hit.point => sees,
+            _ => {
+                let previous = self.rivals.vertex(Slot::Previous);
+                let sees = self.sees_point(previous.point, exit.hit.point);
+                self.rivals.seen = Some((exit.hit.point, sees));
+                sees
+            }
+        }
+    }
+}
