@@ -1,18 +1,18 @@
-//! What a walk remembers of the bands that it scores: nothing where it plays one band alone; of a walk
+//! What a walk remembers of the bands that it scores: nothing where it traces one band alone; of a walk
 //! that all bands share, what each band would have made of it.
 //!
-//! Shared walks (hero wavelengths, Wilkie et al. 2014). The hero h, drawn with probability 1/n, steers: its
-//! extinction draws the flights, its phase function the directions. With f_b and p_b the integrand and the
-//! density of the walk in band b, the walk carries
+//! Shared walks (hero wavelengths, Wilkie et al. 2014). The hero h, drawn with probability 1/n, steers:
+//! its extinction draws the flights, its phase function the directions. With f_b and p_b the integrand
+//! and the density of the walk in band b, the walk carries
 //!   value_b = f_b / (p_h w),   rho_b = p_b / p_h,
 //! w being the hero's throughput without its albedos. Step by step, relative to the hero,
 //!   a flight of length d that ends in the medium   rho_b *= (sigma_t,b / sigma_t,h) e^{-(sigma_t,b - sigma_t,h) d},
 //!                                                  value_b *= the same * albedo_b / survival
 //!   one that ends at the boundary                  both *= e^{-(sigma_t,b - sigma_t,h) d}
 //!   a turn                                         both *= phase_b / phase_h
-//! where survival is the factor that roulette sees, one for all bands (the largest albedo). By the balance
-//! heuristic over heroes a walk scores value_b w / (sum over m of rho_m / n) in band b. Equal coefficients make
-//! every factor exactly 1, and every band the same to the last bit.
+//! where survival is the factor that roulette sees, one for all bands (the largest albedo). By the
+//! balance heuristic over heroes a walk scores value_b w / (sum over m of rho_m / n) in band b. Equal
+//! coefficients make every factor exactly 1, and every band the same to the last bit.
 
 use super::{Scores, TransportClass};
 use crate::math::exp;
@@ -32,7 +32,8 @@ pub(super) trait WalkBands: Clone {
     /// Density of the walk under any hero over its density under its own: sum of rho_m / n.
     fn density(&self) -> f64;
 
-    /// Adds a contribution of the walk's own band, and to every other that the walk scores what it is there.
+    /// Adds a contribution of the walk's own band, and to every other that the walk scores what it is
+    /// there.
     fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64);
 }
 

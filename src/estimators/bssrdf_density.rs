@@ -1,17 +1,20 @@
-//! Density estimation from stored points: flux that entered in discs about the points of the surface, over the area of
-//! a disc, as the irradiance there.
+//! Density estimation from stored points: flux that entered in discs about the points of the surface,
+//! over the area of a disc, as the irradiance there.
 //!
-//! M points x_p, uniform over the area A of a finite body, each take one light sample; E_p is the irradiance that goes in,
-//! T12 L cos / pdf. A point stands for the flux Phi_q = E_q A / (M - 1) when another one asks, and
+//! M points x_p, uniform over the area A of a finite body, each take one light sample; E_p is the
+//! irradiance that goes in, T12 L cos / pdf. A point stands for the flux Phi_q = E_q A / (M - 1) when
+//! another one asks, and
 //!   E'_p = sum over q != p within r of Phi_q / (pi r^2),   L_r = A/M sum over p of K E'_p.
-//! Dividing by pi r^2 makes an irradiance of flux; it is in place there and nowhere else: a sum of K over points that carry
-//! flux themselves divides by nothing. The point itself is left out of its disc, or its own flux would stand there with
-//! certainty; of M - 1 others a disc holds its share, so that the mean of E'_p is E over the disc.
+//! Dividing by pi r^2 makes an irradiance of flux; it is in place there and nowhere else: a sum of K
+//! over points that carry flux themselves divides by nothing. The point itself is left out of its disc,
+//! or its own flux would stand there with certainty; of M - 1 others a disc holds its share, so that the
+//! mean of E'_p is E over the disc.
 //!
-//! Distances are straight, between points whose normals are less than a right angle apart (else light leaked through
-//! thin bodies). On planes and spheres exactly pi r^2 of the surface lies within r; elsewhere that is an approximation.
-//! Borders of shadows are blurred by r, which more points do not mend: biased for every fixed r. Without r the sum is plain,
-//! L_r = A/M sum over p of K E_p, and unbiased.
+//! Distances are straight, between points whose normals are less than a right angle apart (else light
+//! leaked through thin bodies). On planes and spheres exactly pi r^2 of the surface lies within r;
+//! elsewhere that is an approximation. Borders of shadows are blurred by r, which more points do not
+//! mend: biased for every fixed r. Without r the sum is plain, L_r = A/M sum over p of K E_p, and
+//! unbiased.
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -281,9 +284,9 @@ mod tests {
         Emission::Cap { frame: Frame::about(DVec3::Z), height: 2.0, radiance: vec![1.0] }
     }
 
-    /// On a sphere in a sky of radiance 1 irradiance is the same everywhere and a disc's area is pi r^2, so that averaging
-    /// changes nothing: T21 int T12 cos dwi int_0^2R K 2 pi d dd in class multiple, with discs and without. 6000 passes of
-    /// 512 points; 5 standard errors are below 1 %.
+    /// On a sphere in a sky of radiance 1 irradiance is the same everywhere and a disc's area is pi r^2,
+    /// so that averaging changes nothing: T21 int T12 cos dwi int_0^2R K 2 pi d dd in class multiple,
+    /// with discs and without. 6000 passes of 512 points; 5 standard errors are below 1 %.
     #[test]
     fn sphere_in_a_sky() {
         for radius in [None, Some(0.3)] {
@@ -318,8 +321,8 @@ mod tests {
         }
     }
 
-    /// Parallel light: without discs points in the dark have nothing, with them those within r of the border have some,
-    /// and the bias says so.
+    /// Parallel light: without discs points in the dark have nothing, with them those within r of the
+    /// border have some, and the bias says so.
     #[test]
     fn borders_of_shadows_are_blurred() {
         let radius = 0.2;

@@ -1,17 +1,18 @@
-//! Importance-sampled BSSRDF integration on any surface, without a point cloud (King, Kulla, Conty & Fajardo 2013).
+//! Importance-sampled BSSRDF integration on any surface, without a point cloud (King, Kulla, Conty &
+//! Fajardo 2013).
 //!
-//! A probe is a line through the body: its axis is the exit's normal (probability 1/2) or one of two tangents (1/4 each),
-//! it passes the exit at distance r, drawn from a technique of the model of one band of the group, in a uniform
-//! azimuth. All crossings of the line with the surface, of front and back faces, are entries. The expected number of
-//! entries per area at a point x_i is
+//! A probe is a line through the body: its axis is the exit's normal (probability 1/2) or one of two
+//! tangents (1/4 each), it passes the exit at distance r, drawn from a technique of the model of one
+//! band of the group, in a uniform azimuth. All crossings of the line with the surface, of front and
+//! back faces, are entries. The expected number of entries per area at a point x_i is
 //!   pdf_area = sum over axes a of P(a) |n_i . a| times the mean over bands of sum over techniques of share pdf(r_a),
-//! r_a being the distance of x_i from the axis a through the exit: the disc's density, carried from the disc across a to
-//! the surface. All axes, bands and techniques that could have made an entry are in the sum, whichever made it (the
-//! balance heuristic), so that
+//! r_a being the distance of x_i from the axis a through the exit: the disc's density, carried from the
+//! disc across a to the surface. All axes, bands and techniques that could have made an entry are in the
+//! sum, whichever made it (the balance heuristic), so that
 //!   L_r = mean over probes of sum over their entries of K T12 L cos / (pdf_light pdf_area)
-//! is unbiased for every surface: the line meets all sheets of it, and at least one axis has |n_i . a| >= 1/sqrt 3.
-//! On half-space and slab lines along tangents lie parallel to the surface and meet nothing; there the normal is
-//! always taken.
+//! is unbiased for every surface: the line meets all sheets of it, and at least one axis has |n_i . a|
+//! >= 1/sqrt 3. On half-space and slab lines along tangents lie parallel to the surface and meet
+//! nothing; there the normal is always taken.
 //!
 //! Normals: the geometric one carries areas, the shading one the Fresnel factor and the cosine.
 

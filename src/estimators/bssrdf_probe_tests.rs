@@ -147,8 +147,8 @@ fn half_space_probes_follow_the_kernel() {
     }
 }
 
-/// Under a sky of radiance 1 class multiple is T21 int T12 cos dwi int K dA. 512 passes of 1024 paths; 5 standard
-/// errors are below 1 %.
+/// Under a sky of radiance 1 class multiple is T21 int T12 cos dwi int K dA. 512 passes of 1024 paths; 5
+/// standard errors are below 1 %.
 #[test]
 fn half_space_under_a_sky() {
     let eta = 1.3;
@@ -173,9 +173,9 @@ fn half_space_under_a_sky() {
     }
 }
 
-/// On a sphere of radius R, dA = 2 pi d dd in the distance d between exit and entry, up to 2R. Three bands, of which
-/// two share paths and probes. Expected as on the half-space. 384 passes of 2048 paths; 5 standard
-/// errors are below 1 %.
+/// On a sphere of radius R, dA = 2 pi d dd in the distance d between exit and entry, up to 2R. Three
+/// bands, of which two share paths and probes. Expected as on the half-space. 384 passes of 2048 paths;
+/// 5 standard errors are below 1 %.
 #[test]
 fn sphere_under_a_sky() {
     let eta = [1.3, 1.3, 1.5];
@@ -197,8 +197,8 @@ fn sphere_under_a_sky() {
     }
 }
 
-/// Rays from another depth find the same; probes of limited reach find the part of the integral within it. 384 passes
-/// of 2048 paths; 5 standard errors are below 1 %.
+/// Rays from another depth find the same; probes of limited reach find the part of the integral within
+/// it. 384 passes of 2048 paths; 5 standard errors are below 1 %.
 #[test]
 fn depth_does_not_matter_and_reach_does() {
     let sphere = Shape::Sphere { radius: 1.0 };
@@ -241,7 +241,8 @@ fn rays_say_what_they_cannot_see() {
     assert!(matches!(bias(box_mesh), Bias::Biased(_)));
 }
 
-/// albedo T12 T21 p / (eta^2 (mu_i' + mu_o')) E cos_i: single scattering of parallel light in a half-space.
+/// albedo T12 T21 p / (eta^2 (mu_i' + mu_o')) E cos_i: single scattering of parallel light in a
+/// half-space.
 fn single_closed_form(eta: f64, medium: &Medium, toward: DVec3) -> f64 {
     let [wi, wo] = [toward.normalize(), -ray().dir];
     let [entry, exit] = [wi.z, wo.z].map(|mu| fresnel(mu, eta));
@@ -268,8 +269,9 @@ fn single_scattering_of_a_half_space() {
     }
 }
 
-/// The path tracer's class single, which nothing here has a part in: 512 passes of 1024 paths each, 5 standard errors
-/// of the difference below 6 %: a look from outside at what the closed form above holds to 1 %.
+/// The path tracer's class single, which nothing here has a part in: 512 passes of 1024 paths each, 5
+/// standard errors of the difference below 6 %: a look from outside at what the closed form above holds
+/// to 1 %.
 #[test]
 fn single_scattering_is_that_of_path_tracing() {
     let media = [medium(2.0, 0.5, 0.4)];

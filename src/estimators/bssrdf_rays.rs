@@ -1,15 +1,15 @@
-//! BSSRDF integration by rays from inside: one goes under the surface, shoots rays in all directions, and looks at the
-//! illumination where they meet the surface.
+//! BSSRDF integration by rays from inside: one goes under the surface, shoots rays in all directions,
+//! and looks at the illumination where they meet the surface.
 //!
-//! The rays start from a point on the normal below the exit, at most half way to the opposite side, in uniform
-//! directions w. The first surface point that each meets from inside is an entry; its density is
+//! The rays start from a point on the normal below the exit, at most half way to the opposite side, in
+//! uniform directions w. The first surface point that each meets from inside is an entry; its density is
 //!   pdf_area = |n_i . w| / (4 pi d^2),
-//! d being the ray's length. From a depth h below a plane that is h / (4 pi (r^2 + h^2)^(3/2)), the shape of a dipole's
-//! source without absorption, which keeps the weights bounded for every h. (From the exit itself nothing would be seen of
-//! the plane or the face that it lies on.)
+//! d being the ray's length. From a depth h below a plane that is h / (4 pi (r^2 + h^2)^(3/2)), the
+//! shape of a dipole's source without absorption, which keeps the weights bounded for every h. (From the
+//! exit itself nothing would be seen of the plane or the face that it lies on.)
 //!
-//! What such rays cannot see: entries that the body's own boundary hides from the point below the exit. There are none
-//! in a convex body.
+//! What such rays cannot see: entries that the body's own boundary hides from the point below the exit.
+//! There are none in a convex body.
 
 use std::sync::Arc;
 
@@ -32,8 +32,8 @@ pub struct RayOptions {
     pub model: Model,
     /// Rays per emergence, positive.
     pub rays: usize,
-    /// How far below the exit they start, mm; `None`: the reduced mean free path (of a group of bands, the geometric
-    /// mean of its least and its largest).
+    /// How far below the exit they start, mm; `None`: the reduced mean free path (of a group of bands,
+    /// the geometric mean of its least and its largest).
     pub depth: Option<f64>,
     /// Whether the single-scattering term is added; `None`: where the model leaves it out.
     pub single: Option<bool>,
@@ -89,8 +89,8 @@ impl BssrdfRays {
 /// Pairs of triangle and vertex that a look at a mesh's convexity may take.
 const MOST_PAIRS: usize = 1 << 30;
 
-/// Whether no vertex of a mesh stands out over the plane of one of its triangles by more than rounding. Not asked of
-/// convex meshes that are very large, which then count as not known to be convex.
+/// Whether no vertex of a mesh stands out over the plane of one of its triangles by more than rounding.
+/// Not asked of convex meshes that are very large, which then count as not known to be convex.
 fn is_convex(mesh: &Mesh) -> bool {
     let vertices = mesh.vertices();
     if mesh.triangles().len().saturating_mul(vertices.len()) > MOST_PAIRS {

@@ -1,21 +1,23 @@
-//! Single scattering along the refracted camera ray (Jensen, Marschner, Levoy & Hanrahan 2001, eq. 6), for models that
-//! leave it out.
+//! Single scattering along the refracted camera ray (Jensen, Marschner, Levoy & Hanrahan 2001, eq. 6),
+//! for models that leave it out.
 //!
 //! Inside, the radiance that arrives at the exit along the refracted ray is
 //!   L = int_0^t_max sigma_s e^(-sigma_t t) int p(w12 . wo') L'(w12) dw12 dt,
-//! and of L' the part that comes straight through the boundary is T12 eta^2 L_i e^(-sigma_t s'), s' being the way from
-//! the boundary. On its own way out L loses eta^2 again. So, in directions outside, where lights are sampled,
+//! and of L' the part that comes straight through the boundary is T12 eta^2 L_i e^(-sigma_t s'), s'
+//! being the way from the boundary. On its own way out L loses eta^2 again. So, in directions outside,
+//! where lights are sampled,
 //!   dw12 = cos_i / (eta^2 cos_i') dw_i
 //!   L_o / T21 = int int sigma_s e^(-sigma_t (t + s')) p T12 L_i cos_i / (eta^2 cos_i') dw_i dt.
-//! (Taken over directions outside without that factor, eq. 6 is too bright by eta^2 cos_i' / cos_i.) On a half-space
-//! the integral over t is
+//! (Taken over directions outside without that factor, eq. 6 is too bright by eta^2 cos_i' / cos_i.) On
+//! a half-space the integral over t is
 //!   f L_i cos_i,   f = albedo T12 p / (eta^2 (mu_i' + mu_o')).
 //!
-//! Distance t is drawn from sigma_t e^(-sigma_t t), so that the weight is the albedo. Where light enters is taken as the
-//! source does: on the straight line from the vertex to the light, at distance s, from which the refracted way is
-//! estimated as s' = s cos_i / cos_i'. That is exact on a plane and at a matched boundary, an approximation elsewhere. A ray
-//! that leaves the body before t carries nothing, and paths that are reflected inside are no part of the term. T21 is left
-//! out: the camera path was refracted with that probability.
+//! Distance t is drawn from sigma_t e^(-sigma_t t), so that the weight is the albedo. Where light enters
+//! is taken as the source does: on the straight line from the vertex to the light, at distance s, from
+//! which the refracted way is estimated as s' = s cos_i / cos_i'. That is exact on a plane and at a
+//! matched boundary, an approximation elsewhere. A ray that leaves the body before t carries nothing,
+//! and paths that are reflected inside are no part of the term. T21 is left out: the camera path was
+//! refracted with that probability.
 
 use super::emergence::{BssrdfScene, Emergence};
 use super::illumination::{Entrance, Illumination};
@@ -70,7 +72,8 @@ struct Scattered {
     value: f64,
 }
 
-/// Light and its part that a vertex on the refracted ray scatters along it, the way to the exit left out.
+/// Light and its part that a vertex on the refracted ray scatters along it, the way to the exit left
+/// out.
 fn scattered(
     bssrdf: &BssrdfScene,
     illumination: &Illumination,
@@ -119,8 +122,8 @@ mod tests {
     use crate::scene::sensor::Probe;
     use crate::scene::{Emission, Light, Scene, Sensor};
 
-    /// The mean over t, by quadrature, is albedo T12 p cos_i / (eta^2 (mu_i' + mu_o')) on a half-space: a deterministic
-    /// look at every factor of a sample.
+    /// The mean over t, by quadrature, is albedo T12 p cos_i / (eta^2 (mu_i' + mu_o')) on a half-space:
+    /// a deterministic look at every factor of a sample.
     #[test]
     fn mean_over_distance_is_the_closed_form() {
         for eta in [1.0, 1.3, 1.5] {

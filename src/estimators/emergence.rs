@@ -1,12 +1,13 @@
-//! Camera paths over a body whose inside is a BSSRDF: reflection or refraction at every hit of the surface by roulette
-//! with the Fresnel reflectance, and at a refraction (point-cloud note, phase two)
+//! Camera paths over a body whose inside is a BSSRDF: reflection or refraction at every hit of the
+//! surface by roulette with the Fresnel reflectance, and at a refraction (point-cloud note, phase two)
 //!   L_o = L_e + L_t + L_r
-//! with L_e = 0 (no medium here emits), L_t the light that goes straight through, and L_r gathered from the surface by
-//! whoever walks.
+//! with L_e = 0 (no medium here emits), L_t the light that goes straight through, and L_r gathered from
+//! the surface by whoever walks.
 //!
-//! The branch of refraction is taken with probability T21, so that what is gathered there must leave T21 out.
-//! L_t follows the refracted ray to the other side with transmittance exp(-sigma_t* t), leaves with the transmittance of
-//! the boundary as a weight (what is reflected there is the model's business) and goes on outside as the same path.
+//! The branch of refraction is taken with probability T21, so that what is gathered there must leave T21
+//! out. L_t follows the refracted ray to the other side with transmittance exp(-sigma_t* t), leaves with
+//! the transmittance of the boundary as a weight (what is reflected there is the model's business) and
+//! goes on outside as the same path.
 //!
 //! Bands that refract alike share a path; with dispersion each index has its own.
 
@@ -91,8 +92,8 @@ impl PathStreams {
 
 /// Collects light that leaves the body.
 pub(super) trait Gather {
-    /// Scores what arrives at the exit from the rest of the surface: the integral of K T12 L |cos|, times the path's
-    /// throughput.
+    /// Scores what arrives at the exit from the rest of the surface: the integral of K T12 L |cos|,
+    /// times the path's throughput.
     fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores);
 }
 
@@ -169,7 +170,7 @@ impl BssrdfScene {
             .collect()
     }
 
-    /// Plays path `index` of a pass for one group of bands.
+    /// Traces path `index` of a pass for one group of bands.
     pub fn play(
         &self,
         bands: &[usize],

@@ -1,5 +1,5 @@
-//! What a light sends to a point of the surface, and what of it goes in and comes out elsewhere: the part that all
-//! ways of choosing the point share.
+//! What a light sends to a point of the surface, and what of it goes in and comes out elsewhere: the
+//! part that all ways of choosing the point share.
 
 use super::choice::{choose_light, light_shares};
 use super::emergence::{BssrdfScene, Emergence};
@@ -32,7 +32,8 @@ impl Illumination {
         Illumination { shares: light_shares(scene) }
     }
 
-    /// One light in proportion to its strength (`u[0]`), a direction from it; `None` where no light shines.
+    /// One light in proportion to its strength (`u[0]`), a direction from it; `None` where no light
+    /// shines.
     #[inline]
     pub fn draw(&self, scene: &Scene, band: usize, u: [f64; 3]) -> Option<Arrival> {
         let (light, choice) = choose_light(&self.shares[band], u[0])?;
@@ -41,8 +42,9 @@ impl Illumination {
         Some(Arrival { light, wi: sample.wi, value })
     }
 
-    /// Scores, for one light sample per band, what enters at `hit` and leaves at the emergence. `pdf_area` is the
-    /// density of the entry point, 1/mm^2, times the number of points that are drawn so.
+    /// Scores, for one light sample per band, what enters at `hit` and leaves at the emergence.
+    /// `pdf_area` is the density of the entry point, 1/mm^2, times the number of points that are drawn
+    /// so.
     ///
     /// Bands whose light samples are the same direction share its shadow ray.
     pub fn enter(
@@ -82,15 +84,15 @@ pub(super) struct Entrance {
     pub cos: f64,
     /// Between the normal and the direction inside, positive.
     pub cos_inside: f64,
-    /// T12.
+    /// Fresnel transmittance into the body, T12.
     pub transmittance: f64,
     /// Unit direction of travel inside.
     pub dir: DVec3,
 }
 
 impl Entrance {
-    /// For light from `wi`, with the cosine and the transmittance of the shading normal. `None` from below, or where
-    /// the light is above one of the two normals and below the other, which is counted.
+    /// For light from `wi`, with the cosine and the transmittance of the shading normal. `None` from
+    /// below, or where the light is above one of the two normals and below the other, which is counted.
     #[inline]
     pub fn at(hit: &Hit, wi: DVec3, eta: f64, scores: &mut Scores) -> Option<Entrance> {
         let frame = Frame::about(hit.shading_normal);

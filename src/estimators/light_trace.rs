@@ -4,13 +4,13 @@
 //! refracted at the boundary, flies distances of density sigma_t exp(-sigma_t t), is absorbed with
 //! probability 1 - albedo at every scattering event or turned by the phase function, and enters again
 //! where a body is not convex, until it leaves for good. Then the sensor receives it
-//! ([`Sensor::receive`](crate::scene::Sensor::receive)). No connection to a light or to the sensor is made,
-//! so it samples every boundary under every light, a smooth one under parallel light included, which no
-//! path from the sensor finds; in exchange it needs a sensor that photons hit. Its walk is written apart
-//! from the path tracer's, so that a slip in one of them shows as a difference.
+//! ([`Sensor::receive`](crate::scene::Sensor::receive)). No connection to a light or to the sensor is
+//! made, so it samples every boundary under every light, a smooth one under parallel light included,
+//! which no path from the sensor finds; in exchange it needs a sensor that photons hit. Its walk is
+//! written apart from the path tracer's, so that a slip in one of them shows as a difference.
 //!
-//! Power of a photon. Light of radiance L(w) from directions w towards it, drawn with density p(w) from a
-//! light that was chosen with probability P, carries in one of N photons
+//! Power of a photon. Light of radiance L(w) from directions w towards it, drawn with density p(w) from
+//! a light that was chosen with probability P, carries in one of N photons
 //!   finite body     L / (p P N) * pi R^2: starting points are uniform on the disc of the bounding sphere's
 //!                   radius R across the direction, through which all light that can meet the body comes
 //!   planar face     L / (p P N) * |cos|: power per area of the face on which the light shines, every
@@ -19,15 +19,17 @@
 //! light that has not met the body is not scored.
 //!
 //! At the boundary. Power flows from direction a (towards where the photon came from) into b, drawn with
-//! the density pdf(b | a) of [`Boundary::sample`] for wo = a. Its weight is f(b; a) |cos_b| / pdf(b | a),
-//! f(wo; wi) being the value of radiance's BSDF, which obeys f(b; a) / n_b^2 = f(a; b) / n_a^2. The weight
-//! that the boundary reports is f(a; b) |cos_b| / pdf(b | a) = G1(b) (n_a / n_b)^2, so that of the photon is
+//! the density pdf(b | a) of [`Boundary::sample`] for wo = a. Its weight is f(b; a) |cos_b| / pdf(b |
+//! a), f(wo; wi) being the value of radiance's BSDF, which obeys f(b; a) / n_b^2 = f(a; b) / n_a^2. The
+//! weight that the boundary reports is f(a; b) |cos_b| / pdf(b | a) = G1(b) (n_a / n_b)^2, so that of
+//! the photon is
 //!   f(b; a) / f(a; b) * G1(b) (n_a / n_b)^2 = G1(b):
 //! what facets hide is lost, and radiance's squared index is undone. At a smooth boundary it is 1.
 //!
 //! This holds where the boundary sees the true normal. With an interpolated normal the BSDF times the
-//! cosine to that normal is no longer reciprocal (Veach 1997, 5.3): light and camera transport become two
-//! different models, and this estimator's is called biased, since the camera's is what pictures show.
+//! cosine to that normal is no longer reciprocal (Veach 1997, 5.3): light and camera transport become
+//! two different models, and this estimator's is called biased, since the camera's is what pictures
+//! show.
 
 use std::sync::Arc;
 
@@ -147,7 +149,7 @@ fn start(
 }
 
 impl<'a> Photon<'a> {
-    /// Plays photon `index` of a pass; returns how many numbers its walk drew.
+    /// Traces photon `index` of a pass; returns how many numbers its walk drew.
     fn play(
         tracer: &'a LightTracer,
         band: usize,

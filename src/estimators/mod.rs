@@ -1,6 +1,6 @@
 //! The one open trait and the estimators, one file each, named as the literature names them.
 //!
-//! An estimator is built for one cell and plays passes: it turns a pass's random streams into scores
+//! An estimator is built for one cell and runs passes: it turns a pass's random streams into scores
 //! and knows no file, thread or statistic. The runner folds scores into moments, zeros included.
 
 mod bands;
@@ -28,11 +28,11 @@ use crate::sampling::stream::PassKey;
 
 /// Turns random numbers into scores.
 pub trait Estimator: Send + Sync {
-    /// Plays one independent realisation of every observable for these bands and adds it to the
+    /// Runs one independent realisation of every observable for these bands and adds it to the
     /// zeroed scores.
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores);
 
-    /// Whether one call plays each band alone or all of them on shared paths.
+    /// Whether one call traces each band alone or all of them on shared paths.
     fn band_use(&self) -> BandUse {
         BandUse::EachAlone
     }
@@ -42,13 +42,15 @@ pub trait Estimator: Send + Sync {
         Bias::Unbiased
     }
 
-    /// The model whose integral this estimates; none where it is light transport itself. Estimators of one integral
-    /// have to agree; between different ones lies a model error, which is measured and no failure.
+    /// The model whose integral this estimates; none where it is light transport itself. Estimators of
+    /// one integral have to agree; between different ones lies a model error, which is measured and no
+    /// failure.
     fn model(&self) -> Option<String> {
         None
     }
 
-    /// Bands and classes in which the mean of any affordable number of passes is far from normal, known beforehand.
+    /// Bands and classes in which the mean of any affordable number of passes is far from normal, known
+    /// beforehand.
     fn heavy_tails(&self) -> Vec<HeavyTail> {
         Vec::new()
     }
@@ -76,11 +78,11 @@ pub enum BandUse {
 /// Scores whose sample mean has no valid interval.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HeavyTail {
-    /// In this band.
+    /// Band index.
     pub band: usize,
     /// In this class, and in the total.
     pub class: TransportClass,
-    /// Because.
+    /// Why.
     pub reason: String,
 }
 

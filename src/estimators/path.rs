@@ -1,10 +1,10 @@
 //! Unidirectional path tracing with MIS between BSDF sampling and light sampling at every exit.
 //!
 //! A path starts at the sensor and runs against the light. Flights in the medium have the density
-//! sigma_t exp(-sigma_t t), so a scattering event weighs albedo; directions follow the phase function;
-//! at the boundary the interface draws reflection or refraction. Wherever the path could go straight to
-//! a light, a light is also sampled, and both samples of the same direction are weighed by the balance
-//! heuristic:
+//! sigma_t exp(-sigma_t t), so the weight of a scattering event is the albedo; directions follow the
+//! phase function; at the boundary the interface draws reflection or refraction. Wherever the path could
+//! go straight to a light, a light is also sampled, and both samples of the same direction are weighted
+//! by the balance heuristic:
 //!   rough boundary    at every surface vertex: interface pdf against light pdf
 //!   matched boundary  at every medium vertex: phase pdf times the transmittance to the outside (the
 //!                     probability of flying there) against light pdf
@@ -20,7 +20,7 @@
 use std::sync::Arc;
 
 use super::bands::OneBand;
-use super::walk::{Field, Path, Unrivalled, Walk, unscattered_notes};
+use super::walk::{CameraWalk, Field, Path, Unrivalled, unscattered_notes};
 use super::{Estimator, Scores};
 use crate::optics::boundary::Boundary;
 use crate::sampling::stream::PassKey;
@@ -46,7 +46,7 @@ impl Estimator for PathTracer {
         for &band in bands {
             for index in 0..self.field.scene.sensor.rays_per_pass() {
                 let path = Path { field: &self.field, band, index, key };
-                Walk::play(path, scores, Unrivalled, OneBand);
+                CameraWalk::play(path, scores, Unrivalled, OneBand);
             }
         }
     }

@@ -222,7 +222,7 @@ fn draws_per_event() {
     for index in 0..1000 {
         let mut scores = Scores::new(layout.clone());
         let path = Path { field: &tracer.field, band: 0, index, key: &key };
-        let draws = Walk::play(path, &mut scores, Unrivalled, OneBand);
+        let draws = CameraWalk::play(path, &mut scores, Unrivalled, OneBand);
         let [_, rays, _, medium_events, boundary_events, ..] = scores.cost;
         let out = u64::from(scores.observables[0] > 0.0); // it flew to the sky, and scored
         let survived = medium_events - (1 - out); // else the last event ended it

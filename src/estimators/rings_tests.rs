@@ -82,8 +82,9 @@ fn assert_alike(name: &str, ours: &[(f64, f64)], theirs: &[(f64, f64)], detectab
 
 /// Of the classical dipole's exitance the part cdf(r) lies within r,
 ///   cdf(r) = sum over both sources of w_k (1 - z_k/d_k e^(s (z_k - d_k))),   w_k = e^(-s z_k) over their sum,
-/// in its total (alpha'/2) sum of e^(-s z_k). With radiance 1 from above and a Fresnel transmittance of mean P = int T12 mu
-/// dw / pi at both ends, a ring shows pi P^2 times its part. 512 passes of 1024 paths; 5 standard errors are below 5 %.
+/// in its total (alpha'/2) sum of e^(-s z_k). With radiance 1 from above and a Fresnel transmittance of
+/// mean P = int T12 mu dw / pi at both ends, a ring shows pi P^2 times its part. 512 passes of 1024
+/// paths; 5 standard errors are below 5 %.
 #[test]
 fn rings_of_the_classical_dipole() {
     let moment = |eta: f64| {
@@ -120,9 +121,9 @@ fn rings_of_the_classical_dipole() {
     }
 }
 
-/// Photons come in at the origin, camera paths leave there: ring by ring they find the same, through smooth, rough and no
-/// boundaries, on a half-space and on a slab that is lit from below too. 128 passes of 4096 paths of either; 5 standard
-/// errors of the difference are below 11 %.
+/// Photons come in at the origin, camera paths leave there: ring by ring they find the same, through
+/// smooth, rough and no boundaries, on a half-space and on a slab that is lit from below too. 128 passes
+/// of 4096 paths of either; 5 standard errors of the difference are below 11 %.
 #[test]
 fn photons_and_camera_paths_agree_ring_by_ring() {
     let slab = || Shape::Slab { thickness: 0.6 };
@@ -144,8 +145,8 @@ fn photons_and_camera_paths_agree_ring_by_ring() {
     }
 }
 
-/// Once-scattered light comes in where its refracted way does, not below the light. 384 passes of 4096 paths of either;
-/// 5 standard errors of the difference are below 10 %.
+/// Once-scattered light comes in where its refracted way does, not below the light. 384 passes of 4096
+/// paths of either; 5 standard errors of the difference are below 10 %.
 #[test]
 fn single_scattering_ring_by_ring() {
     let scene = Arc::new(scene(Shape::HalfSpace, SMOOTH, 1.0, rings(4096)));
@@ -160,7 +161,8 @@ fn single_scattering_ring_by_ring() {
     assert_alike("single", &ours[..4], &light[..4], 0.1);
 }
 
-/// A photon that leaves by the top counts in `all`, whatever its ring: to the bit what a flux of one bin counts.
+/// A photon that leaves by the top counts in `all`, whatever its ring: to the bit what a flux of one bin
+/// counts.
 #[test]
 fn all_is_the_flux() {
     let face = FluxFace { name: "top", point: DVec3::ZERO, reach: 1.0, frame: Frame::about(DVec3::Z) };

@@ -1,11 +1,13 @@
-//! A camera walk through the body, with whatever techniques beside unidirectional sampling its ends may have.
+//! A camera walk through the body, with whatever techniques beside unidirectional sampling its ends may
+//! have.
 //!
-//! The walk is that of [`super::path`]; an estimator that adds techniques implements [`Rivals`]: it is called at
-//! every medium vertex, and says at every exit how densely its techniques draw the same path. Weights are
-//! those of the balance heuristic over all techniques. Their densities are written relative to U, the density with
-//! which the walk draws its medium vertices and the flight to the exit, so that U itself, which underflows
-//! in thick media, is never formed: a light sample has density p_L, a BSDF sample p_B, a rival p_R / U.
-//! Roulette is in no density: each walk divides by its own survival, and weights without it still sum to 1.
+//! The walk is that of [`super::path`]; an estimator that adds techniques implements [`Rivals`]: it is
+//! called at every medium vertex, and says at every exit how densely its techniques draw the same path.
+//! Weights are those of the balance heuristic over all techniques. Their densities are written relative
+//! to U, the density with which the walk draws its medium vertices and the flight to the exit, so that U
+//! itself, which underflows in thick media, is never formed: a light sample has density p_L, a BSDF
+//! sample p_B, a rival p_R / U. Roulette is in no density: each walk divides by its own survival, and
+//! weights without it still sum to 1.
 
 use std::sync::Arc;
 
@@ -61,32 +63,37 @@ pub(super) struct Path<'a> {
 
 /// Techniques beside unidirectional sampling.
 pub(super) trait Rivals: Sized {
-    /// At a medium vertex that roulette has spared, before its direction is drawn; the walk's ray holds the
-    /// vertex and the direction of arrival. Draws samples and scores them.
-    fn call<B: WalkBands>(walk: &mut Walk<'_, Self, B>);
+    /// At a medium vertex that roulette has spared, before its direction is drawn; the walk's ray holds
+    /// the vertex and the direction of arrival. Draws samples and scores them.
+    fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>);
 
     /// The walk has met the boundary.
     fn meet_surface(&mut self);
 
-    /// The walk has met a smooth boundary from outside: scores lights that it reflects by their expectation.
+    /// The walk has met a smooth boundary from outside: scores lights that it reflects by their
+    /// expectation.
     fn reflect<B: WalkBands>(
-        walk: &mut Walk<'_, Self, B>,
+        walk: &mut CameraWalk<'_, Self, B>,
         hit: &Hit,
         reflected: DVec3,
         reflectance: f64,
     );
 
     /// Whether [`Self::reflect`] scores a light from this direction.
-    fn has_scored_reflection<B: WalkBands>(walk: &Walk<'_, Self, B>, light: usize, wi: DVec3) -> bool;
+    fn has_scored_reflection<B: WalkBands>(
+        walk: &CameraWalk<'_, Self, B>,
+        light: usize,
+        wi: DVec3,
+    ) -> bool;
 
-    /// Which of BSDF and light sampling take part at the end of a path that leaves from the walk's latest medium
-    /// vertex: 1 or 0 each.
+    /// Which of BSDF and light sampling take part at the end of a path that leaves from the walk's
+    /// latest medium vertex: 1 or 0 each.
     fn unidirectional(&self) -> [f64; 2];
 
-    /// Sum over the rivals of their densities of the path that ends at `exit` and goes on towards `wi`, light
-    /// `light`, relative to the density of the walk's medium vertices.
+    /// Sum over the rivals of their densities of the path that ends at `exit` and goes on towards `wi`,
+    /// light `light`, relative to the density of the walk's medium vertices.
     fn densities<B: WalkBands>(
-        walk: &mut Walk<'_, Self, B>,
+        walk: &mut CameraWalk<'_, Self, B>,
         exit: &WalkExit,
         light: usize,
         wi: DVec3,
@@ -99,16 +106,16 @@ pub(super) struct Unrivalled;
 
 impl Rivals for Unrivalled {
     #[inline]
-    fn call<B: WalkBands>(_: &mut Walk<'_, Self, B>) {}
+    fn call<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>) {}
 
     #[inline]
     fn meet_surface(&mut self) {}
 
     #[inline]
-    fn reflect<B: WalkBands>(_: &mut Walk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
+    fn reflect<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
 
     #[inline]
-    fn has_scored_reflection<B: WalkBands>(_: &Walk<'_, Self, B>, _: usize, _: DVec3) -> bool {
+    fn has_scored_reflection<B: WalkBands>(_: &CameraWalk<'_, Self, B>, _: usize, _: DVec3) -> bool {
         false
     }
 
@@ -118,7 +125,12 @@ impl Rivals for Unrivalled {
     }
 
     #[inline]
-    fn densities<B: WalkBands>(_: &mut Walk<'_, Self, B>, _: &WalkExit, _: usize, _: DVec3) -> f64 {
+    fn densities<B: WalkBands>(
+        _: &mut CameraWalk<'_, Self, B>,
+        _: &WalkExit,
+        _: usize,
+        _: DVec3,
+    ) -> f64 {
         0.0
     }
 }
@@ -148,7 +160,7 @@ enum DirectionDraw {
 /// A light and a direction to it, drawn by light sampling.
 #[derive(Clone, Copy)]
 struct LightDraw {
-    /// Which light.
+    /// Index of the light.
     index: usize,
     /// Probability of choosing it.
     choice: f64,
@@ -158,7 +170,7 @@ struct LightDraw {
 }
 
 /// One path.
-pub(super) struct Walk<'a, R, B> {
+pub(super) struct CameraWalk<'a, R, B> {
     pub scene: &'a Scene,
     choice: &'a [f64],
     roulette: Roulette,
@@ -184,10 +196,10 @@ pub(super) struct Walk<'a, R, B> {
     pub bands: B,
 }
 
-impl<'a, R: Rivals, B: WalkBands> Walk<'a, R, B> {
-    /// Plays a path; returns how many numbers its walk drew.
+impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
+    /// Traces a path; returns how many numbers its walk drew.
     pub fn play(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
-        let walk = Walk::start(path, scores, rivals, bands);
+        let walk = CameraWalk::start(path, scores, rivals, bands);
         walk.scores.count(Cost::Rays);
         match walk.scene.shape.intersect(&walk.ray, Side::Outside, None, f64::INFINITY) {
             Some(hit) => walk.run(hit),
@@ -195,10 +207,11 @@ impl<'a, R: Rivals, B: WalkBands> Walk<'a, R, B> {
         }
     }
 
-    /// Plays the last two segments in the medium alone: the sensor's ray is the arrival at x_i, the next flight
-    /// must end in the medium, the one after it at the boundary, and what leaves there must meet a light.
+    /// Traces the last two segments in the medium alone: the sensor's ray is the arrival at x_i, the
+    /// next flight must end in the medium, the one after it at the boundary, and what leaves there must
+    /// meet a light.
     pub fn play_two_bounces(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> Option<()> {
-        let mut walk = Walk::start(path, scores, rivals, bands);
+        let mut walk = CameraWalk::start(path, scores, rivals, bands);
         walk.history.scatter();
         R::call(&mut walk);
         walk.turn();
@@ -217,7 +230,7 @@ impl<'a, R: Rivals, B: WalkBands> Walk<'a, R, B> {
         Some(())
     }
 
-    fn start(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> Walk<'a, R, B> {
+    fn start(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> CameraWalk<'a, R, B> {
         let Path { field, band, index, key } = path;
         let scene = &*field.scene;
         let mut sensor_stream = key.stream(index as u64, Purpose::Sensor);
@@ -225,7 +238,7 @@ impl<'a, R: Rivals, B: WalkBands> Walk<'a, R, B> {
         let [c, d] = sensor_stream.draw2();
         let start = scene.sensor.ray(index, [a, b, c, d]);
         scores.count(Cost::Paths);
-        Walk {
+        CameraWalk {
             scene,
             choice: &field.choice[band],
             roulette: field.roulette,
@@ -471,8 +484,8 @@ impl<'a, R: Rivals, B: WalkBands> Walk<'a, R, B> {
         self.bands.score(self.scores, place, value);
     }
 
-    /// The same for a path that has left the walk, with what the bands made of it since. Where it ends is not known
-    /// here: sensors that ask are not served by techniques that score so.
+    /// The same for a path that has left the walk, with what the bands made of it since. Where it ends
+    /// is not known here: sensors that ask are not served by techniques that score so.
     #[inline]
     pub fn score_with(&mut self, bands: &B, class: TransportClass, light: usize, value: f64) {
         let place = ScorePlace { slot: self.slot, band: self.band, class, light };
@@ -485,8 +498,8 @@ impl<'a, R: Rivals, B: WalkBands> Walk<'a, R, B> {
         self.choice[light]
     }
 
-    /// The exit of a path that arrives along `dir`; `None` (and counted) where shading and geometric normal
-    /// disagree about the side.
+    /// The exit of a path that arrives along `dir`; `None` (and counted) where shading and geometric
+    /// normal disagree about the side.
     pub fn exit_at(&mut self, hit: Hit, dir: DVec3) -> Option<WalkExit> {
         let frame = Frame::about(hit.shading_normal);
         let wo = frame.to_local(-dir);
@@ -582,9 +595,9 @@ impl<'a, R: Rivals, B: WalkBands> Walk<'a, R, B> {
         }
     }
 
-    /// Adds a light sample whose light comes in at `entry`: `value` is f |cos| (or phase times transmittance) times
-    /// radiance, `own` the density with which the path's own sampling draws the direction. Against parallel light it
-    /// has none.
+    /// Adds a light sample whose light comes in at `entry`: `value` is f |cos| (or phase times
+    /// transmittance) times radiance, `own` the density with which the path's own sampling draws the
+    /// direction. Against parallel light it has none.
     fn score_connection(&mut self, light: LightDraw, entry: DVec3, value: f64, own: f64) {
         let LightDraw { index, choice, wi, pdf } = light;
         let [bsdf, by_light] = self.taking_part();

@@ -158,9 +158,9 @@ fn is_wrong(ray: &Ray, hit: &Hit, t_max: f64, size: f64) -> bool {
 }
 
 /// A point outside: its ray enters the body before it leaves it. A ray that touches an edge does
-/// both at one distance, hence the slack. A flight that ends on the surface to rounding may end beyond it:
-/// such a point is not outside until it is so by 1e-12 of the size, and the next flight takes it as on
-/// the surface.
+/// both at one distance, hence the slack. A flight that ends on the surface to rounding may end beyond
+/// it: such a point is not outside until it is so by 1e-12 of the size, and the next flight takes it as
+/// on the surface.
 fn enters_first(shape: &Shape, ray: &Ray, size: f64) -> bool {
     let first = |side| shape.intersect(ray, side, None, f64::INFINITY);
     let Some(enter) = first(Side::Outside) else { return false };

@@ -1,12 +1,13 @@
-//! Lines through a body near a point of its surface, and the density of their crossings with the surface (King, Kulla,
-//! Conty & Fajardo 2013).
+//! Lines through a body near a point of its surface, and the density of their crossings with the surface
+//! (King, Kulla, Conty & Fajardo 2013).
 //!
-//! A line's axis is the point's normal (probability 1/2) or one of two tangents (1/4 each); it passes the point at a
-//! distance r that a radial density draws, in a uniform azimuth. The expected number of crossings per area at an offset
-//! from the point, where the surface has normal n, is
+//! A line's axis is the point's normal (probability 1/2) or one of two tangents (1/4 each); it passes
+//! the point at a distance r that a radial density draws, in a uniform azimuth. The expected number of
+//! crossings per area at an offset from the point, where the surface has normal n, is
 //!   sum over axes a of P(a) |n . a| times the mean over bands of sum over their densities of share pdf(r_a),
-//! r_a being the distance of the offset from the axis a through the point: the disc's density, carried from the disc across
-//! a to the surface. All axes, bands and densities that could have made a crossing are in the sum, whichever made it.
+//! r_a being the distance of the offset from the axis a through the point: the disc's density, carried
+//! from the disc across a to the surface. All axes, bands and densities that could have made a crossing
+//! are in the sum, whichever made it.
 
 use super::{Hit, Ray, Shape, Side};
 use crate::math::{DVec3, Frame};
@@ -44,8 +45,9 @@ pub struct Met {
 }
 
 impl Lines {
-    /// For a body and the radial densities of each band with their shares, which sum to 1. On half-space and slab lines
-    /// along tangents lie parallel to the surface and meet nothing: there the normal is always taken.
+    /// For a body and the radial densities of each band with their shares, which sum to 1. On half-space
+    /// and slab lines along tangents lie parallel to the surface and meet nothing: there the normal is
+    /// always taken.
     pub fn new(shape: &Shape, techniques: Vec<Vec<(f64, Radial)>>) -> Lines {
         let axes = match shape {
             Shape::HalfSpace | Shape::Slab { .. } => [0.0, 0.0, 1.0],
@@ -71,7 +73,8 @@ impl Lines {
         Line { point: point + across * x + along * y, axis, radius: (x * x + y * y).sqrt() }
     }
 
-    /// Expected number of crossings of one line per mm^2 of a surface with this normal at `offset` from the point.
+    /// Expected number of crossings of one line per mm^2 of a surface with this normal at `offset` from
+    /// the point.
     pub fn pdf_area(&self, bands: &[usize], frame: &Frame, offset: DVec3, normal: DVec3) -> f64 {
         let mut sum = 0.0;
         for (share, axis) in self.axes.into_iter().zip([frame.s, frame.t, frame.n]) {
@@ -92,8 +95,8 @@ impl Lines {
 }
 
 impl Line {
-    /// Appends all crossings with the surface. The line is followed from outside the body, by turns outside and
-    /// inside, so that of neighbours along an edge exactly one is met.
+    /// Appends all crossings with the surface. The line is followed from outside the body, by turns
+    /// outside and inside, so that of neighbours along an edge exactly one is met.
     pub fn cross(&self, shape: &Shape, hits: &mut Vec<Hit>) -> Met {
         let mut met = Met::default();
         let Some(mut ray) = self.start(shape) else { return met };
@@ -152,7 +155,8 @@ mod tests {
         mesh.triangles().iter().filter(crossed).count()
     }
 
-    /// A line meets every sheet of a mesh once: as many crossings as triangles over the line, in turns in and out.
+    /// A line meets every sheet of a mesh once: as many crossings as triangles over the line, in turns
+    /// in and out.
     #[test]
     fn lines_cross_every_sheet_once() {
         let meshes = [

@@ -213,9 +213,9 @@ impl Mesh {
     /// Seen along such a ray the edge is the rim of the body, and rounding decides on which side of the
     /// rim the origin lies: outside of it no triangle is met at all. So an origin that is on an edge to
     /// rounding is taken to be on every face there, and leaves (or enters) through the first that it
-    /// heads through. Between nearly coplanar faces rounding reaches farther along the surface, hence the
-    /// margin; the fraction of a surface near the origin that lies so near to an edge is below 1e-9 with
-    /// fewer than a hundred edges across.
+    /// heads through. Between nearly coplanar faces rounding reaches farther along the surface, hence
+    /// the margin; the fraction of a surface near the origin that lies so near to an edge is below 1e-9
+    /// with fewer than a hundred edges across.
     fn at_once(&self, ray: &Ray, side: Side, from: FaceId) -> Option<Hit> {
         let margin = 1e3 * self.slack;
         let corners = self.corners(from.0);

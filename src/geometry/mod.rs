@@ -85,8 +85,8 @@ pub struct BoundingSphere {
 }
 
 impl BoundingSphere {
-    /// A ray along -`out` that starts a diameter off on the disc across it, uniform per area (pi R^2): all light that
-    /// goes this way and meets the body comes through that disc.
+    /// A ray along -`out` that starts a diameter off on the disc across it, uniform per area (pi R^2):
+    /// all light that goes this way and meets the body comes through that disc.
     pub fn beam(&self, out: DVec3, u: [f64; 2]) -> Ray {
         let across = Frame::about(out);
         let [x, y] = square_to_disc(u);
@@ -198,7 +198,8 @@ impl Shape {
         }
     }
 
-    /// A lower bound of the distance from a point of the body to its surface, mm; exact for analytic shapes, and cheap.
+    /// A lower bound of the distance from a point of the body to its surface, mm; exact for analytic
+    /// shapes, and cheap.
     pub fn clearance(&self, point: DVec3) -> f64 {
         match *self {
             Shape::HalfSpace => -point.z,

@@ -180,7 +180,8 @@ mod tests {
         }
     }
 
-    /// D5: a point lies on its triangle, has its normal, and the density asked again is the one reported.
+    /// D5: a point lies on its triangle, has its normal, and the density asked again is the one
+    /// reported.
     #[test]
     fn points_lie_on_their_triangle() {
         let mesh = uneven();

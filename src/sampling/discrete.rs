@@ -38,8 +38,8 @@ pub struct Cumulative {
 }
 
 impl Cumulative {
-    /// Indices in proportion to `weights`; `None` unless they are finite, none is negative, and their sum
-    /// is positive and finite.
+    /// Indices in proportion to `weights`; `None` unless they are finite, none is negative, and their
+    /// sum is positive and finite.
     pub fn new(weights: &[f64]) -> Option<Cumulative> {
         let total: f64 = weights.iter().sum();
         let are_weights = weights.iter().all(|w| w.is_finite() && *w >= 0.0);
@@ -70,8 +70,8 @@ impl Cumulative {
         self.ends[index] - self.begin(index)
     }
 
-    /// Density of a sample whose technique (or hero band) was picked by this table, `pdfs` being what each
-    /// of them has there: sum of P_m p_m, the denominator of the balance heuristic over one sample
+    /// Density of a sample whose technique (or hero band) was picked by this table, `pdfs` being what
+    /// each of them has there: sum of P_m p_m, the denominator of the balance heuristic over one sample
     /// (Veach & Guibas 1995; over hero wavelengths Wilkie et al. 2014).
     pub fn mixture_pdf(&self, pdfs: impl IntoIterator<Item = f64>) -> f64 {
         pdfs.into_iter().enumerate().map(|(index, pdf)| self.probability(index) * pdf).sum()

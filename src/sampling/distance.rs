@@ -26,9 +26,9 @@ pub fn transmittance(sigma_t: f64, t: f64) -> f64 {
 /// A distance in [0, `t_max`] in proportion to exp(-sigma_t t): the inverse of
 /// F(t) = (1 - e^(-sigma_t t)) / (1 - e^(-tau)), tau = sigma_t t_max.
 ///
-/// e^(-sigma_t t) = 1 - u (1 - e^(-tau)) = (1 - u) + u e^(-tau): the first form keeps the digits of a thin
-/// medium, the second, a sum of positive terms, those of the far end of a thick one. Uniform where tau
-/// is 0; the plain exponential where `t_max` is infinite.
+/// e^(-sigma_t t) = 1 - u (1 - e^(-tau)) = (1 - u) + u e^(-tau): the first form keeps the digits of a
+/// thin medium, the second, a sum of positive terms, those of the far end of a thick one. Uniform where
+/// tau is 0; the plain exponential where `t_max` is infinite.
 #[inline]
 pub fn sample_truncated_exponential(sigma_t: f64, t_max: f64, u: f64) -> f64 {
     if sigma_t == 0.0 {
@@ -56,15 +56,16 @@ pub fn pdf_distance_truncated_exponential(sigma_t: f64, t_max: f64, t: f64) -> f
 /// sampling (Kulla & Fajardo 2012, section 4).
 ///
 /// The ray's origin, the point and the sample form a triangle. With delta the coordinate of the point's
-/// foot on the ray, D its distance from the line and L^2 = delta^2 + D^2, the triangle's angle at the origin
-/// is `near` = atan2(D, delta); the segment [0, t_max] is seen from the point under the angle `span`, and
-/// what lies beyond it under `rest`, in all half a turn. A sample divides the span in the ratio u, and by
-/// the law of sines
+/// foot on the ray, D its distance from the line and L^2 = delta^2 + D^2, the triangle's angle at the
+/// origin is `near` = atan2(D, delta); the segment [0, t_max] is seen from the point under the angle
+/// `span`, and what lies beyond it under `rest`, in all half a turn. A sample divides the span in the
+/// ratio u, and by the law of sines
 ///   t = L sin(u span) / sin(near + u span) = L sin(u span) / sin(rest + (1 - u) span).
 /// A sine is that of what is left to half a turn; of the two arguments the smaller is a sum of positive
-/// terms below a quarter turn. So there is no difference of near numbers at either end, nor close to a point
-/// on the line, for t_max infinite (rest = 0) as for a short segment far away. rest = atan2(D, t_max - delta); span = atan2(t_max D, D^2 - delta (t_max - delta)), or
-/// atan2(D, -delta) for the infinite ray.
+/// terms below a quarter turn. So there is no difference of near numbers at either end, nor close to a
+/// point on the line, for t_max infinite (rest = 0) as for a short segment far away. rest = atan2(D,
+/// t_max - delta); span = atan2(t_max D, D^2 - delta (t_max - delta)), or atan2(D, -delta) for the
+/// infinite ray.
 ///
 /// A point on the line would leave no density anywhere else: D is never below [`Equiangular::CLAMP`] L,
 /// for the sample and for the density alike.
@@ -72,7 +73,7 @@ pub fn pdf_distance_truncated_exponential(sigma_t: f64, t_max: f64, t: f64) -> f
 pub struct Equiangular {
     delta: f64,
     distance: f64,
-    /// L.
+    /// Distance of the point from the ray's origin, L, mm.
     far: f64,
     near: f64,
     span: f64,
@@ -84,8 +85,8 @@ impl Equiangular {
     /// The least distance of the point from the line, in units of its distance from the ray's origin.
     pub const CLAMP: f64 = 1e-9;
 
-    /// Along a ray of length `t_max` (mm, may be infinite) from the origin with unit direction `dir`, for
-    /// a point at `offset` from the origin.
+    /// Along a ray of length `t_max` (mm, may be infinite) from the origin with unit direction `dir`,
+    /// for a point at `offset` from the origin.
     ///
     /// `None` where there is nothing to sample: the point is the origin itself, or the segment is seen
     /// under no angle that a number can hold. A technique then has density 0 there.
@@ -307,8 +308,8 @@ mod tests {
         }
     }
 
-    /// The point on the line is the clamp's business, the point at the origin nobody's; vectors and their
-    /// two numbers say the same.
+    /// The point on the line is the clamp's business, the point at the origin nobody's; vectors and
+    /// their two numbers say the same.
     #[test]
     fn equiangular_limits() {
         assert_eq!(Equiangular::new(0.0, 0.0, 1.0), None);

@@ -3,9 +3,9 @@
 //! With v = tan^2(theta/2), theta the angle to the axis,
 //!   p(v) = s^2 / (s^2 + v)^2   on [0, infinity),   distribution function v / (s^2 + v),
 //! which inverts to v = s^2 u / (1 - u). The solid angle is d omega = 2 pi sin(theta) dtheta
-//! = 4 pi dv / (1 + v)^2, so that the density per solid angle is p(v) (1 + v)^2 / (4 pi): 1 / (4 pi s^2) on
-//! the axis, s^2 / (4 pi) opposite to it, and uniform for s = 1. For a narrow lobe 2 s is the angle that
-//! holds half of it, and outside it falls off as theta^-4.
+//! = 4 pi dv / (1 + v)^2, so that the density per solid angle is p(v) (1 + v)^2 / (4 pi): 1 / (4 pi s^2)
+//! on the axis, s^2 / (4 pi) opposite to it, and uniform for s = 1. For a narrow lobe 2 s is the angle
+//! that holds half of it, and outside it falls off as theta^-4.
 
 use std::f64::consts::PI;
 
@@ -19,7 +19,8 @@ pub struct PowerLobe {
 }
 
 impl PowerLobe {
-    /// About the unit vector `axis`; `width` is s > 0, the tangent of half the angle that holds half of it.
+    /// About the unit vector `axis`; `width` is s > 0, the tangent of half the angle that holds half of
+    /// it.
     pub fn new(axis: DVec3, width: f64) -> PowerLobe {
         PowerLobe { frame: Frame::about(axis), width2: width * width }
     }
@@ -34,8 +35,8 @@ impl PowerLobe {
         self.frame.to_world(DVec3::new(r * cos_phi, r * sin_phi, (a - b) / (a + b)))
     }
 
-    /// Density of [`Self::sample`] per solid angle. v = |dir - axis|^2 / |dir + axis|^2 keeps its digits at
-    /// both poles; with it as a fraction nothing overflows.
+    /// Density of [`Self::sample`] per solid angle. v = |dir - axis|^2 / |dir + axis|^2 keeps its digits
+    /// at both poles; with it as a fraction nothing overflows.
     #[inline]
     pub fn pdf(&self, dir: DVec3) -> f64 {
         let (apart, along) =

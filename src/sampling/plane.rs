@@ -1,12 +1,13 @@
 //! Directions from a vertex to the points of a plane above it, spread about the vertex's foot.
 //!
-//! At height h below the plane, with mean free path l, light that leaves through the plane does so within a
-//! few of sqrt(h^2 + l^2) of the foot. So let the point's distance from the foot be r = s sqrt(u / (1 - u)),
-//! s^2 = h^2 + l^2: density s^2 / (pi (r^2 + s^2)^2) per area. Seen from the vertex at distance d under the
-//! cosine c = h / d, an area element is c / d^2 of it in solid angle, and r^2 + s^2 = h^2 / c^2 + l^2, hence
+//! At height h below the plane, with mean free path l, light that leaves through the plane does so
+//! within a few of sqrt(h^2 + l^2) of the foot. So let the point's distance from the foot be r = s
+//! sqrt(u / (1 - u)), s^2 = h^2 + l^2: density s^2 / (pi (r^2 + s^2)^2) per area. Seen from the vertex
+//! at distance d under the cosine c = h / d, an area element is c / d^2 of it in solid angle, and r^2 +
+//! s^2 = h^2 / c^2 + l^2, hence
 //!   pdf = s^2 d^2 / (pi c (r^2 + s^2)^2) = s^2 h^2 c / (pi (h^2 + l^2 c^2)^2)   per solid angle.
-//! For l = 0 that is the cosine lobe. The plane is only what the lobe is made with: a direction may be used
-//! on any surface.
+//! For l = 0 that is the cosine lobe. The plane is only what the lobe is made with: a direction may be
+//! used on any surface.
 
 use std::f64::consts::PI;
 
@@ -22,12 +23,12 @@ pub struct PlaneLobe {
 }
 
 impl PlaneLobe {
-    /// A vertex that is lower than this many mean free paths has the lobe of this height: below it the lobe
-    /// grazes the plane, where a unit vector no longer holds the digits of its cosine.
+    /// A vertex that is lower than this many mean free paths has the lobe of this height: below it the
+    /// lobe grazes the plane, where a unit vector no longer holds the digits of its cosine.
     pub const LOWEST: f64 = 1e-6;
 
-    /// `normal` is the plane's unit normal, away from the vertex; `height` > 0 the vertex's distance from the
-    /// plane, `mfp` > 0 the mean free path, both in mm.
+    /// `normal` is the plane's unit normal, away from the vertex; `height` > 0 the vertex's distance
+    /// from the plane, `mfp` > 0 the mean free path, both in mm.
     pub fn new(normal: DVec3, height: f64, mfp: f64) -> PlaneLobe {
         let height = height.max(PlaneLobe::LOWEST * mfp);
         let s = (height * height + mfp * mfp).sqrt();
@@ -44,8 +45,8 @@ impl PlaneLobe {
         self.frame.to_world(DVec3::new(r * cos_phi, r * sin_phi, up).normalize())
     }
 
-    /// Density of [`Self::sample`] per solid angle, to a relative 2e-16 / cos, which is what a unit vector holds of
-    /// its cosine; 0 for what does not go towards the plane.
+    /// Density of [`Self::sample`] per solid angle, to a relative 2e-16 / cos, which is what a unit
+    /// vector holds of its cosine; 0 for what does not go towards the plane.
     #[inline]
     pub fn pdf(&self, dir: DVec3) -> f64 {
         let cos = dir.dot(self.frame.n);
@@ -70,8 +71,8 @@ mod tests {
 
     const LOBES: [(f64, f64); 5] = [(1.0, 1e-3), (1.0, 1.0), (0.1, 1.0), (0.01, 2.0), (1e-4, 1.0)];
 
-    /// The sampled ray meets the plane at distance s sqrt(u / (1 - u)) from the foot: D1 in the words of the
-    /// head, in mm.
+    /// The sampled ray meets the plane at distance s sqrt(u / (1 - u)) from the foot: D1 in the words of
+    /// the head, in mm.
     #[test]
     fn distance_from_the_foot() {
         for (h, l) in LOBES {
@@ -114,8 +115,8 @@ mod tests {
         }
     }
 
-    /// D7: over the hemisphere it adds up to 1; below the plane's horizon there is nothing; and a vertex in
-    /// the plane itself still has a lobe.
+    /// D7: over the hemisphere it adds up to 1; below the plane's horizon there is nothing; and a vertex
+    /// in the plane itself still has a lobe.
     #[test]
     fn normalised() {
         for (h, l) in LOBES {

@@ -22,8 +22,8 @@ pub enum Radial {
         /// Radius of the disc, may be infinite.
         r_max: f64,
     },
-    /// Normalized diffusion (Christensen & Burley 2015): (e^(-r/d) + e^(-r/(3d))) / (8 pi d r), in radius
-    /// one part of Exp(d) and three parts of Exp(3d).
+    /// Normalized diffusion (Christensen & Burley 2015): (e^(-r/d) + e^(-r/(3d))) / (8 pi d r), in
+    /// radius one part of Exp(d) and three parts of Exp(3d).
     NormalizedDiffusion {
         /// d, positive.
         d: f64,
@@ -37,9 +37,11 @@ pub enum Radial {
 /// Each source at depth z sends z (1 + s r') e^(-s r') / (4 pi r'^3), r'^2 = r^2 + z^2, through the
 /// surface; over the plane that is e^(-s z) / 2, and inside radius r the part
 ///   F(r) = 1 - (z / r') e^(-s (r' - z)).
-/// So a source is chosen in proportion to e^(-s z), and 1 - F = u' in (0, 1] is solved for x = (r' - z)/z:
+/// So a source is chosen in proportion to e^(-s z), and 1 - F = u' in (0, 1] is solved for x = (r' -
+/// z)/z:
 ///   s z x + ln(1 + x) = -ln u'
-/// (r' = W(s z e^(s z) / u') / s with Lambert's W), from which r = z sqrt(x (2 + x)) without a difference.
+/// (r' = W(s z e^(s z) / u') / s with Lambert's W), from which r = z sqrt(x (2 + x)) without a
+/// difference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dipole {
     /// s: effective transport coefficient sqrt(3 sigma_a sigma_t'), 1/mm, not negative.

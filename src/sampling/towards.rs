@@ -24,8 +24,8 @@ pub struct TowardsPoint {
 }
 
 impl TowardsPoint {
-    /// Angles to the axis below this count as this, in samples (a part 6e-10 of them) and densities, which
-    /// grow without bound towards the axis.
+    /// Angles to the axis below this count as this, in samples (a part 6e-10 of them) and densities,
+    /// which grow without bound towards the axis.
     pub const CLAMP: f64 = 1e-9;
 
     /// Towards a point at `offset` (mm) from the vertex; `None` if it is the vertex itself.
@@ -46,8 +46,8 @@ impl TowardsPoint {
         TowardsPoint::pdf_about(self.frame.n, dir).1
     }
 
-    /// [`Self::sample`] in a frame whose third axis points to the point: theta by `u[0]`, azimuth 2 pi `u[1]`
-    /// from the first axis.
+    /// [`Self::sample`] in a frame whose third axis points to the point: theta by `u[0]`, azimuth 2 pi
+    /// `u[1]` from the first axis.
     #[inline]
     pub fn sample_local(u: [f64; 2]) -> DVec3 {
         // 1 - sqrt(1 - u) without the difference.
@@ -58,7 +58,8 @@ impl TowardsPoint {
         DVec3::new(r * cos_phi, r * sin_phi, 1.0 - 2.0 * half * half)
     }
 
-    /// theta, and [`Self::pdf`], of the unit vector `dir` for a point straight along the unit vector `axis`.
+    /// theta, and [`Self::pdf`], of the unit vector `dir` for a point straight along the unit vector
+    /// `axis`.
     #[inline]
     pub fn pdf_about(axis: DVec3, dir: DVec3) -> (f64, f64) {
         // Half angles by lengths keep their digits at both poles (Kahan).

@@ -2,8 +2,8 @@
 //!
 //! Radiance is constant inside a texel, so that its density can be exactly proportional to it: texel k
 //! of row r subtends (cos theta_r - cos theta_{r+1}) 2 pi / width. A texel is drawn with probability
-//! radiance * solid angle over their sum S (alias table), a direction uniformly inside it, and the density
-//! of direction w is radiance(w) / S: no sine, no pole.
+//! radiance * solid angle over their sum S (alias table), a direction uniformly inside it, and the
+//! density of direction w is radiance(w) / S: no sine, no pole.
 //!
 //! +z is up (first row); the middle column looks along +x and azimuth grows towards the left edge,
 //! as seen from inside, counter-clockwise from above.
@@ -91,8 +91,8 @@ impl LatLong {
         radiance[texel] * (self.edges[row] - self.edges[row + 1]) * 2.0 * PI / self.width as f64
     }
 
-    /// The part of a band's map that is more than `excess` times as bright as its mean and at most `reach` (rad)
-    /// from its brightest texel, as a light of its own. `None` if there is no such part.
+    /// The part of a band's map that is more than `excess` times as bright as its mean and at most
+    /// `reach` (rad) from its brightest texel, as a light of its own. `None` if there is no such part.
     pub fn bright(&self, band: usize, excess: f64, reach: f64) -> Option<Bright> {
         let map = &self.bands[band];
         let least = excess * map.strength / (4.0 * PI);
@@ -255,8 +255,8 @@ mod tests {
         assert!((mass - 1.0).abs() < 1e-12);
     }
 
-    /// The bright part of a map with a sun: only the sun's texels, with a density that is the part's share of the
-    /// whole's, and samples that it evaluates alike.
+    /// The bright part of a map with a sun: only the sun's texels, with a density that is the part's
+    /// share of the whole's, and samples that it evaluates alike.
     #[test]
     fn bright_part() {
         let (width, height) = (32, 16);

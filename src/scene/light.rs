@@ -89,7 +89,8 @@ impl Light {
         }
     }
 
-    /// What another band has in a direction that was drawn from this light: radiance, or irradiance of parallel light.
+    /// What another band has in a direction that was drawn from this light: radiance, or irradiance of
+    /// parallel light.
     #[inline]
     pub fn sampled_radiance(&self, band: usize, wi: DVec3) -> f64 {
         match &self.emission {

@@ -1,7 +1,7 @@
 //! Phase one: points of the surface with the flux that enters there, in the order of their hierarchy.
 //!
-//! A point's random numbers are those of its index, so the flux is computed after the hierarchy has put the points
-//! in order, from the same numbers again: nothing but positions is ever moved.
+//! A point's random numbers are those of its index, so the flux is computed after the hierarchy has put
+//! the points in order, from the same numbers again: nothing but positions is ever moved.
 
 use crate::estimators::emergence::BssrdfScene;
 use crate::geometry::{BodyPoint, BodySampler, Ray};
@@ -19,8 +19,8 @@ pub(super) struct Cloud {
     flux: Vec<f64>,
     /// Which light; empty where there is one.
     light: Vec<u16>,
-    /// Shading normal and direction to the light, where the model asks for them. Half as many digits as elsewhere, for
-    /// memory's sake: 6e-8, far below what any number of passes can see.
+    /// Shading normal and direction to the light, where the model asks for them. Half as many digits as
+    /// elsewhere, for memory's sake: 6e-8, far below what any number of passes can see.
     directions: Vec<[[f32; 3]; 2]>,
     pub shadow_rays: u64,
     pub wrong_side: u64,
@@ -145,7 +145,8 @@ impl Cloud {
 
     /// The most memory that `count` points take, while they are put in order too, bytes.
     pub fn bytes(bssrdf: &BssrdfScene, count: usize) -> usize {
-        // A code, an index and a position; then coordinates, places and about half a node (40 bytes) a point.
+        // A code, an index and a position; then coordinates, places and about half a node (40 bytes) a
+        // point.
         let (sorted, kept) = (16 + 24, 24 + 4 + 20);
         let light = if bssrdf.scene.lights.len() > 1 { 2 } else { 0 };
         let directions = if bssrdf.models.iter().any(|model| model.needs_directions()) { 24 } else { 0 };

@@ -1,16 +1,20 @@
-//! The point-cloud method for BSSRDFs (Dal Corso & Frisvad 2018: direct Monte Carlo integration, two phases).
+//! The point-cloud method for BSSRDFs (Dal Corso & Frisvad 2018: direct Monte Carlo integration, two
+//! phases).
 //!
-//! Phase one, once a pass: M points of the surface with density f per area, at each one direction to a light, and the
-//! flux Phi = E / f that enters there. Phase two, for each camera path that is refracted into the body at x_o:
+//! Phase one, once a pass: M points of the surface with density f per area, at each one direction to a
+//! light, and the flux Phi = E / f that enters there. Phase two, for each camera path that is refracted
+//! into the body at x_o:
 //!   L_r = 1/M sum_p S(x_p, x_o) Phi_p B_p / p(d_p),   B_p = 1 with probability p(d_p), d_p = |x_o - x_p|,
-//! the source's V(xi, e^(-sigma_tr d)) e^(+sigma_tr d) with p(d) = e^(-sigma_tr d). Given the points E[B_p / p] = 1, and over
-//! the points each term has mean int S E dA, whatever p > 0 is: unbiased with respect to the model, which knows no
-//! visibility inside the body. What p decides is variance: the second moment of a term is E[(S Phi)^2 / p], and
-//! where p falls faster than S^2 does, it grows with the size of the body ([`Acceptance`]).
+//! the source's V(xi, e^(-sigma_tr d)) e^(+sigma_tr d) with p(d) = e^(-sigma_tr d). Given the points
+//! E[B_p / p] = 1, and over the points each term has mean int S E dA, whatever p > 0 is: unbiased with
+//! respect to the model, which knows no visibility inside the body. What p decides is variance: the
+//! second moment of a term is E[(S Phi)^2 / p], and where p falls faster than S^2 does, it grows with
+//! the size of the body ([`Acceptance`]).
 //!
-//! The camera path's branch of refraction has probability T21, so the kernel leaves T21 out (`emergence.rs`).
-//! Light is sampled by strength with a shadow ray. Pixels of a pass share the points: their errors are correlated within a
-//! pass, and independent between passes, each of which has points of its own.
+//! The camera path's branch of refraction has probability T21, so the kernel leaves T21 out
+//! (`emergence.rs`). Light is sampled by strength with a shadow ray. Pixels of a pass share the points:
+//! their errors are correlated within a pass, and independent between passes, each of which has points
+//! of its own.
 
 mod cloud;
 
@@ -35,17 +39,18 @@ pub enum Acceptance {
     All,
     /// e^(-sigma_tr d) of the band: bands accept by themselves.
     Band,
-    /// e^(-m d) with the mean m of sigma_tr over the bands: the source's rule for RGB. In a band with sigma_tr < m/2 the
-    /// variance grows exponentially with the size of the body.
+    /// e^(-m d) with the mean m of sigma_tr over the bands: the source's rule for RGB. In a band with
+    /// sigma_tr < m/2 the variance grows exponentially with the size of the body.
     Mean,
     /// e^(-m d) with the smallest sigma_tr: bounded in every band, and accepts the most.
     Minimum,
-    /// The mean over the bands of e^(-sigma_tr d): bounded in every band, accepts fewer than the smallest does.
+    /// The mean over the bands of e^(-sigma_tr d): bounded in every band, accepts fewer than the
+    /// smallest does.
     MeanOfExponentials,
     /// max(e^(-m d), least), m the mean.
     Floor(f64),
-    /// In proportion to the mean over the bands of the kernel over its integral, as many as the mean of exponentials
-    /// accepts over a disc as wide as the body.
+    /// In proportion to the mean over the bands of the kernel over its integral, as many as the mean of
+    /// exponentials accepts over a disc as wide as the body.
     Kernel,
 }
 
@@ -67,11 +72,11 @@ pub enum Search {
 pub struct PointCloudOptions {
     /// The BSSRDF.
     pub model: Model,
-    /// M.
+    /// Number of surface points per pass, M.
     pub samples: usize,
     /// How points are drawn from the surface.
     pub faces: FaceChoice,
-    /// p(d).
+    /// How the probability of acceptance falls with distance.
     pub acceptance: Acceptance,
     /// How accepted points are found.
     pub search: Search,
@@ -143,8 +148,8 @@ fn rules(
     bssrdf.groups.iter().map(|group| (group.clone(), rule.clone())).collect()
 }
 
-/// Accepts in proportion to the kernels, on average over a disc of radius `reach` as many as the mean of exponentials:
-/// int_0^R e^(-s d) 2 d dd / R^2 = 2 (1 - (1 + a) e^(-a)) / a^2 with a = s R.
+/// Accepts in proportion to the kernels, on average over a disc of radius `reach` as many as the mean of
+/// exponentials: int_0^R e^(-s d) 2 d dd / R^2 = 2 (1 - (1 + a) e^(-a)) / a^2 with a = s R.
 fn in_proportion(bssrdf: &BssrdfScene, sigmas: &[f64], reach: f64) -> ThinningForm {
     use crate::math::{exp, integrate};
     let mean_of = |sigma: f64| {
@@ -188,9 +193,10 @@ impl Estimator for PointCloud {
         Some(self.options.model.to_string())
     }
 
-    /// Under p = e^(-m d) an accepted term of a band with effective transport s weighs like e^((m - s) d), with a Pareto
-    /// tail of index m / (m - s) on an unbounded surface: without variance where m > 2 s. A finite body cuts the tail off
-    /// at its diameter D; the variance has then grown by about e^((m - 2 s) D).
+    /// Under p = e^(-m d) an accepted term of a band with effective transport s weighs like e^((m - s)
+    /// d), with a Pareto tail of index m / (m - s) on an unbounded surface: of infinite variance where m
+    /// > 2 s. A finite body cuts the tail off at its diameter D; the variance has then grown by about
+    /// e^((m - 2 s) D).
     fn heavy_tails(&self) -> Vec<HeavyTail> {
         if self.options.acceptance != Acceptance::Mean {
             return Vec::new(); // weights of all other rules are bounded by what the kernel loses, or by their floor

@@ -72,7 +72,8 @@ fn measure(name: &str, scene: &Arc<Scene>, options: PointCloudOptions, passes: u
     sums.into_iter().map(of).collect()
 }
 
-/// Under a sky L the irradiance that enters is the same everywhere, and on a sphere dA = 2 pi d dd in chord length d:
+/// Under a sky L the irradiance that enters is the same everywhere, and on a sphere dA = 2 pi d dd in
+/// chord length d:
 ///   T21 L (1 - 2 C1(1/eta)) int_0^2R R(d) 2 pi d dd.
 fn expected(scene: &Scene, band: usize) -> f64 {
     let options = options(Acceptance::All, Search::Scan);
@@ -82,8 +83,9 @@ fn expected(scene: &Scene, band: usize) -> f64 {
     (1.0 - fresnel(1.0, ETA).reflectance) * (band + 1) as f64 * entering * profile
 }
 
-/// Every rule, by hierarchy and by scan, on a body so small that no rule has heavy tails. 21 comparisons of a mean of
-/// 2000 passes, 5 standard errors each (about 0.5 to 2 % of the value, printed): a false alarm in 80,000 runs.
+/// Every rule, by hierarchy and by scan, on a body so small that no rule has heavy tails. 21 comparisons
+/// of a mean of 2000 passes, 5 standard errors each (about 0.5 to 2 % of the value, printed): a false
+/// alarm in 80,000 runs.
 #[test]
 fn every_rule_has_the_mean_of_quadrature() {
     let scene = scene(vec![sky()]);
@@ -110,7 +112,8 @@ fn every_rule_has_the_mean_of_quadrature() {
     }
 }
 
-/// Two lights add up, and each is scored under its own name; light behind the body and in shadow does not enter.
+/// Two lights add up, and each is scored under its own name; light behind the body and in shadow does
+/// not enter.
 #[test]
 fn lights_are_told_apart() {
     let sun = |toward: DVec3, irradiance: f64| Light {

@@ -1,9 +1,10 @@
-//! Bidirectional path tracing with one light vertex inside the medium (Lafortune & Willems 1993; Veach & Guibas
-//! 1994): what subdivision is a local form of.
+//! Bidirectional path tracing with one light vertex inside the medium (Lafortune & Willems 1993; Veach &
+//! Guibas 1994): what subdivision is a local form of.
 //!
-//! Every walk gets one light path: a direction from a light, a point of the disc across it that covers the body, the
-//! first boundary point x_k met, refraction there, a flight to x_j. Every medium vertex x_i of the walk connects to
-//! that x_j. Per volume of x_j, area of x_k and solid angle of w_L its density is, R being the bounding sphere's radius,
+//! Every walk gets one light path: a direction from a light, a point of the disc across it that covers
+//! the body, the first boundary point x_k met, refraction there, a flight to x_j. Every medium vertex
+//! x_i of the walk connects to that x_j. Per volume of x_j, area of x_k and solid angle of w_L its
+//! density is, R being the bounding sphere's radius,
 //!   p_G(w_L) (n.w_L) / (pi R^2) p(w_kj | w_L) sigma_t T(d_jk) / d_jk^2,
 //! over U of [`super::connections`]:
 //!   p_G (n.w_L) / (pi R^2) p_rev d_ij^2 / (phase_i T_ij phase_j cos_k).
@@ -16,7 +17,7 @@ use super::end::{End, Middle};
 use super::guide::Guide;
 use crate::error::{Error, Result};
 use crate::estimators::bands::{OneBand, WalkBands};
-use crate::estimators::walk::{Field, Path, Rivals, Unrivalled, Walk, WalkExit};
+use crate::estimators::walk::{CameraWalk, Field, Path, Rivals, Unrivalled, WalkExit};
 use crate::estimators::{Cost, Estimator, Roulette, Scores};
 use crate::geometry::{BoundingSphere, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
@@ -65,7 +66,7 @@ impl Estimator for Bidirectional {
                 let guides = &self.guides[band];
                 let path = Path { field: &self.field, band, index, key };
                 if guides.is_empty() {
-                    Walk::play(path, scores, Unrivalled, OneBand);
+                    CameraWalk::play(path, scores, Unrivalled, OneBand);
                     continue;
                 }
                 let mut stream = key.stream(index as u64, Purpose::Connection);
@@ -73,7 +74,7 @@ impl Estimator for Bidirectional {
                 let light = self.light_path(guides, band, &mut stream, scores);
                 let nowhere = Ray { origin: DVec3::NAN, dir: DVec3::Z };
                 let rivals = OneLightVertex { guides, light, covered, vertices: [nowhere; 2], count: 0 };
-                Walk::play(path, scores, rivals, OneBand);
+                CameraWalk::play(path, scores, rivals, OneBand);
             }
         }
     }
@@ -147,7 +148,7 @@ struct OneLightVertex<'a> {
 
 /// The technique's density over U of a path that has arrived at x_i along `arrival`.
 fn density<B: WalkBands>(
-    walk: &Walk<'_, OneLightVertex<'_>, B>,
+    walk: &CameraWalk<'_, OneLightVertex<'_>, B>,
     arrival: DVec3,
     middle: &Middle,
     exit: &WalkExit,
@@ -165,7 +166,7 @@ fn density<B: WalkBands>(
 }
 
 impl Rivals for OneLightVertex<'_> {
-    fn call<B: WalkBands>(walk: &mut Walk<'_, Self, B>) {
+    fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>) {
         let state = &mut walk.rivals;
         let Ray { origin: x_i, dir: arrival } = walk.ray;
         state.vertices = [state.vertices[1], walk.ray];
@@ -193,9 +194,9 @@ impl Rivals for OneLightVertex<'_> {
         self.count = 0;
     }
 
-    fn reflect<B: WalkBands>(_: &mut Walk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
+    fn reflect<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
 
-    fn has_scored_reflection<B: WalkBands>(_: &Walk<'_, Self, B>, _: usize, _: DVec3) -> bool {
+    fn has_scored_reflection<B: WalkBands>(_: &CameraWalk<'_, Self, B>, _: usize, _: DVec3) -> bool {
         false
     }
 
@@ -204,7 +205,7 @@ impl Rivals for OneLightVertex<'_> {
     }
 
     fn densities<B: WalkBands>(
-        walk: &mut Walk<'_, Self, B>,
+        walk: &mut CameraWalk<'_, Self, B>,
         exit: &WalkExit,
         light: usize,
         wi: DVec3,

@@ -1,14 +1,15 @@
-//! What a walk carries for connections through the boundary, and the density of a path's end under all of them.
+//! What a walk carries for connections through the boundary, and the density of a path's end under all
+//! of them.
 //!
 //! The end of a path: x_i -> x_j -> x_k in the order of the walk, x_i and x_j in the medium, x_k on the
-//! boundary, then w_L towards a light. Every density is taken per volume of x_j, area of x_k and solid angle
-//! of w_L, and divided by
+//! boundary, then w_L towards a light. Every density is taken per volume of x_j, area of x_k and solid
+//! angle of w_L, and divided by
 //!   U = phase(x_i) sigma_t T(d_ij) / d_ij^2 * phase(x_j) T(d_jk) cos_k / d_jk^2,
-//! the density with which the walk itself draws x_j and x_k (the flight to the boundary has the probability T,
-//! no sigma_t). Delta lobes and parallel light leave Dirac factors in w_L, of which only the
-//! coefficients are kept: a technique takes part for a pair (lobe, light) exactly if its Dirac factors are the
-//! pair's. Refraction by a smooth surface, drawn from the light's side, is a delta in w_kj; written in w_L it
-//! gains J = dw_L / dw_kj = eta^2 |n.w_kj| / |n.w_L|.
+//! the density with which the walk itself draws x_j and x_k (the flight to the boundary has the
+//! probability T, no sigma_t). Delta lobes and parallel light leave Dirac factors in w_L, of which only
+//! the coefficients are kept: a technique takes part for a pair (lobe, light) exactly if its Dirac
+//! factors are the pair's. Refraction by a smooth surface, drawn from the light's side, is a delta in
+//! w_kj; written in w_L it gains J = dw_L / dw_kj = eta^2 |n.w_kj| / |n.w_L|.
 //!
 //!   lobe x light          BSDF   light   top to bottom   bottom to top   last vertex
 //!   rough x finite        yes    yes     yes             yes             yes
@@ -26,12 +27,12 @@ use super::state::{Connections, Slot, WalkVertex};
 use super::subdivision::{self, Subdivided};
 use crate::estimators::Cost;
 use crate::estimators::bands::WalkBands;
-use crate::estimators::walk::{Rivals, Walk, WalkExit};
+use crate::estimators::walk::{CameraWalk, Rivals, WalkExit};
 use crate::geometry::{Hit, Ray};
 use crate::math::DVec3;
 
 impl Rivals for Connections<'_> {
-    fn call<B: WalkBands>(walk: &mut Walk<'_, Self, B>) {
+    fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>) {
         let Ray { origin: point, dir: arrival } = walk.ray;
         let state = &mut walk.rivals;
         state.arrive(WalkVertex { point, arrival, walks: walk.bands.density() });
@@ -65,7 +66,7 @@ impl Rivals for Connections<'_> {
     }
 
     fn reflect<B: WalkBands>(
-        walk: &mut Walk<'_, Self, B>,
+        walk: &mut CameraWalk<'_, Self, B>,
         hit: &Hit,
         reflected: DVec3,
         reflectance: f64,
@@ -88,7 +89,11 @@ impl Rivals for Connections<'_> {
         }
     }
 
-    fn has_scored_reflection<B: WalkBands>(walk: &Walk<'_, Self, B>, light: usize, wi: DVec3) -> bool {
+    fn has_scored_reflection<B: WalkBands>(
+        walk: &CameraWalk<'_, Self, B>,
+        light: usize,
+        wi: DVec3,
+    ) -> bool {
         let setup = walk.rivals.setup;
         let guide = setup.guides.iter().find(|guide| guide.light == light);
         let light = &walk.scene.lights[light];
@@ -102,7 +107,7 @@ impl Rivals for Connections<'_> {
     }
 
     fn densities<B: WalkBands>(
-        walk: &mut Walk<'_, Self, B>,
+        walk: &mut CameraWalk<'_, Self, B>,
         exit: &WalkExit,
         light: usize,
         wi: DVec3,
@@ -131,7 +136,7 @@ impl Rivals for Connections<'_> {
 }
 
 /// Scores an end that the light-guided last vertex has drawn at the walk's latest vertex.
-fn score_guided<B: WalkBands>(walk: &mut Walk<'_, Connections<'_>, B>, found: &GuidedEnd<'_>) {
+fn score_guided<B: WalkBands>(walk: &mut CameraWalk<'_, Connections<'_>, B>, found: &GuidedEnd<'_>) {
     let GuidedEnd { guide, exit, leg, w_l, radiance } = found;
     let setup = walk.rivals.setup;
     let end = End::new(walk, guide, exit, *w_l, walk.rivals.unidirectional(), *radiance);
@@ -158,9 +163,12 @@ fn score_guided<B: WalkBands>(walk: &mut Walk<'_, Connections<'_>, B>, found: &G
     walk.score_with(&bands, walk.history.class(), guide.light, score);
 }
 
-/// Scores a path whose edge from the walk's latest vertex is subdivided; the leg along which x_j was drawn is known to
-/// be free.
-fn score_subdivided<B: WalkBands>(walk: &mut Walk<'_, Connections<'_>, B>, found: &Subdivided<'_>) {
+/// Scores a path whose edge from the walk's latest vertex is subdivided; the leg along which x_j was
+/// drawn is known to be free.
+fn score_subdivided<B: WalkBands>(
+    walk: &mut CameraWalk<'_, Connections<'_>, B>,
+    found: &Subdivided<'_>,
+) {
     let Subdivided { guide, x_j, middle, exit, w_l, radiance } = found;
     let x_i = walk.rivals.vertex(Slot::Latest);
     let end = End::new(walk, guide, exit, *w_l, walk.rivals.takes_part(2), *radiance);
@@ -191,7 +199,7 @@ fn score_subdivided<B: WalkBands>(walk: &mut Walk<'_, Connections<'_>, B>, found
     walk.score_with(&bands, history.class(), guide.light, value);
 }
 
-impl<B: WalkBands> Walk<'_, Connections<'_>, B> {
+impl<B: WalkBands> CameraWalk<'_, Connections<'_>, B> {
     /// Whether something stands between an exit and the light.
     fn is_shadowed(&mut self, exit: &WalkExit, w_l: DVec3) -> bool {
         self.scores.count(Cost::ShadowRays);

@@ -4,13 +4,14 @@ use super::guess::Guess;
 use super::guide::Guide;
 use crate::estimators::Cost;
 use crate::estimators::bands::WalkBands;
-use crate::estimators::walk::{Rivals, Walk, WalkExit};
+use crate::estimators::walk::{CameraWalk, Rivals, WalkExit};
 use crate::geometry::{Hit, Ray, Side};
 use crate::math::{DVec3, exp, ln};
 use crate::optics::boundary::Boundary;
 
-/// With which probability a technique is called at a vertex: `most` e^(-decay sigma d), d being the distance to
-/// the boundary along the specular guess. It depends on the vertex alone, so that every density can name it.
+/// With which probability a technique is called at a vertex: `most` e^(-decay sigma d), d being the
+/// distance to the boundary along the specular guess. It depends on the vertex alone, so that every
+/// density can name it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Call {
     /// Probability at the boundary.
@@ -29,8 +30,8 @@ impl Call {
         }
     }
 
-    /// The distance up to which the call is made, for one uniform number; `None` if it is not made at all. P(reach
-    /// > d) is [`Self::probability`], and a lower bound of d may decide before d is known.
+    /// The distance up to which the call is made, for one uniform number; `None` if it is not made at
+    /// all. P(reach > d) is [`Self::probability`], and a lower bound of d may decide before d is known.
     pub(super) fn reach(&self, sigma: f64, u: f64) -> Option<f64> {
         if u >= self.most {
             None
@@ -61,10 +62,10 @@ pub(super) struct End<'a> {
 }
 
 impl<'a> End<'a> {
-    /// At an exit, towards `w_l`, which lies outside; for a smooth boundary `w_l` is the refracted direction. `keep`
-    /// says which of BSDF and light sampling take part.
+    /// At an exit, towards `w_l`, which lies outside; for a smooth boundary `w_l` is the refracted
+    /// direction. `keep` says which of BSDF and light sampling take part.
     pub fn new<R: Rivals, B: WalkBands>(
-        walk: &Walk<'_, R, B>,
+        walk: &CameraWalk<'_, R, B>,
         guide: &'a Guide,
         exit: &WalkExit,
         w_l: DVec3,
@@ -144,7 +145,7 @@ impl Middle {
 /// Part of a leg's length within which two ways of meeting the same point of the boundary may differ.
 const LEG: f64 = 1e-7;
 
-impl<R: Rivals, B: WalkBands> Walk<'_, R, B> {
+impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
     /// Whether nothing lies between two points of the body; the second may be on the boundary.
     pub(super) fn sees_point(&mut self, from: DVec3, to: DVec3) -> bool {
         if self.scene.shape.is_convex() {

@@ -1,11 +1,12 @@
 //! The specular guess: where light from a direction would enter the body to reach a point inside.
 //!
-//! A fixed point, deterministic and cheap, that need not converge: shoot from the point along the light's
-//! direction, refract the light at the normal that is met, shoot back along the refracted ray, take the
-//! normal there. It steers samplers, which know their own densities; what it gets wrong costs variance alone.
+//! A fixed point, deterministic and cheap, that need not converge: shoot from the point along the
+//! light's direction, refract the light at the normal that is met, shoot back along the refracted ray,
+//! take the normal there. It steers samplers, which know their own densities; what it gets wrong costs
+//! variance alone.
 
 use crate::estimators::Cost;
-use crate::estimators::walk::Walk;
+use crate::estimators::walk::CameraWalk;
 use crate::geometry::{Ray, Side};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
@@ -29,8 +30,8 @@ pub(super) struct Guess {
 
 impl Guess {
     /// For a point in the medium and a direction towards the light; `None` where no boundary is met.
-    pub fn new<R, B>(walk: &mut Walk<'_, R, B>, point: DVec3, toward: DVec3) -> Option<Guess> {
-        let Walk { scene, boundary, scores, .. } = walk;
+    pub fn new<R, B>(walk: &mut CameraWalk<'_, R, B>, point: DVec3, toward: DVec3) -> Option<Guess> {
+        let CameraWalk { scene, boundary, scores, .. } = walk;
         let mut shoot = |dir| {
             scores.count(Cost::Rays);
             scene.shape.intersect(&Ray { origin: point, dir }, Side::Inside, None, f64::INFINITY)

@@ -20,8 +20,8 @@ pub(super) struct Guide {
     bright: Option<Bright>,
 }
 
-/// Concentration of a light: 4 pi int L^2 / (int L)^2. 1 for a constant sky, 4 pi over its solid angle for a
-/// disc, infinite for parallel light.
+/// Concentration of a light: 4 pi int L^2 / (int L)^2. 1 for a constant sky, 4 pi over its solid angle
+/// for a disc, infinite for parallel light.
 fn concentration(emission: &Emission) -> f64 {
     match emission {
         Emission::Directional { .. } => f64::INFINITY,
@@ -37,8 +37,8 @@ const BRIGHT: f64 = 10.0;
 const COMPACT: f64 = 0.3;
 
 impl Guide {
-    /// The guides among lights whose concentration reaches `least`. A map is split: the part of it that is
-    /// far brighter than its mean, and near its brightest texel, is the guide; the rest has none.
+    /// The guides among lights whose concentration reaches `least`. A map is split: the part of it that
+    /// is far brighter than its mean, and near its brightest texel, is the guide; the rest has none.
     pub fn all(lights: &[Light], band: usize, least: f64) -> Vec<Guide> {
         let mut guides: Vec<Guide> = lights
             .iter()
@@ -88,8 +88,8 @@ impl Guide {
         }
     }
 
-    /// Density of [`Self::sample`] per solid angle, the choice of the guide included; for parallel light the
-    /// probability of the choice.
+    /// Density of [`Self::sample`] per solid angle, the choice of the guide included; for parallel light
+    /// the probability of the choice.
     pub fn density(&self, light: &Light, band: usize, wi: DVec3) -> f64 {
         self.choice
             * match (&self.bright, &light.emission) {

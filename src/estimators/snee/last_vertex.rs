@@ -1,16 +1,16 @@
 //! The light-guided last vertex: from any medium vertex x_j, towards where light probably enters.
 //!
-//! Rough boundary: draw w_L from the light, refract it at a microfacet about the normal n* of the specular guess,
-//! and go against it to the boundary, x_k the first hit. Two widths of microfacets are mixed, the boundary's own and a
-//! wider one for bodies whose true normal at x_k may be far from n*. Per area of x_k and solid angle of w_L the
-//! density is
+//! Rough boundary: draw w_L from the light, refract it at a microfacet about the normal n* of the
+//! specular guess, and go against it to the boundary, x_k the first hit. Two widths of microfacets are
+//! mixed, the boundary's own and a wider one for bodies whose true normal at x_k may be far from n*. Per
+//! area of x_k and solid angle of w_L the density is
 //!   q(x_j) p_G(w_L) p(w_kj | w_L, n*) cos_k / d_jk^2,   over U:   q p_G p / (phase(x_j) T(d_jk)).
 //! n* is a function of x_j and the light's axis, so nothing is left to integrate over.
 //!
-//! Smooth boundary and a light of finite size: w_L follows from the direction, so the direction is drawn about the
-//! refracted axis, by a lobe as wide as the light and a wide one; density q P(guide) p_lobe(w_jk) with the same
-//! Dirac factor as BSDF sampling. It also covers what subdivision cannot: single scattering, and paths whose last
-//! vertex follows an internal reflection.
+//! Smooth boundary and a light of finite size: w_L follows from the direction, so the direction is drawn
+//! about the refracted axis, by a lobe as wide as the light and a wide one; density q P(guide)
+//! p_lobe(w_jk) with the same Dirac factor as BSDF sampling. It also covers what subdivision cannot:
+//! single scattering, and paths whose last vertex follows an internal reflection.
 
 use super::end::{Call, End, Leg};
 use super::guess::Guess;
@@ -18,7 +18,7 @@ use super::guide::Guide;
 use super::state::{Connections, Slot};
 use crate::estimators::Cost;
 use crate::estimators::bands::WalkBands;
-use crate::estimators::walk::{Walk, WalkExit};
+use crate::estimators::walk::{CameraWalk, WalkExit};
 use crate::geometry::{Ray, Side};
 use crate::math::{DVec3, Frame, tan};
 use crate::optics::boundary::Boundary;
@@ -34,8 +34,8 @@ pub struct LastVertex {
     pub call: Call,
     /// Share of the wider lobe.
     pub wide_share: f64,
-    /// Least roughness of the wider lobe (rough boundary; at least twice the boundary's own), or its width
-    /// (smooth).
+    /// Least roughness of the wider lobe (rough boundary; at least twice the boundary's own), or its
+    /// width (smooth).
     pub wide: f64,
 }
 
@@ -106,9 +106,10 @@ impl Lobe {
     }
 }
 
-/// The technique's density of an end whose last vertex is x_j, over U, times the density of the walk up to x_j.
+/// The technique's density of an end whose last vertex is x_j, over U, times the density of the walk up
+/// to x_j.
 pub(super) fn density<B: WalkBands>(
-    walk: &mut Walk<'_, Connections<'_>, B>,
+    walk: &mut CameraWalk<'_, Connections<'_>, B>,
     x_j: Slot,
     to_k: &Leg,
     end: &End<'_>,
@@ -148,7 +149,7 @@ pub(super) struct GuidedEnd<'a> {
 
 /// Draws the technique at the walk's latest vertex.
 pub(super) fn draw<'a, B: WalkBands>(
-    walk: &mut Walk<'_, Connections<'a>, B>,
+    walk: &mut CameraWalk<'_, Connections<'a>, B>,
     technique: &LastVertex,
 ) -> Option<GuidedEnd<'a>> {
     let sigma = walk.rivals.setup.sigma;

@@ -1,15 +1,17 @@
 //! Subdivision next-event estimation (Koerner, Novak, Kutz, Habel & Jarosz 2016, "Subdivision next-event
 //! estimation for path-traced subsurface scattering"), and what makes it worth calling.
 //!
-//! At every medium vertex x_i of a camera walk a boundary point x_k is probed and the edge between them is
-//! subdivided by a vertex x_j, from the light's end or from the walk's (`subdivision`). Both are weighed against
-//! the walk's own ways of making the same path. Beyond the talk: probes that know where light probably enters
-//! (`guess`, `probe`), a last vertex guided by the light (`last_vertex`), calls made with a probability that falls
-//! with depth, and a gate that leaves lights that are not concentrated to the walk alone (`guide`): where no
-//! light passes it, the estimator is `path` to the last bit.
+//! At every medium vertex x_i of a camera walk a boundary point x_k is probed and the edge between them
+//! is subdivided by a vertex x_j, from the light's end or from the walk's (`subdivision`). Both are
+//! weighted against the walk's own ways of making the same path. Beyond the talk: probes that know where
+//! light probably enters (`guess`, `probe`), a last vertex guided by the light (`last_vertex`), calls
+//! made with a probability that falls with depth, and a gate that leaves lights that are not
+//! concentrated to the walk alone (`guide`): where no light passes it, the estimator is `path` to the
+//! last bit.
 //!
-//! Unbiased for all that the walk or a rival can sample. Through a smooth boundary parallel light is only found
-//! by subdivision from the light's end: what lacks two medium vertices before the exit is missing there.
+//! Unbiased for all that the walk or a rival can sample. Through a smooth boundary parallel light is
+//! only found by subdivision from the light's end: what lacks two medium vertices before the exit is
+//! missing there.
 
 mod bidirectional;
 mod connections;
@@ -25,7 +27,7 @@ mod two_bounce;
 use std::sync::Arc;
 
 use super::bands::{MAX_SHARED, OneBand, SharedBands};
-use super::walk::{Field, Path, Unrivalled, Walk, unscattered_notes};
+use super::walk::{CameraWalk, Field, Path, Unrivalled, unscattered_notes};
 use super::{BandUse, Estimator, Roulette, Scores};
 use crate::error::{Error, Result};
 use crate::optics::boundary::Boundary;
@@ -89,8 +91,9 @@ pub struct SneeOptions {
     pub joint: JointKind,
     /// The light-guided last vertex.
     pub last_vertex: Option<LastVertex>,
-    /// Whether a smooth boundary's reflection of a light that is connected to is scored by its expectation,
-    /// wherever a walk meets the boundary from outside, instead of by the walks that take it.
+    /// Whether a smooth boundary's reflection of a light that is connected to is scored by its
+    /// expectation, wherever a walk meets the boundary from outside, instead of by the walks that take
+    /// it.
     pub expected_reflection: bool,
     /// Least concentration 4 pi int L^2 / (int L)^2 of a light that is connected to; 1 lets all pass.
     pub least_concentration: f64,
@@ -209,7 +212,8 @@ impl Estimator for Snee {
     }
 }
 
-/// What no technique finds through a smooth boundary under parallel light, where only `technique` finds anything.
+/// What no technique finds through a smooth boundary under parallel light, where only `technique` finds
+/// anything.
 fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
     let smooth = scene.boundary.iter().any(|b| matches!(b, Boundary::Smooth { .. }));
     let parallel = scene.lights.iter().filter(|light| light.is_directional() && smooth);
@@ -228,10 +232,10 @@ impl Snee {
     fn play<B: super::bands::WalkBands>(&self, setup: usize, path: Path, scores: &mut Scores, bands: B) {
         let setup = &self.setups[setup];
         if setup.guides.is_empty() {
-            Walk::play(path, scores, Unrivalled, bands);
+            CameraWalk::play(path, scores, Unrivalled, bands);
         } else {
             let stream = path.key.stream(path.index as u64, Purpose::Connection);
-            Walk::play(path, scores, Connections::new(setup, stream), bands);
+            CameraWalk::play(path, scores, Connections::new(setup, stream), bands);
         }
     }
 }

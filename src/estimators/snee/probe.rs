@@ -1,8 +1,8 @@
 //! Points of the boundary by a direction from a medium vertex and the first hit.
 //!
-//! Three lobes, mixed: uniform directions; directions to the tangent plane of the specular guess, by area
-//! about the vertex's foot; directions about the guess itself, with density falling as 1 / sin of the angle, which
-//! is how a vertex near the refracted ray of a boundary point sees that point.
+//! Three lobes, mixed: uniform directions; directions to the tangent plane of the specular guess, by
+//! area about the vertex's foot; directions about the guess itself, with density falling as 1 / sin of
+//! the angle, which is how a vertex near the refracted ray of a boundary point sees that point.
 
 use super::guess::Guess;
 use crate::math::DVec3;

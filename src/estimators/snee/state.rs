@@ -4,7 +4,7 @@ use super::BandSetup;
 use super::guess::Guess;
 use super::guide::Guide;
 use crate::estimators::bands::WalkBands;
-use crate::estimators::walk::{Walk, WalkExit};
+use crate::estimators::walk::{CameraWalk, WalkExit};
 use crate::math::DVec3;
 use crate::sampling::discrete::choose_share;
 use crate::sampling::stream::Stream;
@@ -88,8 +88,8 @@ impl<'a> Connections<'a> {
         }
     }
 
-    /// Which of BSDF and light sampling take part at the end of a path with this many medium vertices since
-    /// the boundary.
+    /// Which of BSDF and light sampling take part at the end of a path with this many medium vertices
+    /// since the boundary.
     pub fn takes_part(&self, count: u32) -> [f64; 2] {
         let strategies = &self.setup.options.strategies;
         let share = |takes_part: bool| if takes_part { 1.0 } else { 0.0 };
@@ -97,7 +97,7 @@ impl<'a> Connections<'a> {
     }
 }
 
-impl<B: WalkBands> Walk<'_, Connections<'_>, B> {
+impl<B: WalkBands> CameraWalk<'_, Connections<'_>, B> {
     /// The specular guess at a vertex for a guide, found once.
     pub(super) fn guess(&mut self, slot: Slot, guide: &Guide) -> Option<Guess> {
         let Held { vertex, guess } = self.rivals.held[slot as usize];
@@ -111,7 +111,8 @@ impl<B: WalkBands> Walk<'_, Connections<'_>, B> {
         }
     }
 
-    /// Whether the vertex before the last sees an exit: a probe in its direction would have met it first.
+    /// Whether the vertex before the last sees an exit: a probe in its direction would have met it
+    /// first.
     pub(super) fn sees(&mut self, exit: &WalkExit) -> bool {
         match self.rivals.seen {
             Some((point, sees)) if point == exit.hit.point => sees,

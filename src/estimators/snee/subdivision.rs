@@ -1,7 +1,7 @@
 //! Subdivision: first a boundary point x_k by a probe from x_i, then x_j on the way, from either end.
 //!
-//! With p(x_k | x_i) = p_probe(w_ik) cos_ik / d_ik^2 wherever x_i sees x_k, q the probability of the call, and
-//! U of [`super::connections`],
+//! With p(x_k | x_i) = p_probe(w_ik) cos_ik / d_ik^2 wherever x_i sees x_k, q the probability of the
+//! call, and U of [`super::connections`],
 //!   top to bottom   w_L from the light, w_kj by refraction, a distance along it by exponential and
 //!                   equiangular sampling towards x_i:
 //!                   q p(x_k | x_i) p_G(w_L) p(w_kj | w_L) p_t(d_jk) / d_jk^2
@@ -19,7 +19,7 @@ use super::probe::ProbeMixture;
 use super::state::{Connections, Slot};
 use crate::estimators::Cost;
 use crate::estimators::bands::WalkBands;
-use crate::estimators::walk::{Walk, WalkExit};
+use crate::estimators::walk::{CameraWalk, WalkExit};
 use crate::geometry::{FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
@@ -29,7 +29,11 @@ use crate::sampling::distance::{DistanceMixture, Equiangular, transmittance};
 const EXPONENTIAL: f64 = 0.5;
 
 /// How far a ray goes before distances along it end: to the boundary, or without end.
-fn chord<B: WalkBands>(walk: &mut Walk<'_, Connections<'_>, B>, ray: &Ray, from: Option<FaceId>) -> f64 {
+fn chord<B: WalkBands>(
+    walk: &mut CameraWalk<'_, Connections<'_>, B>,
+    ray: &Ray,
+    from: Option<FaceId>,
+) -> f64 {
     if !walk.rivals.setup.options.truncated {
         return f64::INFINITY;
     }
@@ -40,7 +44,7 @@ fn chord<B: WalkBands>(walk: &mut Walk<'_, Connections<'_>, B>, ray: &Ray, from:
 
 /// Distances from x_k along `dir`, top to bottom.
 fn from_boundary<B: WalkBands>(
-    walk: &mut Walk<'_, Connections<'_>, B>,
+    walk: &mut CameraWalk<'_, Connections<'_>, B>,
     x_i: DVec3,
     hit: &Hit,
     dir: DVec3,
@@ -53,7 +57,7 @@ fn from_boundary<B: WalkBands>(
 
 /// Distances from x_i along `dir`, bottom to top.
 fn from_vertex<B: WalkBands>(
-    walk: &mut Walk<'_, Connections<'_>, B>,
+    walk: &mut CameraWalk<'_, Connections<'_>, B>,
     x_i: DVec3,
     x_k: DVec3,
     dir: DVec3,
@@ -62,10 +66,10 @@ fn from_vertex<B: WalkBands>(
     Equiangular::towards(x_k - x_i, dir, t_max)
 }
 
-/// The density of both directions of subdivision for an end, over U, times the density of the walk up to x_i.
-/// The caller has seen to it that x_i sees x_k.
+/// The density of both directions of subdivision for an end, over U, times the density of the walk up to
+/// x_i. The caller has seen to it that x_i sees x_k.
 pub(super) fn density<B: WalkBands>(
-    walk: &mut Walk<'_, Connections<'_>, B>,
+    walk: &mut CameraWalk<'_, Connections<'_>, B>,
     x_i: Slot,
     middle: &Middle,
     exit: &WalkExit,
@@ -149,7 +153,7 @@ pub(super) struct Subdivided<'a> {
 
 /// Draws an edge at the walk's latest vertex.
 pub(super) fn draw_edge<'a, B: WalkBands>(
-    walk: &mut Walk<'_, Connections<'a>, B>,
+    walk: &mut CameraWalk<'_, Connections<'a>, B>,
 ) -> Option<ProbedEdge<'a>> {
     let setup = walk.rivals.setup;
     let options = &setup.options;
@@ -175,7 +179,7 @@ pub(super) fn draw_edge<'a, B: WalkBands>(
 
 /// Subdivides an edge from the light's end.
 pub(super) fn top_to_bottom<'a, B: WalkBands>(
-    walk: &mut Walk<'_, Connections<'a>, B>,
+    walk: &mut CameraWalk<'_, Connections<'a>, B>,
     edge: &ProbedEdge<'a>,
 ) -> Option<Subdivided<'a>> {
     let &ProbedEdge { guide, hit } = edge;
@@ -215,7 +219,7 @@ pub(super) fn top_to_bottom<'a, B: WalkBands>(
 
 /// Subdivides an edge from the walk's end.
 pub(super) fn bottom_to_top<'a, B: WalkBands>(
-    walk: &mut Walk<'_, Connections<'a>, B>,
+    walk: &mut CameraWalk<'_, Connections<'a>, B>,
     edge: &ProbedEdge<'a>,
 ) -> Option<Subdivided<'a>> {
     let &ProbedEdge { guide, hit } = edge;

@@ -72,8 +72,8 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// A light that is not concentrated leaves nothing but the walk: the image and the work of `path`, to the last
-/// bit. A concentrated one does not.
+/// A light that is not concentrated leaves nothing but the walk: the image and the work of `path`, to
+/// the last bit. A concentrated one does not.
 #[test]
 fn behind_the_gate_it_is_path() {
     for boundary in [ROUGH, SMOOTH, Boundary::Matched] {

@@ -1,12 +1,12 @@
-//! Thinning: each point x_i of a cloud is accepted independently with probability p(|x - x_i|), and what is accepted
-//! weighs 1/p, so that the expected sum over the accepted is the sum over all.
+//! Thinning: each point x_i of a cloud is accepted independently with probability p(|x - x_i|), and what
+//! is accepted weighs 1/p, so that the expected sum over the accepted is the sum over all.
 //!
-//! p is positive and does not increase with distance. `scan` asks every point; `PointTree` makes acceptances of the
-//! same law from a hierarchy, without visiting most of the points that it rejects.
+//! p is positive and does not increase with distance. `scan` asks every point; `PointTree` makes
+//! acceptances of the same law from a hierarchy, without visiting most of the points that it rejects.
 //!
-//! Uniform numbers decide against p down to 2^-106 (`Stream::draw_fine`): with 24 bits, the one number 0 would accept
-//! points of p < 2^-24 with probability 2^-24 and weights e^(+sigma d) without bound, a bias of orders of magnitude in
-//! large bodies; with 53 bits the same happens beyond optical depth 36.7.
+//! Uniform numbers decide against p down to 2^-106 (`Stream::draw_fine`): with 24 bits, the one number 0
+//! would accept points of p < 2^-24 with probability 2^-24 and weights e^(+sigma d) without bound, a
+//! bias of orders of magnitude in large bodies; with 53 bits the same happens beyond optical depth 36.7.
 
 mod scan;
 mod tree;
@@ -24,8 +24,8 @@ use crate::math::exp;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThinningRule {
     form: ThinningForm,
-    /// Square of the distance beyond which p is at most 2^-k, for each k; a uniform number in [2^-k, 2^(1-k)) can only
-    /// accept what is nearer.
+    /// Square of the distance beyond which p is at most 2^-k, for each k; a uniform number in [2^-k,
+    /// 2^(1-k)) can only accept what is nearer.
     reach_squared: [f64; LEVELS],
 }
 
@@ -35,9 +35,9 @@ const LEVELS: usize = 64;
 /// Forms of p(d).
 #[derive(Clone, Debug, PartialEq)]
 pub enum ThinningForm {
-    /// 1.
+    /// Every point is accepted.
     All,
-    /// e^(-sigma d).
+    /// An exponential of the distance, e^(-sigma d).
     Exponential {
         /// 1/mm, not negative.
         sigma: f64,
@@ -64,16 +64,17 @@ pub enum ThinningForm {
 }
 
 impl ThinningForm {
-    /// min(1, c f(d)) as a table, for a function that does not increase. What is tabulated is the probability by
-    /// definition: tables coarser than `f` cost variance, not bias.
+    /// min(1, c f(d)) as a table, for a function that does not increase. What is tabulated is the
+    /// probability by definition: tables coarser than `f` cost variance, not bias.
     ///
-    /// c makes the mean of p over the disc of radius `reach` equal to `mean` (at most 1), so that two rules can be
-    /// compared at equal numbers of accepted points.
+    /// c makes the mean of p over the disc of radius `reach` equal to `mean` (at most 1), so that two
+    /// rules can be compared at equal numbers of accepted points.
     pub fn proportional(f: impl Fn(f64) -> f64, reach: f64, mean: f64) -> ThinningForm {
         const INTERVALS: usize = 2048;
         let at = |k: usize| reach * square(k as f64 / INTERVALS as f64);
         let values: Vec<f64> = (0..=INTERVALS).map(|k| f(at(k))).collect();
-        // Simpson's rule is wasted on a kink: the trapezoidal rule on the grid itself, int p 2 d dd / reach^2.
+        // Simpson's rule is wasted on a kink: the trapezoidal rule on the grid itself, int p 2 d dd /
+        // reach^2.
         let mean_of = |c: f64| {
             let p = |k: usize| (c * values[k]).min(1.0);
             let interval = |k: usize| (square(at(k + 1)) - square(at(k))) * 0.5 * (p(k) + p(k + 1));
@@ -93,7 +94,7 @@ impl ThinningForm {
         ThinningForm::Table { values: values.iter().map(|value| (c * value).min(1.0)).collect(), reach }
     }
 
-    /// p(d).
+    /// Probability of acceptance at a distance, p(d).
     #[inline]
     pub fn probability(&self, d: f64) -> f64 {
         match self {
@@ -145,7 +146,8 @@ impl ThinningRule {
     fn varies(&self, factor: f64, [near, far]: [f64; 2], most: f64) -> bool {
         match self.form {
             ThinningForm::All => false,
-            // Without another exponential: e^x > 1 + x + x^2/2 says yes too rarely by what does not matter here.
+            // Without another exponential: e^x > 1 + x + x^2/2 says yes too rarely by what does not
+            // matter here.
             ThinningForm::Exponential { sigma } => {
                 let x = sigma * (far - near);
                 1.0 + x + 0.5 * x * x > factor
@@ -195,7 +197,7 @@ pub struct Accepted {
     pub index: usize,
     /// Its distance, mm.
     pub distance: f64,
-    /// 1/p.
+    /// Its weight, one over the probability of acceptance.
     pub weight: f64,
 }
 
@@ -222,8 +224,8 @@ fn decide(rule: &ThinningRule, u: f64, squared: f64) -> Option<(f64, f64)> {
 }
 
 impl Stream {
-    /// A uniform number in [0, 1) whose digits do not end at 2^-53: small numbers have their own 53 digits, down to
-    /// multiples of 2^-106, so that P(u < p) = p for every p that matters.
+    /// A uniform number in [0, 1) whose digits do not end at 2^-53: small numbers have their own 53
+    /// digits, down to multiples of 2^-106, so that P(u < p) = p for every p that matters.
     #[inline]
     pub fn draw_fine(&mut self) -> f64 {
         const FEW: f64 = 1.0 / (1u64 << 20) as f64;

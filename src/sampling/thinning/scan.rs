@@ -1,10 +1,12 @@
-//! Thinning by asking every point: the oracle, and what the hierarchy does where nearly all are accepted.
+//! Thinning by asking every point: the oracle, and what the hierarchy does where nearly all are
+//! accepted.
 
 use super::{Accepted, ThinningRule, ThinningWork, decide};
 use crate::math::DVec3;
 use crate::sampling::stream::Stream;
 
-/// Points at a time: their distances fit the first-level cache, and are computed in a loop without branches.
+/// Points at a time: their distances fit the first-level cache, and are computed in a loop without
+/// branches.
 const CHUNK: usize = 256;
 
 /// Accepts points in `range` of the coordinates `points`, each with p of its distance from `at`.

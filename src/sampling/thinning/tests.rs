@@ -67,7 +67,8 @@ fn probability_does_not_increase() {
     }
 }
 
-/// Effective transport of skin1, marble, ketchup and whole milk (Jensen et al. 2001), red, green, blue each, 1/mm.
+/// Effective transport of skin1, marble, ketchup and whole milk (Jensen et al. 2001), red, green, blue
+/// each, 1/mm.
 const BANDS: [f64; 12] = [
     0.27224, 0.73178, 1.46479, 0.11752, 0.17966, 0.25308, 0.21001, 1.73966, 2.53732, 0.09175, 0.15208,
     0.39866,
@@ -93,7 +94,8 @@ fn proportional_rule_accepts_as_many_as_asked() {
     assert!((mean.value - 0.05).abs() < 1e-6, "{mean:?}");
 }
 
-/// Numbers below 2^-53 exist, and about as often as they should: of 2^-20 one in a million draws is lengthened.
+/// Numbers below 2^-53 exist, and about as often as they should: of 2^-20 one in a million draws is
+/// lengthened.
 #[test]
 fn small_numbers_have_digits_of_their_own() {
     let mut stream = stream("small_numbers_have_digits_of_their_own");
@@ -181,8 +183,9 @@ fn chi2(counts: &[u32], p: impl Fn(usize) -> f64, queries: usize) -> (f64, f64) 
     terms.fold((0.0, 0.0), |(sum, bins), z2| (sum + z2, bins + 1.0))
 }
 
-/// The law of independent Bernoulli(p_i), for hierarchy and scan: per point, in pairs of neighbours, and the mean and
-/// variance of the number. Levels: 5 standard deviations each, 50 of them in all (a false alarm in 35,000 runs).
+/// The law of independent Bernoulli(p_i), for hierarchy and scan: per point, in pairs of neighbours, and
+/// the mean and variance of the number. Levels: 5 standard deviations each, 50 of them in all (a false
+/// alarm in 35,000 runs).
 #[test]
 fn acceptances_are_independent_with_their_probability() {
     let queries = 20_000;

@@ -7,8 +7,8 @@ use crate::geometry::{BoundingSphere, Ray};
 use crate::math::{DVec3, Frame};
 use crate::sampling::warp::square_to_cosine_hemisphere;
 
-/// Mean radiance over a pixel's square and a cap of directions about the view, each direction weighted by its cosine
-/// to the view, as flux through the square is.
+/// Mean radiance over a pixel's square and a cap of directions about the view, each direction weighted
+/// by its cosine to the view, as flux through the square is.
 #[derive(Clone, Copy, Debug)]
 pub struct Accepting {
     screen: Screen,
@@ -23,8 +23,9 @@ pub struct Accepting {
 }
 
 impl Accepting {
-    /// `height` is 1 - cos of the cap's half angle, solid angle over 2 pi, in (0, 1). The screen, in mm about
-    /// `center`, stays where it is, even inside the body: it is the plane on which the image is sharp.
+    /// `height` is 1 - cos of the cap's half angle, solid angle over 2 pi, in (0, 1). The screen, in mm
+    /// about `center`, stays where it is, even inside the body: it is the plane on which the image is
+    /// sharp.
     pub fn new(screen: Screen, center: DVec3, height: f64, bounds: BoundingSphere) -> Accepting {
         let sin2 = height * (2.0 - height);
         Accepting { screen, center, frame: Frame::about(screen.view), sin2, bounds }
@@ -66,8 +67,9 @@ impl SensorKind for Accepting {
         self.screen.count()
     }
 
-    /// A point uniform in the pixel, a direction with density proportional to its cosine in the cap. The ray starts two
-    /// radii before the body's middle: outside the body and before all of it, wherever the screen is.
+    /// A point uniform in the pixel, a direction with density proportional to its cosine in the cap. The
+    /// ray starts two radii before the body's middle: outside the body and before all of it, wherever
+    /// the screen is.
     #[inline]
     fn ray(&self, index: usize, u: [f64; 4]) -> SensorRay {
         let point = self.center + self.screen.offset(index, u);
@@ -81,8 +83,9 @@ impl SensorKind for Accepting {
         is_finite
     }
 
-    /// The lines of a pixel cross its square of area A within the cap, so that their power is int_A dA int_cap L cos dw;
-    /// a pixel's value is the mean of L in that very measure, whose whole is A int_cap cos dw = A pi sin^2.
+    /// The lines of a pixel cross its square of area A within the cap, so that their power is int_A dA
+    /// int_cap L cos dw; a pixel's value is the mean of L in that very measure, whose whole is A int_cap
+    /// cos dw = A pi sin^2.
     #[inline]
     fn receive(&self, out: &Ray) -> Option<(usize, f64)> {
         self.pixel(out).map(|pixel| (pixel, 1.0 / self.extent()))

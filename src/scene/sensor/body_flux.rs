@@ -24,8 +24,8 @@ impl SensorKind for BodyFlux {
         self.bins * self.paths
     }
 
-    /// Phi_bin = int dw int L dA_perp = 2 pi dmu * pi R^2 mean(L), directions uniform in the bin, positions uniform on
-    /// the disc of the bounding sphere's radius R across the direction.
+    /// Phi_bin = int dw int L dA_perp = 2 pi dmu * pi R^2 mean(L), directions uniform in the bin,
+    /// positions uniform on the disc of the bounding sphere's radius R across the direction.
     #[inline]
     fn ray(&self, index: usize, u: [f64; 4]) -> SensorRay {
         let BodyFlux { bounds, frame, bins, paths } = self;

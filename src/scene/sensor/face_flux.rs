@@ -36,7 +36,8 @@ impl SensorKind for FaceFlux {
         self.faces.len() * self.bins * self.paths
     }
 
-    /// M_bin = int L mu dw = pi (mu1^2 - mu0^2) mean(L), with mu drawn with density proportional to mu inside the bin.
+    /// M_bin = int L mu dw = pi (mu1^2 - mu0^2) mean(L), with mu drawn with density proportional to mu
+    /// inside the bin.
     #[inline]
     fn ray(&self, index: usize, u: [f64; 4]) -> SensorRay {
         let FaceFlux { faces, bins, paths } = self;
@@ -54,8 +55,8 @@ impl SensorKind for FaceFlux {
         !is_finite
     }
 
-    /// The lines of a bin are its slot, and its exitance is their power per area of the face, as every point of it is
-    /// alike: factor 1.
+    /// The lines of a bin are its slot, and its exitance is their power per area of the face, as every
+    /// point of it is alike: factor 1.
     #[inline]
     fn receive(&self, out: &Ray) -> Option<(usize, f64)> {
         let (index, mu) = self

@@ -1,7 +1,8 @@
 //! Sensors: what a pass measures, as rays with weights. A pass traces every ray of the sensor once;
 //! ray i belongs to one slot (a pixel, or a bin of a flux), and slots add up to regions.
 //!
-//! One file a kind of sensor, which implements [`SensorKind`]; [`Sensor`] passes every call on to its kind.
+//! One file a kind of sensor, which implements [`SensorKind`]; [`Sensor`] passes every call on to its
+//! kind.
 
 mod accepting;
 mod body_flux;
@@ -41,7 +42,8 @@ pub enum Sensor {
     Vertex(Vertex),
     /// Radiant exitance of a half-space's or slab's faces by the cosine of the exit direction.
     FaceFlux(FaceFlux),
-    /// Radiant exitance of the top face of a half-space or slab by how far from the exit its light came in.
+    /// Radiant exitance of the top face of a half-space or slab by how far from the exit its light came
+    /// in.
     Rings(Rings),
     /// Flux of a finite body by the cosine between exit direction and axis.
     BodyFlux(BodyFlux),
@@ -100,7 +102,8 @@ impl Sensor {
         call!(self.pixels())
     }
 
-    /// Where all of its rays start, if at one point, and the side of the boundary on which that has to be.
+    /// Where all of its rays start, if at one point, and the side of the boundary on which that has to
+    /// be.
     pub fn position(&self) -> Option<(DVec3, Side)> {
         call!(self.position())
     }
@@ -116,8 +119,8 @@ impl Sensor {
         call!(self.ray(index, u))
     }
 
-    /// Where light counts that a ray of slot `slot` finds, having come in at the point `entry` of the body: rings look
-    /// at that point, all others have decided by the ray.
+    /// Where light counts that a ray of slot `slot` finds, having come in at the point `entry` of the
+    /// body: rings look at that point, all others have decided by the ray.
     #[inline]
     pub fn slot_of(&self, slot: usize, entry: DVec3) -> usize {
         call!(self.slot_of(slot, entry))
@@ -127,16 +130,17 @@ impl Sensor {
     /// power that it carries to the slot's unit. The adjoint of [`Self::ray`]: what the rays of a slot
     /// find as radiance, all light that leaves finds as power.
     ///
-    /// Power that leaves is int int L cos dA dw over the lines of the slot, whatever the surface that they are counted
-    /// on (radiance is constant along a line). A slot of one line or one direction has no power: a probe, a
-    /// perspective or an orthographic sensor receives nothing (see [`Self::receives`]).
+    /// Power that leaves is int int L cos dA dw over the lines of the slot, whatever the surface that
+    /// they are counted on (radiance is constant along a line). A slot of one line or one direction has
+    /// no power: a probe, a perspective or an orthographic sensor receives nothing (see
+    /// [`Self::receives`]).
     #[inline]
     pub fn receive(&self, out: &Ray) -> Option<(usize, f64)> {
         call!(self.receive(out))
     }
 
-    /// Whether light that leaves a body can reach it, one of finite size or a half-space or slab: false where a slot is
-    /// a single direction or all of its lines pass through one point.
+    /// Whether light that leaves a body can reach it, one of finite size or a half-space or slab: false
+    /// where a slot is a single direction or all of its lines pass through one point.
     pub fn receives(&self, is_finite: bool) -> bool {
         call!(self.receives(is_finite))
     }
@@ -146,8 +150,8 @@ impl Sensor {
         call!(self.regions())
     }
 
-    /// The regions that a slot counts in: an image's mean and the slot's tile, all light that leaves and the slot's
-    /// ring.
+    /// The regions that a slot counts in: an image's mean and the slot's tile, all light that leaves and
+    /// the slot's ring.
     #[inline]
     pub fn regions_of(&self, slot: usize) -> RegionShares {
         call!(self.regions_of(slot))
@@ -212,7 +216,8 @@ impl IntoIterator for RegionShares {
     }
 }
 
-/// The bin of equal width that a cosine, `above` the least, falls into. Rounded vectors may exceed 1 by a last digit.
+/// The bin of equal width that a cosine, `above` the least, falls into. Rounded vectors may exceed 1 by
+/// a last digit.
 #[inline]
 fn bin(above: f64, width: f64, bins: usize) -> usize {
     ((above / width) as usize).min(bins - 1)

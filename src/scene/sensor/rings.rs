@@ -9,11 +9,11 @@ use crate::sampling::warp::square_to_cosine_hemisphere;
 
 /// Rings about a point of the top face of a half-space or slab.
 ///
-/// The lights shine on the whole face, and every point of it is alike. So exitance at a point from light that came
-/// in within a ring around it is the exitance out of that ring of light that came in at the point: camera paths leave at
-/// the origin and find where light came in, photons come in at the origin and leave somewhere. The distance between
-/// the two is taken along the face, also where light comes in by a slab's other face; light that the surface
-/// reflects leaves where it came in, at distance 0.
+/// The lights shine on the whole face, and every point of it is alike. So exitance at a point from light
+/// that came in within a ring around it is the exitance out of that ring of light that came in at the
+/// point: camera paths leave at the origin and find where light came in, photons come in at the origin
+/// and leave somewhere. The distance between the two is taken along the face, also where light comes in
+/// by a slab's other face; light that the surface reflects leaves where it came in, at distance 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rings {
     /// How far outside its rays start, mm.

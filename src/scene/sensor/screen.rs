@@ -106,7 +106,8 @@ impl Screen {
 mod tests {
     use super::*;
 
-    /// Every pixel lies in one tile, the rectangle of that tile's region, and a tile's factor is one over its pixels.
+    /// Every pixel lies in one tile, the rectangle of that tile's region, and a tile's factor is one
+    /// over its pixels.
     #[test]
     fn tiles_partition_images() {
         for (width, height) in [(64, 64), (7, 5), (4, 9), (3, 2)] {

@@ -83,8 +83,9 @@ fn accepting(height: f64) -> Sensor {
     Sensor::Accepting(Accepting::new(screen, center, height, bounds))
 }
 
-/// Rings begin with their inner edge, end before their outer one, and count in `all` too; what none holds
-/// counts there alone. Camera paths and photons are told apart from other slots by the same distance.
+/// Rings begin with their inner edge, end before their outer one, and count in `all` too; what none
+/// holds counts there alone. Camera paths and photons are told apart from other slots by the same
+/// distance.
 #[test]
 fn rings_by_distance_along_the_face() {
     let sensor = Sensor::Rings(Rings { reach: 1.0, edges: vec![0.5, 1.0, 5.0], paths: 3 });
