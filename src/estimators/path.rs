@@ -3,7 +3,7 @@
 //! A path starts at the sensor and runs against the light. Flights in the medium have the density
 //! sigma_t exp(-sigma_t t), so a scattering event weighs albedo; directions follow the phase function;
 //! at the boundary the interface draws reflection or refraction. Wherever the path could go straight to
-//! a light, a light is also sampled, and both samples of the same direction are weighed by the balance
+//! a light, a light is also sampled, and both samples of the same direction are weighted by the balance
 //! heuristic:
 //!   rough boundary    at every surface vertex: interface pdf against light pdf
 //!   matched boundary  at every medium vertex: phase pdf times the transmittance to the outside (the
@@ -57,8 +57,8 @@ impl Estimator for PathTracer {
         let parallel = scene.lights.iter().filter(|light| light.is_directional());
         let missing = parallel.filter(|_| smooth).map(|light| {
             format!(
-                "path cannot sample directional light `{}` through a smooth boundary: its share is missing \
-                 (exactly 0), not dark",
+                "path cannot sample directional light `{}` through a smooth boundary: it is excluded \
+                 from this estimator's result (its share is exactly 0)",
                 light.name
             )
         });

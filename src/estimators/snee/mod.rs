@@ -2,7 +2,7 @@
 //! estimation for path-traced subsurface scattering"), and what makes it worth calling.
 //!
 //! At every medium vertex x_i of a camera walk a boundary point x_k is probed and the edge between them is
-//! subdivided by a vertex x_j, from the light's end or from the walk's (`subdivision`). Both are weighed against
+//! subdivided by a vertex x_j, from the light's end or from the walk's (`subdivision`). Both are weighted against
 //! the walk's own ways of making the same path. Beyond the talk: probes that know where light probably enters
 //! (`guess`, `probe`), a last vertex guided by the light (`last_vertex`), calls made with a probability that falls
 //! with depth, and a gate that leaves lights that are not concentrated to the walk alone (`guide`): where no
@@ -199,7 +199,7 @@ impl Estimator for Snee {
         if !(bsdf && light) {
             notes.push(
                 "`strategies` leaves out a part of unidirectional sampling: of paths whose last two medium vertices \
-                 follow each other, what only that part finds is missing (not dark)"
+                 follow each other, those that only that part finds are excluded from this estimator's result"
                     .into(),
             );
         }
@@ -214,8 +214,8 @@ fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
     let missing = parallel.map(|light| {
         format!(
             "through a smooth boundary, directional light `{}` is found by {technique} alone: surface, single, \
-             single_internal and what has one medium vertex after its last internal reflection are missing (not \
-             dark)",
+             single_internal and paths with one medium vertex after their last internal reflection are excluded \
+             from this estimator's result",
             light.name
         )
     });
