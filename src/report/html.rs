@@ -1,8 +1,9 @@
 //! The page as one HTML file: no network, pictures as data URIs, light and dark, readable on a phone.
 
 use super::base64;
-use super::document::{Block, Document, FigureBlock, Picture, TableBlock, slug};
+use super::document::{Document, FigureBlock, PageBlock, PictureFile, TableBlock, slug};
 use super::latex::to_latex;
+use super::markup::escape;
 use super::viewer;
 
 const STYLE: &str = include_str!("style.css");
@@ -28,7 +29,9 @@ pub fn to_html(page: &Document) -> String {
 /// Links to the sections, where there are several.
 fn contents(page: &Document) -> String {
     let headings = page.blocks.iter().filter_map(|block| match block {
-        Block::Heading(2, text) => Some(format!("<a href=\"#{}\">{}</a>\n", slug(text), escape(text))),
+        PageBlock::Heading(2, text) => {
+            Some(format!("<a href=\"#{}\">{}</a>\n", slug(text), escape(text)))
+        }
         _ => None,
     });
     let links: Vec<String> = headings.collect();
@@ -38,25 +41,25 @@ fn contents(page: &Document) -> String {
     }
 }
 
-fn block(of: &Block) -> String {
+fn block(of: &PageBlock) -> String {
     match of {
-        Block::Heading(2, text) => format!("<h2 id=\"{}\">{}</h2>\n", slug(text), escape(text)),
-        Block::Heading(level, text) => format!("<h{level}>{}</h{level}>\n", escape(text)),
-        Block::Text(text) => format!("<p>{}</p>\n", inline(text)),
-        Block::List(items) => {
+        PageBlock::Heading(2, text) => format!("<h2 id=\"{}\">{}</h2>\n", slug(text), escape(text)),
+        PageBlock::Heading(level, text) => format!("<h{level}>{}</h{level}>\n", escape(text)),
+        PageBlock::Text(text) => format!("<p>{}</p>\n", inline(text)),
+        PageBlock::List(items) => {
             let items: String =
                 items.iter().map(|item| format!("<li>{}</li>\n", inline(item))).collect();
             format!("<ul>\n{items}</ul>\n")
         }
-        Block::Code(code) => format!("<pre tabindex=\"0\">{}</pre>\n", escape(code)),
-        Block::Table(t) => table(t),
-        Block::Viewer(viewer) => viewer::to_html(viewer),
-        Block::Folded(title, blocks) => {
+        PageBlock::Code(code) => format!("<pre tabindex=\"0\">{}</pre>\n", escape(code)),
+        PageBlock::Table(t) => table(t),
+        PageBlock::Viewer(viewer) => viewer::to_html(viewer),
+        PageBlock::Folded(title, blocks) => {
             let inner: String = blocks.iter().map(block).collect();
             format!("<details>\n<summary>{}</summary>\n{inner}</details>\n", escape(title))
         }
-        Block::Wide(f) => format!("<div class=\"wide\">\n{}</div>\n", figure(f)),
-        Block::Figures(f) => figures(f),
+        PageBlock::Wide(f) => format!("<div class=\"wide\">\n{}</div>\n", figure(f)),
+        PageBlock::Figures(f) => figures(f),
     }
 }
 
@@ -129,11 +132,11 @@ fn field(text: &str) -> String {
 fn figure(f: &FigureBlock) -> String {
     let title = escape(&f.title);
     let picture = match &f.picture {
-        Picture::Png(png) => {
+        PictureFile::Png(png) => {
             format!("<img alt=\"{title}\" src=\"data:image/png;base64,{}\">", base64::encode(png))
         }
         // In a page the name space goes without saying.
-        Picture::Svg(svg) => svg.replace(" xmlns=\"http://www.w3.org/2000/svg\"", ""),
+        PictureFile::Svg(svg) => svg.replace(" xmlns=\"http://www.w3.org/2000/svg\"", ""),
     };
     let caption = inline(&f.caption);
     format!("<figure>{picture}<figcaption><b>{title}</b> {caption}</figcaption></figure>\n")
@@ -149,11 +152,6 @@ fn inline(text: &str) -> String {
     parts.map(part).collect()
 }
 
-/// Text as HTML shows it, in elements and in attributes.
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,9 +161,12 @@ mod tests {
         let mut table = Table::new(&["cell", "ratio"]);
         (0..rows).for_each(|_| table.push(vec!["a&b".into(), "1.2 [1.1, 1.3]".into()]));
         let blocks = vec![
-            Block::Heading(2, "How fast?".into()),
-            Block::Folded("More".into(), vec![Block::Table(TableBlock::new("speed", "Speed.", table))]),
-            Block::Heading(2, "Cost".into()),
+            PageBlock::Heading(2, "How fast?".into()),
+            PageBlock::Folded(
+                "More".into(),
+                vec![PageBlock::Table(TableBlock::new("speed", "Speed.", table))],
+            ),
+            PageBlock::Heading(2, "Cost".into()),
         ];
         to_html(&Document { title: "x".into(), blocks })
     }

@@ -1,6 +1,6 @@
 //! Tables for papers: LaTeX with booktabs, and longtable where a page may not hold them.
 
-use super::document::{Block, Document, FigureBlock, Picture};
+use super::document::{Document, FigureBlock, PageBlock, PictureFile};
 use super::table::Table;
 
 const PREAMBLE: &str = "% pdflatex report.tex, in its own folder. Plots are SVG, and what the page folds away is long: both stand in files.
@@ -19,35 +19,35 @@ pub fn to_document(page: &Document) -> String {
     format!("{PREAMBLE}\\begin{{center}}\\Large {title}\\end{{center}}\n{body}\\end{{document}}\n")
 }
 
-fn block(of: &Block) -> String {
+fn block(of: &PageBlock) -> String {
     match of {
-        Block::Heading(2, text) => format!("\n\\section*{{{}}}\n", escaped(text)),
-        Block::Heading(_, text) => format!("\n\\subsection*{{{}}}\n", escaped(text)),
-        Block::Text(text) => format!("{}\n\n", escaped(text)),
-        Block::List(items) => {
+        PageBlock::Heading(2, text) => format!("\n\\section*{{{}}}\n", escaped(text)),
+        PageBlock::Heading(_, text) => format!("\n\\subsection*{{{}}}\n", escaped(text)),
+        PageBlock::Text(text) => format!("{}\n\n", escaped(text)),
+        PageBlock::List(items) => {
             let item = |item: &String| format!("  \\item {}\n", escaped(item));
             let items: String = items.iter().map(item).collect();
             format!("\\begin{{itemize}}\n{items}\\end{{itemize}}\n")
         }
-        Block::Code(code) => format!("\\begin{{verbatim}}\n{code}\n\\end{{verbatim}}\n"),
-        Block::Table(t) => format!("{{\\scriptsize\n{}}}\n", long(&t.table, &t.name, &t.caption)),
-        Block::Figures(figures) => figures.iter().map(figure).collect(),
-        Block::Wide(f) => figure(f),
-        Block::Viewer(viewer) => viewer.figures.iter().map(figure).collect(),
-        Block::Folded(title, _) => format!("{} is not printed here.\n\n", escaped(title)),
+        PageBlock::Code(code) => format!("\\begin{{verbatim}}\n{code}\n\\end{{verbatim}}\n"),
+        PageBlock::Table(t) => format!("{{\\scriptsize\n{}}}\n", long(&t.table, &t.name, &t.caption)),
+        PageBlock::Figures(figures) => figures.iter().map(figure).collect(),
+        PageBlock::Wide(f) => figure(f),
+        PageBlock::Viewer(viewer) => viewer.figures.iter().map(figure).collect(),
+        PageBlock::Folded(title, _) => format!("{} is not printed here.\n\n", escaped(title)),
     }
 }
 
 fn figure(f: &FigureBlock) -> String {
     let words = format!("\\textbf{{{}}} {}", escaped(&f.title), escaped(&f.caption));
     match f.picture {
-        Picture::Png(_) => {
+        PictureFile::Png(_) => {
             let picture = format!("\\includegraphics[width=\\linewidth]{{{}}}", f.path);
             format!(
                 "\\begin{{minipage}}{{.3\\linewidth}}\\small\n{picture}\\\\\n{words}\n\\end{{minipage}}\\hfill\n"
             )
         }
-        Picture::Svg(_) => String::new(),
+        PictureFile::Svg(_) => String::new(),
     }
 }
 
@@ -60,7 +60,7 @@ pub fn to_latex(table: &Table, name: &str, caption: &str) -> String {
     if table.rows.len() > FLOATS {
         return long(table, name, caption);
     }
-    let Some(Parts { columns, header, rows, caption }) = parts(table, name, caption) else {
+    let Some(TabularParts { columns, header, rows, caption }) = parts(table, name, caption) else {
         return String::new();
     };
     format!(
@@ -71,7 +71,7 @@ pub fn to_latex(table: &Table, name: &str, caption: &str) -> String {
 
 /// A table that may run over pages.
 fn long(table: &Table, name: &str, caption: &str) -> String {
-    let Some(Parts { columns, header, rows, caption }) = parts(table, name, caption) else {
+    let Some(TabularParts { columns, header, rows, caption }) = parts(table, name, caption) else {
         return String::new();
     };
     let caption = if caption.is_empty() { caption } else { format!("  {} \\\\\n", caption.trim_end()) };
@@ -81,7 +81,7 @@ fn long(table: &Table, name: &str, caption: &str) -> String {
 }
 
 /// What both kinds of table are made of.
-struct Parts {
+struct TabularParts {
     columns: String,
     header: String,
     rows: String,
@@ -89,7 +89,7 @@ struct Parts {
 }
 
 /// Nothing of a table without columns.
-fn parts(table: &Table, name: &str, caption: &str) -> Option<Parts> {
+fn parts(table: &Table, name: &str, caption: &str) -> Option<TabularParts> {
     if table.header.is_empty() {
         return None;
     }
@@ -98,7 +98,7 @@ fn parts(table: &Table, name: &str, caption: &str) -> Option<Parts> {
         format!("  {} \\\\\n", fields.join(" & "))
     };
     let columns = (0..table.header.len()).map(|column| if table.is_numeric(column) { 'r' } else { 'l' });
-    Some(Parts {
+    Some(TabularParts {
         columns: columns.collect(),
         header: format!("  \\toprule\n{}  \\midrule\n", row(&table.header)),
         rows: table.rows.iter().map(row).collect(),

@@ -2,10 +2,10 @@
 //! both shown alike, beside the CPU time that each half took. That they took the same is stated where it is
 //! so, and where it is not, by how much they differ.
 
-use super::document::{self, Block, Document, FigureBlock, TableBlock};
+use super::document::{Document, FigureBlock, PageBlock, PictureFile, TableBlock, ViewerBlock};
 use super::number::significant;
 use super::table::Table;
-use super::viewer::{self, Viewer};
+use super::viewer;
 use crate::error::Result;
 use crate::results::canvas::{Canvas, Unshown};
 use crate::results::image::{Picture, gain};
@@ -39,7 +39,7 @@ pub struct SplitFigure {
     /// A row for each cell.
     pub table: Table,
     /// The whole pictures of both, with seams to move.
-    pub viewer: Viewer,
+    pub viewer: ViewerBlock,
 }
 
 /// The grids that are asked for.
@@ -75,33 +75,33 @@ pub(super) fn write_splits(
 }
 
 /// What the page says of them.
-pub(super) fn blocks(figures: &[SplitFigure]) -> Vec<Block> {
+pub(super) fn blocks(figures: &[SplitFigure]) -> Vec<PageBlock> {
     if figures.is_empty() {
         return Vec::new();
     }
-    let heading = Block::Heading(2, "Split pictures".into());
+    let heading = PageBlock::Heading(2, "Split pictures".into());
     [heading].into_iter().chain(figures.iter().flat_map(SplitFigure::blocks)).collect()
 }
 
 impl SplitFigure {
-    fn blocks(&self) -> [Block; 3] {
+    fn blocks(&self) -> [PageBlock; 3] {
         let figure = FigureBlock {
             path: format!("{}.png", self.stem),
-            picture: document::Picture::Png(self.png.clone()),
+            picture: PictureFile::Png(self.png.clone()),
             title: self.title.clone(),
             caption: self.caption.clone(),
         };
-        [Block::Wide(figure), Block::Viewer(self.viewer.clone()), self.times()]
+        [PageBlock::Wide(figure), PageBlock::Viewer(self.viewer.clone()), self.times()]
     }
 
-    fn times(&self) -> Block {
+    fn times(&self) -> PageBlock {
         let name = self.stem.rsplit('/').next().unwrap_or_default();
-        Block::Table(TableBlock::new(name, "", self.table.clone()))
+        PageBlock::Table(TableBlock::new(name, "", self.table.clone()))
     }
 
     /// The caption as a page of its own, beside the picture.
     fn document(&self) -> Document {
-        let text = Block::Text(self.caption.clone());
+        let text = PageBlock::Text(self.caption.clone());
         Document { title: self.title.clone(), blocks: vec![text, self.times()] }
     }
 }
@@ -140,7 +140,7 @@ fn label<'a>(cell: &'a Cell, axis: Option<&String>) -> &'a str {
 }
 
 /// One cell's picture.
-struct Pair<'a> {
+struct SplitPair<'a> {
     index: usize,
     cell: &'a Cell,
     /// Row and column in the grid.
@@ -163,7 +163,7 @@ struct Grid<'a> {
     split: &'a Split,
     rows: Vec<&'a str>,
     columns: Vec<&'a str>,
-    pairs: Vec<Pair<'a>>,
+    pairs: Vec<SplitPair<'a>>,
     /// Pixels of the largest picture.
     size: (usize, usize),
     zoom: usize,
@@ -179,9 +179,9 @@ impl<'a> Grid<'a> {
             let column = place(&columns, label(cell, split.columns.as_ref()));
             let halves = [&split.left, &split.right].map(|name| Half::of(stored, cell, name));
             let (white, white_of) = white(&halves, split.exposure_stops);
-            Pair { index, cell, at: (row, column), halves, white, white_of }
+            SplitPair { index, cell, at: (row, column), halves, white, white_of }
         };
-        let pairs: Vec<Pair> = cells.iter().map(pair).collect();
+        let pairs: Vec<SplitPair> = cells.iter().map(pair).collect();
         let pictures = || pairs.iter().flat_map(|pair| &pair.halves).filter_map(|half| half.picture);
         let width = pictures().map(|picture| picture.width).max().unwrap_or(1);
         let height = pictures().map(|picture| picture.height).max().unwrap_or(1);
@@ -217,7 +217,7 @@ impl<'a> Grid<'a> {
         Ok(SplitFigure { stem: stem.into(), title, png, caption, table, viewer })
     }
 
-    fn viewer(&self, title: &str) -> Result<Viewer> {
+    fn viewer(&self, title: &str) -> Result<ViewerBlock> {
         let columns = self.columns.len();
         let sheets = [(0, &self.split.left), (1, &self.split.right)];
         let sheets = sheets.map(|(half, name)| viewer::Sheet { name, rgb: self.sheet(half) });
@@ -241,7 +241,7 @@ impl<'a> Grid<'a> {
     }
 
     /// The left columns of the left half's estimator, the right ones of the other's.
-    fn paint(&self, canvas: &mut Canvas, pair: &Pair, (x, y): (usize, usize)) -> [Unshown; 2] {
+    fn paint(&self, canvas: &mut Canvas, pair: &SplitPair, (x, y): (usize, usize)) -> [Unshown; 2] {
         let gain = 1.0 / pair.white;
         let part = |half: &Half, is_left: bool, canvas: &mut Canvas| {
             let Some(picture) = half.picture else { return Unshown::default() };
@@ -287,7 +287,7 @@ impl<'a> Grid<'a> {
 
     /// Whether the halves took the same time, as measured.
     fn times(&self) -> String {
-        let ratios: Vec<f64> = self.pairs.iter().map(Pair::time_ratio).collect();
+        let ratios: Vec<f64> = self.pairs.iter().map(SplitPair::time_ratio).collect();
         let known: Vec<f64> = ratios.iter().copied().filter(|ratio| ratio.is_finite()).collect();
         let factor = |ratio: &f64| ratio.max(1.0 / ratio);
         let unequal = known.iter().filter(|ratio| factor(ratio) > EQUAL).count();
@@ -339,7 +339,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-impl Pair<'_> {
+impl SplitPair<'_> {
     /// CPU time of the right half over that of the left one; NaN where one is not known.
     fn time_ratio(&self) -> f64 {
         self.halves[1].seconds / self.halves[0].seconds

@@ -41,7 +41,7 @@ pub fn efficiency(stored: &Stored, rows: &[Row], cost: CostMeasure) -> Option<Ta
     let rows = chosen(stored, rows, cost);
     let quoted = rows.iter().find(|row| row.efficiency_ratio.is_finite())?;
     let name = |row: &Row| format!("{} / {}", row.candidate, row.baseline);
-    let entries = rows.iter().map(|row| Entry {
+    let entries = rows.iter().map(|row| PivotEntry {
         cell: row.cell.clone(),
         names: vec![row.band.clone()],
         column: name(row),
@@ -89,7 +89,7 @@ pub fn means(stored: &Stored, rows: &[Measurement]) -> Option<TableBlock> {
     };
     let rows: Vec<&Measurement> = rows.iter().filter(|row| first(row) == Some(true)).collect();
     let observable = &rows.first()?.observable;
-    let entry = |row: &&Measurement| Entry {
+    let entry = |row: &&Measurement| PivotEntry {
         cell: row.cell.clone(),
         names: vec![row.band.clone()],
         column: row.estimator.clone(),
@@ -109,7 +109,7 @@ pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> 
         let (low, high) = row.interval();
         let percent = |x: f64| format!("{:+.1}", 100.0 * x);
         let star = if row.note.is_empty() { "" } else { "*" };
-        Entry {
+        PivotEntry {
             cell: row.cell.clone(),
             names: vec![row.band.clone(), row.observable.name.clone()],
             column: row.estimator.clone(),
@@ -128,14 +128,14 @@ pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> 
 }
 
 /// A field of a table: the label of its cell and what else names its row; its column; its text.
-struct Entry {
+struct PivotEntry {
     cell: String,
     names: Vec<String>,
     column: String,
     text: String,
 }
 
-impl Entry {
+impl PivotEntry {
     fn row(&self) -> (&str, &[String]) {
         (&self.cell, &self.names)
     }
@@ -143,7 +143,7 @@ impl Entry {
 
 /// A row for each cell and name, a column for each axis of the sweep, each part of the names, and each column of the
 /// entries, in the order in which they come. Columns that say the same in every row are left out.
-fn pivot(stored: &Stored, parts: &[&str], entries: Vec<Entry>) -> Table {
+fn pivot(stored: &Stored, parts: &[&str], entries: Vec<PivotEntry>) -> Table {
     let axes: Vec<&String> =
         stored.record.cells.first().map(|cell| cell.axes.keys().collect()).unwrap_or_default();
     let (mut rows, mut columns): (Vec<(&str, &[String])>, Vec<&String>) = (Vec::new(), Vec::new());

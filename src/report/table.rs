@@ -5,7 +5,7 @@ use crate::results::csv_text;
 /// A header and rows of text.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// Column names.
+    /// ColumnLayout names.
     pub header: Vec<String>,
     /// Rows, one field a column.
     pub rows: Vec<Vec<String>>,
@@ -82,23 +82,25 @@ impl Table {
         fields.peek().is_some() && fields.all(numeric)
     }
 
-    fn columns(&self) -> Vec<Column> {
+    fn columns(&self) -> Vec<ColumnLayout> {
         let width = |c: usize| {
             let fields = self.rows.iter().map(|row| row[c].chars().count());
             fields.chain([self.header[c].chars().count()]).max().unwrap_or(0)
         };
-        (0..self.header.len()).map(|c| Column { width: width(c), numeric: self.is_numeric(c) }).collect()
+        (0..self.header.len())
+            .map(|c| ColumnLayout { width: width(c), numeric: self.is_numeric(c) })
+            .collect()
     }
 }
 
 /// How a column is set.
-struct Column {
+struct ColumnLayout {
     width: usize,
     numeric: bool,
 }
 
-fn aligned(row: &[String], columns: &[Column]) -> Vec<String> {
-    let pad = |(field, &Column { width, numeric }): (&String, &Column)| match numeric {
+fn aligned(row: &[String], columns: &[ColumnLayout]) -> Vec<String> {
+    let pad = |(field, &ColumnLayout { width, numeric }): (&String, &ColumnLayout)| match numeric {
         true => format!("{field:>width$}"),
         false => format!("{field:<width$}"),
     };

@@ -1,21 +1,24 @@
 //! Plots as SVG, inline in the page and by themselves as files, and their numbers as CSV. Text is in the reader's colours,
 //! series are in the palette of Okabe & Ito, which colour-blind readers can tell apart, each named at its end too.
 
-use super::html::escape;
-use super::number::significant;
+use super::markup::escape;
 use crate::results::csv_text;
 use crate::stats::hypothesis::{Estimate, critical_value};
 use scale::Scale;
 
+pub use scale::PlotAxis;
+
 mod scale;
+/// Colours with their names.
+pub mod swatches;
 
 /// A plot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plot {
     /// Horizontally.
-    pub x: Axis,
+    pub x: PlotAxis,
     /// Vertically.
-    pub y: Axis,
+    pub y: PlotAxis,
     /// The lines.
     pub series: Vec<Series>,
     /// Horizontal lines with their names: values that are known.
@@ -34,31 +37,6 @@ pub enum Size {
     Small,
     /// A strip.
     Flat,
-}
-
-/// An axis.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Axis {
-    /// What it shows, with its unit.
-    pub label: String,
-    /// Whether it is logarithmic.
-    pub is_log: bool,
-    /// From and to, where it is not what the series need.
-    pub range: Option<[f64; 2]>,
-    /// Names of the values 0, 1, ..., where it shows those and no others.
-    pub names: Vec<String>,
-}
-
-impl Axis {
-    /// A linear axis for what the series need.
-    pub fn linear(label: impl Into<String>) -> Axis {
-        Axis { label: label.into(), ..Axis::default() }
-    }
-
-    /// A logarithmic one.
-    pub fn log(label: impl Into<String>) -> Axis {
-        Axis { is_log: true, ..Axis::linear(label) }
-    }
 }
 
 /// How a series is drawn.
@@ -81,14 +59,14 @@ pub struct Series {
     /// Its name.
     pub name: String,
     /// Its points, by x.
-    pub points: Vec<Point>,
+    pub points: Vec<PlotPoint>,
     /// How it is drawn.
     pub style: Style,
 }
 
 /// A point with an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub struct PlotPoint {
     /// Where.
     pub x: f64,
     /// The value.
@@ -101,21 +79,21 @@ pub struct Point {
     pub is_firm: bool,
 }
 
-impl Point {
+impl PlotPoint {
     /// A value with its interval.
-    pub fn new(x: f64, y: f64, [low, high]: [f64; 2]) -> Point {
-        Point { x, y, low, high, is_firm: true }
+    pub fn new(x: f64, y: f64, [low, high]: [f64; 2]) -> PlotPoint {
+        PlotPoint { x, y, low, high, is_firm: true }
     }
 
     /// An estimate with its 95 % interval.
-    pub fn of(x: f64, estimate: &Estimate) -> Point {
+    pub fn of(x: f64, estimate: &Estimate) -> PlotPoint {
         let reach = critical_value(0.05, estimate.dof) * estimate.std_error;
-        Point::new(x, estimate.value, [estimate.value - reach, estimate.value + reach])
+        PlotPoint::new(x, estimate.value, [estimate.value - reach, estimate.value + reach])
     }
 
     /// A value without one.
-    pub fn bare(x: f64, y: f64) -> Point {
-        Point::new(x, y, [y, y])
+    pub fn bare(x: f64, y: f64) -> PlotPoint {
+        PlotPoint::new(x, y, [y, y])
     }
 }
 
@@ -134,7 +112,7 @@ const LETTERS: usize = 30;
 const LETTER: f64 = 6.6;
 
 /// Places of the picture's parts.
-struct Frame {
+struct PlotFrame {
     width: f64,
     height: f64,
     left: f64,
@@ -152,7 +130,7 @@ impl Plot {
     /// What it shows as numbers: a row a point.
     pub fn to_csv(&self) -> String {
         let header = ["series", &self.x.label, &self.y.label, "low", "high", "firm"];
-        let x = |p: &Point| match self.x.names.get(p.x.round() as usize) {
+        let x = |p: &PlotPoint| match self.x.names.get(p.x.round() as usize) {
             Some(name) => name.clone(),
             None => csv_text::number(p.x),
         };
@@ -165,7 +143,7 @@ impl Plot {
         csv_text::to_text(&header, rows)
     }
 
-    fn frame(&self) -> Frame {
+    fn frame(&self) -> PlotFrame {
         let (width, height) = match self.size {
             Size::Wide => (760.0, 380.0),
             Size::Small => (480.0, 320.0),
@@ -176,7 +154,7 @@ impl Plot {
         let right = width - 16.0 - LETTER * longest as f64;
         // Names of values stand slanted where they would run into each other.
         let bottom = height - if self.is_slanted(right - 66.0) { 92.0 } else { 46.0 };
-        Frame { width, height, left: 66.0, top: 12.0, right, bottom }
+        PlotFrame { width, height, left: 66.0, top: 12.0, right, bottom }
     }
 
     fn is_slanted(&self, width: f64) -> bool {
@@ -186,7 +164,7 @@ impl Plot {
 
     fn paint(&self) -> String {
         let frame = self.frame();
-        let Frame { left, top, right, bottom, .. } = frame;
+        let PlotFrame { left, top, right, bottom, .. } = frame;
         let points = || self.series.iter().flat_map(|series| &series.points);
         let x = Scale::new(&self.x, points().map(|p| p.x), [left, right]);
         let levels = self.levels.iter().map(|(value, _)| *value);
@@ -221,8 +199,8 @@ impl Plot {
         self.series.iter().map(colour).collect()
     }
 
-    fn axes(&self, frame: &Frame, x: &Scale, y: &Scale) -> String {
-        let Frame { height, left, top, right, bottom, .. } = *frame;
+    fn axes(&self, frame: &PlotFrame, x: &Scale, y: &Scale) -> String {
+        let PlotFrame { height, left, top, right, bottom, .. } = *frame;
         let mut svg = String::new();
         let is_slanted = self.is_slanted(right - left);
         for (tick, name) in x.ticks() {
@@ -260,7 +238,7 @@ impl Plot {
     }
 
     /// Names at the right, each at the height where its line ends, moved apart.
-    fn names(&self, frame: &Frame, y: &Scale) -> String {
+    fn names(&self, frame: &PlotFrame, y: &Scale) -> String {
         let end = |series: &Series| series.points.last().map_or(f64::NAN, |p| p.y);
         let series = self.series.iter().zip(self.colours());
         let mut names: Vec<(f64, &str, &str)> =
@@ -292,7 +270,7 @@ impl Plot {
 
 /// Plots one above the other in one picture.
 pub fn panels(plots: &[Plot]) -> String {
-    let frames: Vec<Frame> = plots.iter().map(Plot::frame).collect();
+    let frames: Vec<PlotFrame> = plots.iter().map(Plot::frame).collect();
     let width = frames.iter().map(|f| f.width).fold(0.0, f64::max);
     let height: f64 = frames.iter().map(|f| f.height).sum();
     let mut svg = format!(
@@ -301,7 +279,7 @@ pub fn panels(plots: &[Plot]) -> String {
     );
     let mut below = 0.0;
     for (plot, frame) in plots.iter().zip(&frames) {
-        let Frame { width, height, .. } = frame;
+        let PlotFrame { width, height, .. } = frame;
         svg += &format!(
             "<svg y=\"{below}\" width=\"{width}\" height=\"{height}\">\n{}</svg>\n",
             plot.paint()
@@ -331,7 +309,7 @@ impl Series {
             Style::Line if self.points.len() > MARKED => stroked(1.8, ""),
             Style::Line => stroked(1.8, "") + &marks(),
             Style::Marks => {
-                let bar = |(at, _, p): (f64, f64, &Point)| {
+                let bar = |(at, _, p): (f64, f64, &PlotPoint)| {
                     format!("M{at:.1} {:.1}V{:.1}", y.at(p.low), y.at(p.high))
                 };
                 let bars: String = places().map(bar).collect();
@@ -379,7 +357,7 @@ mod tests {
     fn plot() -> Plot {
         let point = |k: i32| {
             let x = f64::from(1 << k);
-            Point::new(x, 1.0 + 1.0 / x, [1.0, 1.0 + 2.0 / x])
+            PlotPoint::new(x, 1.0 + 1.0 / x, [1.0, 1.0 + 2.0 / x])
         };
         let series = ["one & only", "another"].map(|name| Series {
             name: name.into(),
@@ -387,8 +365,8 @@ mod tests {
             ..Series::default()
         });
         Plot {
-            x: Axis::log("passes"),
-            y: Axis { range: Some([0.9, 2.1]), ..Axis::linear("mean") },
+            x: PlotAxis::log("passes"),
+            y: PlotAxis { range: Some([0.9, 2.1]), ..PlotAxis::linear("mean") },
             series: series.into(),
             levels: vec![(1.0, "truth".into())],
             size: Size::Wide,
@@ -409,10 +387,10 @@ mod tests {
     /// Marks that stand side by side at one name are of that name.
     #[test]
     fn numbers_stand_by_their_names() {
-        let points = vec![Point::bare(-0.2, 1.0), Point::bare(0.8, 2.0)];
+        let points = vec![PlotPoint::bare(-0.2, 1.0), PlotPoint::bare(0.8, 2.0)];
         let series = vec![Series { name: "a".into(), points, style: Style::Marks }];
-        let x = Axis { names: vec!["left".into(), "right".into()], ..Axis::linear("side") };
-        let csv = Plot { x, y: Axis::linear("ratio"), series, ..Plot::default() }.to_csv();
+        let x = PlotAxis { names: vec!["left".into(), "right".into()], ..PlotAxis::linear("side") };
+        let csv = Plot { x, y: PlotAxis::linear("ratio"), series, ..Plot::default() }.to_csv();
         assert_eq!(
             csv,
             "series,side,ratio,low,high,firm\na,left,1.0,1.0,1.0,true\na,right,2.0,2.0,2.0,true\n"
@@ -437,7 +415,8 @@ mod tests {
     fn nothing_to_draw_is_no_error() {
         let empty = Plot::default().to_svg();
         assert!(empty.starts_with("<svg") && !empty.contains("NaN"));
-        let flat = Series { points: vec![Point::new(1.0, 0.0, [f64::NAN, 0.0])], ..Series::default() };
+        let flat =
+            Series { points: vec![PlotPoint::new(1.0, 0.0, [f64::NAN, 0.0])], ..Series::default() };
         let svg = Plot { series: vec![flat], ..Plot::default() }.to_svg();
         assert!(!svg.contains("NaN"), "{svg}");
     }

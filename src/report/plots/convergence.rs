@@ -6,8 +6,8 @@
 //! has a tail falls more slowly, or in steps. The interval is that of s for near-normal means,
 //! s sqrt((G - 1) / chi2). Beside it the standard error of m passes that the variance of all passes promises.
 
-use super::{Content, Drawn, Section, runs};
-use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
+use super::section::{Content, PlotFigure, Section, runs};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
 use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::Stored;
 use crate::stats::moments::Moments;
@@ -56,7 +56,7 @@ fn rays(_: &Stored, _: &Cell, run: &EstimatorRun) -> Option<f64> {
     (per_pass > 0.0).then_some(per_pass)
 }
 
-fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> Vec<Drawn> {
+fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> Vec<PlotFigure> {
     let plot = |price: &Price| {
         let series: Vec<Series> = runs(cell)
             .filter_map(|run| {
@@ -66,13 +66,13 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> Vec<Drawn> {
             .flatten()
             .collect();
         let plot = Plot {
-            x: Axis::log(price.label),
-            y: Axis::log("relative error"),
+            x: PlotAxis::log(price.label),
+            y: PlotAxis::log("relative error"),
             series,
             size: Size::Small,
             ..Plot::default()
         };
-        let drawn = Drawn {
+        let drawn = PlotFigure {
             name: format!("error-{}-{index:03}", price.name),
             title: cell.label.clone(),
             caption: format!("Against {}.", price.label),
@@ -95,8 +95,8 @@ struct Errors {
 
 fn of_run(errors: &Errors, name: &str, unit: f64) -> Vec<Series> {
     let points = errors.measured.iter();
-    let points = points.map(|(n, [y, low, high])| Point::new(n * unit, *y, [*low, *high])).collect();
-    let guide = |n: f64| Point::bare(n * unit, errors.of_a_pass / n.sqrt());
+    let points = points.map(|(n, [y, low, high])| PlotPoint::new(n * unit, *y, [*low, *high])).collect();
+    let guide = |n: f64| PlotPoint::bare(n * unit, errors.of_a_pass / n.sqrt());
     let first = errors.measured.first().map_or(1.0, |(n, _)| *n);
     vec![
         Series { name: name.into(), points, style: Style::Marks },

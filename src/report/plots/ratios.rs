@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::{Content, Drawn, Section, band_name, joined, shown_bands};
+use super::section::{Content, PlotFigure, Section, band_name, joined, shown_bands};
 use crate::report::document::slug;
-use crate::report::plot::{Axis, COLOURS, Plot, Point, Series, Size, Style};
+use crate::report::plot::{COLOURS, Plot, PlotAxis, PlotPoint, Series, Size, Style};
 use crate::report::summary;
 use crate::results::record::CostMeasure;
 use crate::results::store::Stored;
@@ -114,7 +114,7 @@ fn of_axis(
     places: &Places,
     (axis, cost): (&str, CostMeasure),
     name: &str,
-) -> Vec<Drawn> {
+) -> Vec<PlotFigure> {
     let mut pairs: Vec<(&str, &str)> =
         rows.iter().map(|row| (&*row.candidate, &*row.baseline)).collect();
     pairs.sort_unstable();
@@ -136,10 +136,10 @@ fn of_axis(
             let wide = values.iter().all(|x| *x > 0.0)
                 && values.iter().fold(0.0, |a: f64, b| a.max(*b))
                     > 5.0 * values.iter().fold(f64::MAX, |a, b| a.min(*b));
-            let x = Axis {
+            let x = PlotAxis {
                 is_log: wide && places.names.is_empty(),
                 names: places.names.clone(),
-                ..Axis::linear(&places.what)
+                ..PlotAxis::linear(&places.what)
             };
             let dropped = lines.len().saturating_sub(MOST_LINES);
             let mut caption =
@@ -149,12 +149,12 @@ fn of_axis(
             }
             let plot = Plot {
                 x,
-                y: Axis::log("efficiency"),
+                y: PlotAxis::log("efficiency"),
                 series: lines.into_iter().take(MOST_LINES).collect(),
                 levels: vec![(1.0, "equal".into())],
                 size: Size::Small,
             };
-            drawn.push(Drawn {
+            drawn.push(PlotFigure {
                 name: slug(&joined(&[name, candidate, band_name(stored, band)])).replace("--", "-"),
                 title: joined(&[&format!("{candidate} over {baseline}"), band_name(stored, band)]),
                 caption,
@@ -176,7 +176,7 @@ fn lines(stored: &Stored, rows: &[&Row], axis: &str, places: &Places) -> Vec<Ser
         let Some(place) = cell.axes.get(axis).and_then(|label| places.at.get(label)) else { continue };
         let others = cell.axes.iter().filter(|(name, _)| *name != axis).map(|(_, label)| label.as_str());
         let name = joined(&others.collect::<Vec<_>>());
-        let mut point = Point::new(*place, row.efficiency_ratio, [row.ci_low, row.ci_high]);
+        let mut point = PlotPoint::new(*place, row.efficiency_ratio, [row.ci_low, row.ci_high]);
         point.is_firm = row.resolved;
         match lines.iter_mut().find(|line| line.name == name) {
             Some(line) => line.points.push(point),

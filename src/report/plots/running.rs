@@ -2,8 +2,8 @@
 //! value that a claim expects. An interval that is valid covers the expected value, now and later, in 19 of 20
 //! estimators; one whose scores have too heavy a tail sits beside it, and is narrow.
 
-use super::{Content, Drawn, Section};
-use crate::report::plot::{Axis, Plot, Point, Series, Size};
+use super::section::{Content, PlotFigure, Section};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size};
 use crate::results::pictures::{Running, Wanted};
 use crate::results::record::{Against, Cell, EstimatorRun, Observable, Quantity};
 use crate::results::store::Stored;
@@ -24,7 +24,7 @@ pub(super) fn section(stored: &Stored, wanted: &[Wanted]) -> Section {
     for (number, running) in running.enumerate() {
         for (index, cell) in stored.record.cells.iter().enumerate() {
             let Some((plot, title)) = plot(stored, index, cell, running) else { continue };
-            drawn.push(Drawn {
+            drawn.push(PlotFigure {
                 name: format!("running-{}-{index:03}", number + 1),
                 title,
                 caption: CAPTION.into(),
@@ -75,8 +75,8 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
         .collect::<Vec<_>>()
         .join(", ");
     let plot = Plot {
-        x: Axis::log("passes"),
-        y: Axis { range, ..Axis::linear("mean") },
+        x: PlotAxis::log("passes"),
+        y: PlotAxis { range, ..PlotAxis::linear("mean") },
         series,
         levels,
         size: Size::Wide,
@@ -85,7 +85,7 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
 }
 
 /// Mean and interval after each batch but the first few, which have none.
-fn means(batches: &[Moments]) -> Vec<Point> {
+fn means(batches: &[Moments]) -> Vec<PlotPoint> {
     let mut all = Moments::default();
     let mut points = Vec::new();
     for batch in batches {
@@ -94,7 +94,7 @@ fn means(batches: &[Moments]) -> Vec<Point> {
             continue;
         }
         let reach = critical_value(1.0 - CONFIDENCE, all.n as f64 - 1.0) * all.std_error();
-        points.push(Point::new(all.n as f64, all.mean, [all.mean - reach, all.mean + reach]));
+        points.push(PlotPoint::new(all.n as f64, all.mean, [all.mean - reach, all.mean + reach]));
     }
     points
 }

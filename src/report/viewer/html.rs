@@ -1,8 +1,8 @@
 //! The viewer in HTML: data for the script, and the pictures beside the page for a reader without it.
 
-use super::super::document::{Block, FigureBlock};
-use super::super::html::escape;
-use super::{Viewer, maps};
+use super::maps;
+use crate::report::document::{FigureBlock, PageBlock, ViewerBlock};
+use crate::report::markup::escape;
 
 const STYLE: &str = include_str!("viewer.css");
 /// In the order in which each uses the ones before it.
@@ -14,7 +14,7 @@ const SCRIPTS: [&str; 4] = [
 ];
 
 /// A viewer's place on the page.
-pub fn to_html(viewer: &Viewer) -> String {
+pub fn to_html(viewer: &ViewerBlock) -> String {
     let figures: String = viewer.figures.iter().map(figure).collect();
     let figures = format!("<div class=\"figures\">\n{figures}</div>");
     let label = match viewer.cell.as_str() {
@@ -44,7 +44,7 @@ pub fn to_html(viewer: &Viewer) -> String {
 }
 
 /// What a page with viewers needs once: a style for its head, and a script for its end.
-pub fn parts(blocks: &[Block]) -> (String, String) {
+pub fn parts(blocks: &[PageBlock]) -> (String, String) {
     if !blocks.iter().any(has_viewer) {
         return Default::default();
     }
@@ -58,10 +58,10 @@ pub fn parts(blocks: &[Block]) -> (String, String) {
     (STYLE.into(), script)
 }
 
-fn has_viewer(block: &Block) -> bool {
+fn has_viewer(block: &PageBlock) -> bool {
     match block {
-        Block::Viewer(_) => true,
-        Block::Folded(_, blocks) => blocks.iter().any(has_viewer),
+        PageBlock::Viewer(_) => true,
+        PageBlock::Folded(_, blocks) => blocks.iter().any(has_viewer),
         _ => false,
     }
 }

@@ -1,11 +1,13 @@
-//! The pictures of one cell, to be compared: one PNG an estimator for a reader without scripts, and what the page's
-//! viewer needs beside: linear values, and maps of noise, of differences and of their z-scores.
+//! The pictures of one cell in a viewer that compares them: one PNG per estimator for a reader without
+//! scripts, and the input of the page's script: linear values, and maps of noise, of differences and of
+//! their z-scores.
 
 use serde::Serialize;
 
 use super::base64;
-use super::document::{self, FigureBlock};
-use super::{Figure, few_bands, number::significant};
+use super::document::{FigureBlock, PictureFile, ViewerBlock};
+use super::number::significant;
+use super::pictures::{Figure, few_bands};
 use crate::error::Result;
 use crate::results::image::{Picture, to_byte_png, to_linear_png};
 use crate::results::record::{Bias, Cell, EstimatorRun};
@@ -21,17 +23,6 @@ pub use html::{parts, to_html};
 
 /// Bytes that the viewers of a page may hold together; a browser opens that much at once.
 const ROOM: usize = 24_000_000;
-
-/// The pictures of one cell.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Viewer {
-    /// The cell's label; empty without a sweep.
-    pub cell: String,
-    /// One tone-mapped PNG an estimator; none where the page shows them above.
-    pub figures: Vec<FigureBlock>,
-    /// What the page's script reads, as JSON; none where the page has no more room.
-    pub data: Option<String>,
-}
 
 #[derive(Serialize)]
 struct Data<'a> {
@@ -76,11 +67,11 @@ struct Maps<'a> {
 ///
 /// # Errors
 /// Pictures without pixels.
-pub(super) fn viewers(stored: &Stored, figures: &[Figure]) -> Result<Vec<Viewer>> {
+pub(super) fn viewers(stored: &Stored, figures: &[Figure]) -> Result<Vec<ViewerBlock>> {
     viewers_within(stored, figures, ROOM)
 }
 
-fn viewers_within(stored: &Stored, figures: &[Figure], room: usize) -> Result<Vec<Viewer>> {
+fn viewers_within(stored: &Stored, figures: &[Figure], room: usize) -> Result<Vec<ViewerBlock>> {
     let (mut viewers, mut left) = (Vec::new(), Some(room));
     for cell in &stored.record.cells {
         let figures: Vec<FigureBlock> =
@@ -94,7 +85,7 @@ fn viewers_within(stored: &Stored, figures: &[Figure], room: usize) -> Result<Ve
             left = room.checked_sub(text.len());
             data = left.map(|_| text);
         }
-        viewers.push(Viewer { cell: cell.label.clone(), figures, data });
+        viewers.push(ViewerBlock { cell: cell.label.clone(), figures, data });
     }
     Ok(viewers)
 }
@@ -102,7 +93,7 @@ fn viewers_within(stored: &Stored, figures: &[Figure], room: usize) -> Result<Ve
 fn block(figure: &Figure) -> FigureBlock {
     FigureBlock {
         path: format!("{}.png", figure.stem),
-        picture: document::Picture::Png(figure.png.clone()),
+        picture: PictureFile::Png(figure.png.clone()),
         title: figure.estimator.clone(),
         caption: figure.caption.clone(),
     }
@@ -162,7 +153,12 @@ pub(super) struct Sheet<'a> {
 ///
 /// # Errors
 /// Sheets without pixels.
-pub(super) fn grid(title: &str, sheets: [Sheet; 2], width: usize, columns: usize) -> Result<Viewer> {
+pub(super) fn grid(
+    title: &str,
+    sheets: [Sheet; 2],
+    width: usize,
+    columns: usize,
+) -> Result<ViewerBlock> {
     let height = sheets[0].rgb.len() / width.max(1);
     let picture =
         |sheet: &Sheet<'_>| Ok(base64::encode(&to_linear_png(width, sheet.rgb.iter().copied())?));
@@ -187,12 +183,12 @@ pub(super) fn grid(title: &str, sheets: [Sheet; 2], width: usize, columns: usize
         noise_range: maps::NOISE_RANGE,
         pictures: pictures.collect(),
     };
-    Ok(Viewer { cell: title.into(), figures: Vec::new(), data: Some(data.to_text()) })
+    Ok(ViewerBlock { cell: title.into(), figures: Vec::new(), data: Some(data.to_text()) })
 }
 
 /// Takes the data off viewers that come when the page's room is spent.
-pub(super) fn keep_room<'a>(first: &[Viewer], more: impl Iterator<Item = &'a mut Viewer>) {
-    let size = |viewer: &Viewer| viewer.data.as_ref().map_or(0, String::len);
+pub(super) fn keep_room<'a>(first: &[ViewerBlock], more: impl Iterator<Item = &'a mut ViewerBlock>) {
+    let size = |viewer: &ViewerBlock| viewer.data.as_ref().map_or(0, String::len);
     let mut used: usize = first.iter().map(size).sum();
     for viewer in more {
         used += size(viewer);
