@@ -9,7 +9,8 @@ use super::viewer;
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// Most rows of a table that carries its sources with it; longer ones have them in files beside the page.
+/// Most rows of a table that carries its sources with it; longer ones have them in files beside the
+/// page.
 const CARRIED_ROWS: usize = 200;
 
 /// The page as a file of its own.

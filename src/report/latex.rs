@@ -54,8 +54,8 @@ fn figure(f: &FigureBlock) -> String {
 /// Most rows of a table that floats.
 const FLOATS: usize = 40;
 
-/// A table with its caption. Needs `\usepackage{booktabs}`, and `\usepackage{longtable}` where there are more than
-/// 40 rows.
+/// A table with its caption. Needs `\usepackage{booktabs}`, and `\usepackage{longtable}` where there
+/// are more than 40 rows.
 pub fn to_latex(table: &Table, name: &str, caption: &str) -> String {
     if table.rows.len() > FLOATS {
         return long(table, name, caption);

@@ -1,5 +1,5 @@
-//! What the page says: what was asked, claims and verdicts first, then efficiency, pictures and plots, what was measured, what
-//! it cost, and how to make it again.
+//! What the page says: what was asked, claims and verdicts first, then efficiency, pictures and plots,
+//! what was measured, what it cost, and how to make it again.
 
 use super::data::ReportData;
 use super::document::{Document, PageBlock, TableBlock};

@@ -1,6 +1,6 @@
-//! Split pictures: a grid with a picture a cell, its left half one estimator's and its right half another's,
-//! both shown alike, beside the CPU time that each half took. That they took the same is stated where it is
-//! so, and where it is not, by how much they differ.
+//! Split pictures: a grid with a picture a cell, its left half one estimator's and its right half
+//! another's, both shown alike, beside the CPU time that each half took. That they took the same is
+//! stated where it is so, and where it is not, by how much they differ.
 
 use super::document::{Document, FigureBlock, PageBlock, PictureFile, TableBlock, ViewerBlock};
 use super::number::significant;
@@ -384,8 +384,8 @@ impl<'a> Half<'a> {
         }
     }
 
-    /// Squared standard errors over squared values, both summed over the image; infinite where nothing has
-    /// been seen, since black says nothing of how bright the body is.
+    /// Squared standard errors over squared values, both summed over the image; infinite where nothing
+    /// has been seen, since black says nothing of how bright the body is.
     fn noise(&self) -> f64 {
         let Some(picture) = self.picture else { return f64::INFINITY };
         let squares = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>();

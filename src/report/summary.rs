@@ -9,8 +9,8 @@ use crate::results::store::Stored;
 use crate::verify::comparisons::Row;
 use crate::verify::model_errors::ModelError;
 
-/// The rows by one measure of cost that stand for a pair of estimators: all classes together, and pixels rather than
-/// their mean. Second arms of one estimator are left out.
+/// The rows by one measure of cost that stand for a pair of estimators: all classes together, and
+/// pixels rather than their mean. Second arms of one estimator are left out.
 pub fn chosen<'a>(stored: &Stored, rows: &'a [Row], cost: CostMeasure) -> Vec<&'a Row> {
     let is_control = |row: &Row| {
         let cell = stored.record.cells.iter().find(|cell| cell.label == row.cell);
@@ -141,8 +141,9 @@ impl PivotEntry {
     }
 }
 
-/// A row for each cell and name, a column for each axis of the sweep, each part of the names, and each column of the
-/// entries, in the order in which they come. Columns that say the same in every row are left out.
+/// A row for each cell and name, a column for each axis of the sweep, each part of the names, and each
+/// column of the entries, in the order in which they come. Columns that say the same in every row are
+/// left out.
 fn pivot(stored: &Stored, parts: &[&str], entries: Vec<PivotEntry>) -> Table {
     let axes: Vec<&String> =
         stored.record.cells.first().map(|cell| cell.axes.keys().collect()).unwrap_or_default();

@@ -64,7 +64,8 @@ pub fn sampler_table(data: &ReportData) -> Table {
     if table.rows.is_empty() { Table::default() } else { table.without_empty_columns() }
 }
 
-/// Efficiencies that stand for the pairs of estimators: by CPU time where it was measured, else by counted work.
+/// Efficiencies that stand for the pairs of estimators: by CPU time where it was measured, else by
+/// counted work.
 pub fn efficiency_table(data: &ReportData) -> Option<TableBlock> {
     let by = |cost| summary::efficiency(&data.stored, &data.comparisons, cost);
     by(CostMeasure::Cpu).or_else(|| by(CostMeasure::Counters))

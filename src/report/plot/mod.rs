@@ -1,5 +1,6 @@
-//! Plots as SVG, inline in the page and by themselves as files, and their numbers as CSV. Text is in the reader's colours,
-//! series are in the palette of Okabe & Ito, which colour-blind readers can tell apart, each named at its end too.
+//! Plots as SVG, inline in the page and by themselves as files, and their numbers as CSV. Text is in
+//! the reader's colours, series are in the palette of Okabe & Ito, which colour-blind readers can tell
+//! apart, each named at its end too.
 
 use super::markup::escape;
 use crate::results::csv_text;

@@ -64,8 +64,8 @@ impl<'a> Scale<'a> {
         }
     }
 
-    /// Where a value is; what is far outside stays near the picture, where it is clipped. A logarithmic axis has
-    /// what is not positive below its lower end.
+    /// Where a value is; what is far outside stays near the picture, where it is clipped. A logarithmic
+    /// axis has what is not positive below its lower end.
     pub(super) fn at(&self, value: f64) -> f64 {
         let share = match self.axis.is_log && value <= 0.0 {
             true => -2.0,

@@ -1,10 +1,11 @@
 //! Error against time and against rays.
 //!
-//! How far means of m passes really lie apart: the batches of a record, taken 2^k at a time, are independent means
-//! of m passes each; with G of them, s^2 = sum (mean_g - mean)^2 / (G - 1) estimates the variance of such a mean with
-//! G - 1 degrees of freedom, whatever m. For independent passes of finite variance s falls as 1/sqrt(m); what
-//! has a tail falls more slowly, or in steps. The interval is that of s for near-normal means,
-//! s sqrt((G - 1) / chi2). Beside it the standard error of m passes that the variance of all passes promises.
+//! How far means of m passes really lie apart: the batches of a record, taken 2^k at a time, are
+//! independent means of m passes each; with G of them, s^2 = sum (mean_g - mean)^2 / (G - 1) estimates
+//! the variance of such a mean with G - 1 degrees of freedom, whatever m. For independent passes of
+//! finite variance s falls as 1/sqrt(m); what has a tail falls more slowly, or in steps. The interval
+//! is that of s for near-normal means, s sqrt((G - 1) / chi2). Beside it the standard error of m passes
+//! that the variance of all passes promises.
 
 use super::section::{Content, PlotFigure, Section, runs};
 use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
@@ -139,7 +140,8 @@ fn errors(stored: &Stored, run: &EstimatorRun) -> Option<Errors> {
     (!measured.is_empty()).then_some(Errors { measured, of_a_pass, passes })
 }
 
-/// Batches joined `size` at a time; those that are left over, and a last batch with fewer passes, are in none.
+/// Batches joined `size` at a time; those that are left over, and a last batch with fewer passes, are
+/// in none.
 fn grouped(batches: &[Moments], size: usize) -> Vec<Moments> {
     let whole = batches.chunks_exact(size).map(|group| total(group.to_vec()).unwrap_or_default());
     let mut whole: Vec<Moments> = whole.collect();

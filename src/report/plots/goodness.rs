@@ -1,4 +1,5 @@
-//! Chi-square in pictures: what was drawn from a sampler, what its density expects, and by how much they differ.
+//! Chi-square in pictures: what was drawn from a sampler, what its density expects, and by how much
+//! they differ.
 
 use super::section::{Content, PlotFigure, Section};
 use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};

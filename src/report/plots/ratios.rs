@@ -1,4 +1,5 @@
-//! Efficiency along the axes of a sweep: a line for each of the other axes' labels, with the 95 % intervals.
+//! Efficiency along the axes of a sweep: a line for each of the other axes' labels, with the 95 %
+//! intervals.
 
 use std::collections::BTreeMap;
 
@@ -70,8 +71,8 @@ struct Places {
     names: Vec<String>,
 }
 
-/// The labels of an axis: as numbers where they are some, `albedo-0.5` among them, those of one word together; else by
-/// name in the order of the cells.
+/// The labels of an axis: as numbers where they are some, `albedo-0.5` among them, those of one word
+/// together; else by name in the order of the cells.
 fn places(stored: &Stored, axis: &str) -> Vec<Places> {
     let mut labels: Vec<&String> = Vec::new();
     for cell in &stored.record.cells {

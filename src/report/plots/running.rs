@@ -1,6 +1,7 @@
-//! Means as passes add up: a plot a cell, with the 95 % interval that each estimator states after so many passes and the
-//! value that a claim expects. An interval that is valid covers the expected value, now and later, in 19 of 20
-//! estimators; one whose scores have too heavy a tail sits beside it, and is narrow.
+//! Means as passes add up: a plot a cell, with the 95 % interval that each estimator states after so
+//! many passes and the value that a claim expects. An interval that is valid covers the expected value,
+//! now and later, in 19 of 20 estimators; one whose scores have too heavy a tail sits beside it, and is
+//! narrow.
 
 use super::section::{Content, PlotFigure, Section};
 use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size};

@@ -77,7 +77,8 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [PlotFigure; 2] {
     ]
 }
 
-/// Linear sRGB of a run's spectrum. Its error is that of the sums over bands in each batch: bands may share their paths.
+/// Linear sRGB of a run's spectrum. Its error is that of the sums over bands in each batch: bands may
+/// share their paths.
 fn colour(stored: &Stored, run: &EstimatorRun) -> Option<[Estimate; 3]> {
     let bands = &stored.record.bands;
     let moments: Vec<Vec<Moments>> =

@@ -28,7 +28,8 @@ pub(super) fn difference(a: &Picture, b: &Picture, band: usize) -> Vec<f64> {
     a.mean(band).zip(b.mean(band)).map(|(a, b)| (a - b) / b.abs()).collect()
 }
 
-/// (a - b) over its standard error, of two that are independent; not a number where neither has an error.
+/// (a - b) over its standard error, of two that are independent; not a number where neither has an
+/// error.
 pub(super) fn z_scores(a: &Picture, b: &Picture, band: usize) -> Vec<f64> {
     let errors = a.std_error(band).zip(b.std_error(band));
     let score = |((a, b), (ea, eb)): ((f64, f64), (f64, f64))| {
@@ -63,8 +64,8 @@ pub(super) fn noise_index(value: f64) -> u8 {
     (1.0 + 254.0 * part).round() as u8
 }
 
-/// Ten steps of viridis (S. van der Walt, N. Smith, Matplotlib; in the public domain), which is ordered by lightness
-/// for every kind of colour vision.
+/// Ten steps of viridis (S. van der Walt, N. Smith, Matplotlib; in the public domain), which is ordered
+/// by lightness for every kind of colour vision.
 const VIRIDIS: [[u8; 3]; 11] = [
     [0x44, 0x01, 0x54],
     [0x48, 0x24, 0x75],

@@ -149,7 +149,8 @@ pub(super) struct Sheet<'a> {
     pub rgb: Vec<[f64; 3]>,
 }
 
-/// The viewer of a grid whose pictures stand on the page already: two sheets of one size, so many tiles a row.
+/// The viewer of a grid whose pictures stand on the page already: two sheets of one size, so many tiles
+/// a row.
 ///
 /// # Errors
 /// Sheets without pixels.
@@ -215,7 +216,8 @@ fn same_integral<'a>(shots: &[Shot<'a>], index: usize) -> Option<Shot<'a>> {
     (first != index).then(|| shots[first])
 }
 
-/// What differences are taken from: the same integral, or light transport itself where a model has no other estimator.
+/// What differences are taken from: the same integral, or light transport itself where a model has no
+/// other estimator.
 fn other<'a>(shots: &[Shot<'a>], index: usize) -> Option<Shot<'a>> {
     let truth = || shots.iter().find(|shot| shot.run.model.is_none()).copied();
     same_integral(shots, index).or_else(|| shots[index].run.model.as_ref().and_then(|_| truth()))
