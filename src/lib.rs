@@ -25,8 +25,6 @@
 //!
 //! One word has one meaning, in code, files, tables and messages.
 //!
-//! Physics:
-//!
 //! | word | meaning |
 //! |---|---|
 //! | band | one wavelength interval with scalar optical properties; transport is scalar inside one band |
@@ -38,11 +36,6 @@
 //! | `mu` | cosine between propagation directions (phase functions) or to an axis (named so) |
 //! | `wo`, `wi` | unit directions, both away from the point: towards the sensor, towards the light |
 //! | transmittance | `exp(-sigma_t d)` |
-//!
-//! Sampling:
-//!
-//! | word | meaning |
-//! |---|---|
 //! | `u` | uniform numbers in [0, 1) |
 //! | `pdf` | density per solid angle; other measures are named: `pdf_area`, `pdf_distance` |
 //! | weight | value over pdf of one sampling decision |
@@ -52,11 +45,6 @@
 //! | estimator | techniques plus weights |
 //! | kind | what an entry of an experiment file is, by its name in a registry: `path`, `henyey_greenstein` |
 //! | skipped | of a light: not connected to by subdivision, and sampled by path tracing only |
-//!
-//! Runs:
-//!
-//! | word | meaning |
-//! |---|---|
 //! | cell | one point of an experiment's sweep, and nothing else |
 //! | observable | a pixel, the mean of a region or tile, a flux, each by transport class |
 //! | pass | one independent realisation of all observables of a cell: the unit of independence |
@@ -67,11 +55,6 @@
 //! | campaign | all that one experiment plans and runs: cells with estimators, or samplers |
 //! | record | what a campaign writes |
 //! | re-run | to run a published experiment again and compare its record |
-//!
-//! Evidence:
-//!
-//! | word | meaning |
-//! |---|---|
 //! | claim | what an experiment file says must hold |
 //! | comparison | one test of a claim: one quantity against a value or another quantity |
 //! | verdict | the outcome of a comparison: pass, fail, underpowered or invalid |

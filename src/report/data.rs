@@ -23,7 +23,7 @@ pub struct ReportData {
     pub rows: Vec<Measurement>,
     /// Efficiencies of pairs of estimators.
     pub comparisons: Vec<Row>,
-    /// Models against light transport itself.
+    /// Errors of models against light transport.
     pub model_errors: Vec<ModelError>,
     /// The pictures, in the order of cells and estimators.
     pub figures: Vec<Figure>,

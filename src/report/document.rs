@@ -20,24 +20,24 @@ pub enum PageBlock {
     Text(String),
     /// Plain items.
     List(Vec<String>),
-    /// Lines as they are: a command.
+    /// Preformatted lines, such as a command.
     Code(String),
-    /// A table that can be taken elsewhere.
+    /// A table with its name and caption.
     Table(TableBlock),
-    /// Pictures that stand side by side.
+    /// Pictures side by side.
     Figures(Vec<FigureBlock>),
-    /// One picture over the width of the page.
+    /// One picture as wide as the page.
     Wide(FigureBlock),
-    /// The pictures of a cell, to be compared.
+    /// A viewer that compares the pictures of a cell.
     Viewer(ViewerBlock),
-    /// What is opened on demand: its title, and what it holds.
+    /// Folded blocks under a title.
     Folded(String, Vec<PageBlock>),
 }
 
-/// A table with what it takes to stand elsewhere.
+/// A table that can be used outside the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableBlock {
-    /// Unique on its page, and its files' stem under `tables/`: lower-case words joined by `-`.
+    /// Unique on its page; the stem of its files under `tables/`: lower-case words joined by `-`.
     pub name: String,
     /// What it shows and how to read it, in one or two sentences.
     pub caption: String,
@@ -86,7 +86,7 @@ pub struct ViewerBlock {
 }
 
 impl Document {
-    /// Every table that has a column, in the order of the page.
+    /// Every table that has columns, in the order of the page.
     pub fn tables(&self) -> Vec<&TableBlock> {
         fn inside<'a>(blocks: &'a [PageBlock], tables: &mut Vec<&'a TableBlock>) {
             for block in blocks {
@@ -102,14 +102,14 @@ impl Document {
         tables
     }
 
-    /// The page as Markdown; pictures stand beside it.
+    /// The page as Markdown; pictures are separate files.
     pub fn to_markdown(&self) -> String {
         let blocks: String = self.blocks.iter().map(|block| format!("\n{}", markdown(block))).collect();
         format!("# {}\n{blocks}", self.title)
     }
 }
 
-/// A text as the name of a file or a place on a page: ASCII letters and digits, else `-`.
+/// A text as a file name or an anchor: ASCII letters and digits in lower case, else `-`.
 pub fn slug(text: &str) -> String {
     let letters =
         text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });

@@ -9,11 +9,11 @@ use super::viewer;
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// Most rows of a table that carries its sources with it; longer ones have them in files beside the
-/// page.
+/// Most rows of a table whose LaTeX, Markdown and CSV are part of the page; those of longer tables are
+/// in files only.
 const CARRIED_ROWS: usize = 200;
 
-/// The page as a file of its own.
+/// The page as one file.
 pub fn to_html(page: &Document) -> String {
     let title = escape(&page.title);
     let body: String = page.blocks.iter().map(block).collect();
@@ -68,7 +68,7 @@ fn figures(figures: &[FigureBlock]) -> String {
     format!("<div class=\"figures\">\n{}</div>\n", figures.iter().map(figure).collect::<String>())
 }
 
-/// A table with its caption, and what it takes to stand in a paper, a spreadsheet or a page.
+/// A table with its caption, and its text for a paper, a spreadsheet or a page.
 fn table(of: &TableBlock) -> String {
     let TableBlock { name, caption, table } = of;
     if table.header.is_empty() {
@@ -98,7 +98,7 @@ fn table(of: &TableBlock) -> String {
     )
 }
 
-/// The table as LaTeX, Markdown and CSV, to be copied.
+/// The table as LaTeX, Markdown and CSV, for copying.
 fn sources(of: &TableBlock) -> String {
     let TableBlock { name, caption, table } = of;
     let files = format!("tables/{name}.tex, .md, .csv");
@@ -122,7 +122,7 @@ fn sources(of: &TableBlock) -> String {
     )
 }
 
-/// A field; outcomes are coloured, and still say in words what they are.
+/// A field; outcomes are words in colour.
 fn field(text: &str) -> String {
     match text {
         "pass" | "fail" | "underpowered" | "invalid" => format!("<span class=\"{text}\">{text}</span>"),
@@ -136,7 +136,7 @@ fn figure(f: &FigureBlock) -> String {
         PictureFile::Png(png) => {
             format!("<img alt=\"{title}\" src=\"data:image/png;base64,{}\">", base64::encode(png))
         }
-        // In a page the name space goes without saying.
+        // Inside an HTML page the name space is implied.
         PictureFile::Svg(svg) => svg.replace(" xmlns=\"http://www.w3.org/2000/svg\"", ""),
     };
     let caption = inline(&f.caption);

@@ -12,7 +12,7 @@ const PREAMBLE: &str = "% pdflatex report.tex, in its own folder. Plots are SVG,
 \\begin{document}
 ";
 
-/// The page as a LaTeX document: what is open on the page, nothing of it afloat.
+/// The page as a LaTeX document: the blocks that are not folded, without floats.
 pub fn to_document(page: &Document) -> String {
     let body: String = page.blocks.iter().map(block).collect();
     let title = escaped(&page.title);
@@ -80,7 +80,7 @@ fn long(table: &Table, name: &str, caption: &str) -> String {
     )
 }
 
-/// What both kinds of table are made of.
+/// The parts of a LaTeX table, floating or long.
 struct TabularParts {
     columns: String,
     header: String,
@@ -88,7 +88,7 @@ struct TabularParts {
     caption: String,
 }
 
-/// Nothing of a table without columns.
+/// None for a table without columns.
 fn parts(table: &Table, name: &str, caption: &str) -> Option<TabularParts> {
     if table.header.is_empty() {
         return None;
@@ -139,7 +139,7 @@ pub fn escaped(text: &str) -> String {
     latex
 }
 
-/// The length of `-1.5(2)e-7` at the start of a text, where there is one that needs setting.
+/// The length of a number such as `-1.5(2)e-7` at the start of a text, if it has to be set as mathematics.
 fn number_length(text: &str) -> Option<usize> {
     let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
     let sign = usize::from(text.starts_with(['-', '+']));

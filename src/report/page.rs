@@ -1,5 +1,5 @@
-//! What the page says: what was asked, claims and verdicts first, then efficiency, pictures and plots,
-//! what was measured, what it cost, and how to make it again.
+//! The content of the page: the experiment, claims and verdicts, then efficiency, pictures and plots,
+//! measurements, cost, and how to reproduce it.
 
 use super::data::ReportData;
 use super::document::{Document, PageBlock, TableBlock};
@@ -17,9 +17,9 @@ use crate::verify::levels::FAMILY_LEVEL;
 use crate::verify::verdict::Outcome;
 use crate::verify::weights::{self, DRIFT_LIMIT};
 
-/// Most rows of a table that is open when a page is.
+/// Tables with more rows are folded.
 const OPEN_ROWS: usize = 40;
-/// Most cells whose measurements are.
+/// With more cells their measurements are folded.
 const OPEN_CELLS: usize = 4;
 
 /// The page of one record.
@@ -46,7 +46,7 @@ pub(super) fn page(data: &ReportData) -> Document {
     Document { title: data.stored.record.experiment.clone(), blocks }
 }
 
-/// What the experiment says of itself, and its size.
+/// The description of the experiment, and its size.
 fn asked(data: &ReportData) -> Vec<PageBlock> {
     let record = &data.stored.record;
     let description = record.resolved["description"].as_str().unwrap_or_default();
@@ -95,7 +95,7 @@ fn named(name: &str, table: Table) -> PageBlock {
     PageBlock::Table(TableBlock::new(name, "", table))
 }
 
-/// Blocks that are open where a reader wants them at once.
+/// Blocks, folded under a title if they are long.
 fn folded_if(is_long: bool, title: &str, blocks: Vec<PageBlock>) -> Vec<PageBlock> {
     if is_long { vec![PageBlock::Folded(title.into(), blocks)] } else { blocks }
 }
@@ -103,7 +103,7 @@ fn folded_if(is_long: bool, title: &str, blocks: Vec<PageBlock>) -> Vec<PageBloc
 fn claims(data: &ReportData) -> Vec<PageBlock> {
     let verdicts = &data.verdicts;
     if verdicts.is_empty() {
-        return vec![heading("Claims"), PageBlock::Text("This experiment claims nothing.".into())];
+        return vec![heading("Claims"), PageBlock::Text("This experiment makes no claim.".into())];
     }
     let green = verdicts.iter().filter(|v| v.is_green()).count();
     let failed = verdicts.iter().filter(|v| v.outcome == Outcome::Fail).count();
@@ -118,12 +118,12 @@ fn claims(data: &ReportData) -> Vec<PageBlock> {
     let mut blocks =
         vec![heading("Claims"), PageBlock::Text(text), named("claims", claim_table(verdicts))];
     if !others.is_empty() {
-        blocks.push(PageBlock::Heading(3, "What is not green".into()));
+        blocks.push(PageBlock::Heading(3, "Verdicts that are not green".into()));
         blocks.push(named("verdicts-not-green", verdict_table(&others)));
     }
     if !green_ones.is_empty() {
         let title = format!(
-            "The {} verdicts that are green, each with what it would have found",
+            "The {} verdicts that are green, each with the smallest defect that it would have found",
             green_ones.len()
         );
         blocks.push(PageBlock::Folded(title, vec![named("verdicts-green", verdict_table(&green_ones))]));
@@ -131,10 +131,10 @@ fn claims(data: &ReportData) -> Vec<PageBlock> {
     blocks
 }
 
-/// What was drawn, and how exactly it is known what should have been.
+/// The tests of samplers, and the precision of their expected masses.
 fn samplers(data: &ReportData) -> Vec<PageBlock> {
-    let text = "Draws are counted in cells chosen by the density alone (coarse + fine). \"detectable\" is \
-                the relative error of the density, of one size in all coarse cells, that would have been \
+    let text = "Draws are counted in bins chosen from the density alone (coarse + fine). \"detectable\" is \
+                the relative error of the density, of equal magnitude in all coarse bins, that would have been \
                 found with 99 % probability. Seconds are of this machine and this run.";
     let table = super::terminal::sampler_table(data);
     let mut masses = Table::new(&["sampler", "kind", "total mass - 1", "bound", "evaluations", "note"]);
@@ -148,7 +148,7 @@ fn samplers(data: &ReportData) -> Vec<PageBlock> {
             if run.exhausted { "the budget of evaluations was spent".into() } else { String::new() },
         ]);
     }
-    let quadrature = "The masses of the cells, by quadrature of the density.";
+    let quadrature = "The masses of the bins, by quadrature of the density.";
     vec![
         heading("Samplers"),
         PageBlock::Text(text.into()),
@@ -198,8 +198,8 @@ fn model_errors(data: &ReportData) -> Vec<PageBlock> {
     if data.model_errors.is_empty() {
         return Vec::new();
     }
-    let text = "What a model's mean is off by, relative to light transport itself; in brackets the 95 % interval. A \
-                property of the model, not of an implementation: it is no claim and cannot fail.";
+    let text = "The error of a model's mean relative to light transport, with the 95 % interval in brackets. It is \
+                a property of the model, not of an implementation: it is not a claim and cannot fail.";
     let table = named("model-errors", model_error_table(&data.model_errors));
     let mut blocks = vec![heading("Model errors"), PageBlock::Text(text.into())];
     blocks.extend(summary::model_errors(&data.stored, &data.model_errors).map(PageBlock::Table));
@@ -214,8 +214,8 @@ fn efficiency(data: &ReportData) -> Vec<PageBlock> {
     let text = "Variance of a pass times its cost, of the first estimator over the other: above 1 the other is the \
                 better. In brackets the 95 % interval. By counters the cost is a weighted sum of counts, the same on \
                 every machine; by CPU time it is this machine's, and fair only where the two were timed side by side. \
-                A ratio is quoted where the two means agree; it is not resolved where more passes would still move \
-                it or a single pass may make it.";
+                A ratio is quoted where the two means agree; it is not resolved where more passes could still \
+                change it or where a single pass may dominate it.";
     let table = named("efficiency-by-class", comparison_table(&data.comparisons));
     let mut blocks = vec![heading("Efficiency")];
     let by = |cost| summary::efficiency(&data.stored, &data.comparisons, cost).map(PageBlock::Table);
@@ -282,7 +282,7 @@ fn notes(data: &ReportData) -> Vec<PageBlock> {
         }
     }
     if items.is_empty() {
-        items.push("No anomalies were counted, and no estimator has a reservation.".into());
+        items.push("No anomalies were counted, and no estimator has a note.".into());
     }
     vec![heading("Anomalies and notes"), PageBlock::List(items)]
 }
@@ -306,9 +306,8 @@ fn origin(data: &ReportData) -> Vec<PageBlock> {
         row("date", p.date.clone());
         command = p.command.join(" ");
     }
-    let again = PageBlock::Text("The command that made it:".into());
+    let again = PageBlock::Text("The command that made this report:".into());
     let resolved = PageBlock::Code(canonical(&record.resolved));
-    let resolved =
-        PageBlock::Folded("The experiment as it was played, every value".into(), vec![resolved]);
+    let resolved = PageBlock::Folded("The experiment as it was run, every value".into(), vec![resolved]);
     vec![heading("Provenance"), named("provenance", table), again, PageBlock::Code(command), resolved]
 }

@@ -17,7 +17,7 @@ pub struct Figure {
     pub stem: String,
     /// The PNG file.
     pub png: Vec<u8>,
-    /// What it shows and what it cannot.
+    /// Passes, exposure, and pixels that could not be shown.
     pub caption: String,
 }
 

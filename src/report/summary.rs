@@ -1,4 +1,4 @@
-//! The tables that a text quotes: a row for each cell and band, a column for each estimator.
+//! Tables that papers quote: a row for each cell and band, a column for each estimator.
 
 use super::document::TableBlock;
 use super::number::{significant, with_error};
@@ -27,7 +27,7 @@ pub fn chosen<'a>(stored: &Stored, rows: &'a [Row], cost: CostMeasure) -> Vec<&'
     rows.iter().filter(is_chosen).collect()
 }
 
-/// What the variance is of.
+/// The quantity whose variance is compared.
 pub fn metric_words(row: &Row) -> String {
     if row.metric == PIXELS {
         "a pixel (averaged over the image)".into()
@@ -127,7 +127,7 @@ pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> 
     Some(TableBlock::new("model-error", caption, table))
 }
 
-/// A field of a table: the label of its cell and what else names its row; its column; its text.
+/// A field of a table: the cell and the names that identify its row, its column, and its text.
 struct PivotEntry {
     cell: String,
     names: Vec<String>,
@@ -142,8 +142,8 @@ impl PivotEntry {
 }
 
 /// A row for each cell and name, a column for each axis of the sweep, each part of the names, and each
-/// column of the entries, in the order in which they come. Columns that say the same in every row are
-/// left out.
+/// column of the entries, in the order in which they come. Columns with the same text in every row
+/// are left out.
 fn pivot(stored: &Stored, parts: &[&str], entries: Vec<PivotEntry>) -> Table {
     let axes: Vec<&String> =
         stored.record.cells.first().map(|cell| cell.axes.keys().collect()).unwrap_or_default();

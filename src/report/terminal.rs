@@ -1,4 +1,4 @@
-//! What `run` prints when it is done: a row per measurement, short enough for a terminal.
+//! The output of `run`: a row per measurement, short enough for a terminal.
 
 use super::data::ReportData;
 use super::document::TableBlock;
@@ -35,8 +35,8 @@ pub fn run_table(data: &ReportData) -> Table {
     if table.rows.is_empty() { Table::default() } else { table }
 }
 
-/// One row per sampler: how many of its tests came out how, and the smallest defect that they would have
-/// found.
+/// One row per sampler: the number of its tests and of those that are green, and the smallest defect
+/// that they would have found.
 pub fn sampler_table(data: &ReportData) -> Table {
     let record = &data.stored.record;
     let header = ["sampler", "draws", "bins", "tests", "green", "detectable", "CPU s", "draws/s/core"];
@@ -64,14 +64,14 @@ pub fn sampler_table(data: &ReportData) -> Table {
     if table.rows.is_empty() { Table::default() } else { table.without_empty_columns() }
 }
 
-/// Efficiencies that stand for the pairs of estimators: by CPU time where it was measured, else by
+/// One efficiency per pair of estimators: by CPU time where it was measured, else by
 /// counted work.
 pub fn efficiency_table(data: &ReportData) -> Option<TableBlock> {
     let by = |cost| summary::efficiency(&data.stored, &data.comparisons, cost);
     by(CostMeasure::Cpu).or_else(|| by(CostMeasure::Counters))
 }
 
-/// A text in lines of at most `width` letters, broken at blanks.
+/// A text in lines of at most `width` characters, broken at blanks.
 pub fn wrapped(text: &str, width: usize) -> String {
     let (mut lines, mut length) = (String::new(), 0);
     for word in text.split_whitespace() {
@@ -89,7 +89,7 @@ pub fn wrapped(text: &str, width: usize) -> String {
     lines
 }
 
-/// Notes of estimators and counts of anomalies, each once with the cells that it concerns.
+/// Notes of estimators and counts of anomalies, each once, with its cells.
 pub fn notes(data: &ReportData) -> Vec<String> {
     let mut lines: Vec<(String, Vec<String>)> = Vec::new();
     let mut add = |text: String, cell: &str| match lines.iter_mut().find(|(known, _)| *known == text) {

@@ -1,6 +1,6 @@
-//! Plots as SVG, inline in the page and by themselves as files, and their numbers as CSV. Text is in
-//! the reader's colours, series are in the palette of Okabe & Ito, which colour-blind readers can tell
-//! apart, each named at its end too.
+//! Plots as SVG, inline in the page and as files, and their numbers as CSV. Text has the colour of the
+//! page. Series use the palette of Okabe & Ito, which is safe for colour-blind readers, and each series
+//! is also labelled at its end.
 
 use super::markup::escape;
 use crate::results::csv_text;
@@ -16,22 +16,22 @@ pub mod swatches;
 /// A plot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plot {
-    /// Horizontally.
+    /// The horizontal axis.
     pub x: PlotAxis,
-    /// Vertically.
+    /// The vertical axis.
     pub y: PlotAxis,
     /// The lines.
     pub series: Vec<Series>,
-    /// Horizontal lines with their names: values that are known.
+    /// Horizontal lines at known values, with their names.
     pub levels: Vec<(f64, String)>,
-    /// How large.
+    /// Size of the picture.
     pub size: Size,
 }
 
-/// How large a plot is.
+/// Size of a plot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Size {
-    /// Over the width of the page.
+    /// As wide as the page.
     #[default]
     Wide,
     /// One of several side by side.
@@ -48,13 +48,13 @@ pub enum Style {
     Line,
     /// Points with their intervals as bars.
     Marks,
-    /// Steps: each value holds for its point's place.
+    /// A bar per point.
     Bars,
-    /// A thin dashed line for the eye, in the ink of the text.
+    /// A thin dashed guide line in the colour of the text.
     Guide,
 }
 
-/// A line.
+/// A series of points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     /// Its name.
@@ -68,15 +68,15 @@ pub struct Series {
 /// A point with an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlotPoint {
-    /// Where.
+    /// Abscissa.
     pub x: f64,
     /// The value.
     pub y: f64,
     /// Lower end of its interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of its interval.
     pub high: f64,
-    /// Is it one to rest on? Others are drawn hollow.
+    /// Whether it is resolved; others are drawn hollow.
     pub is_firm: bool,
 }
 
@@ -92,7 +92,7 @@ impl PlotPoint {
         PlotPoint::new(x, estimate.value, [estimate.value - reach, estimate.value + reach])
     }
 
-    /// A value without one.
+    /// A value without an interval.
     pub fn bare(x: f64, y: f64) -> PlotPoint {
         PlotPoint::new(x, y, [y, y])
     }
@@ -101,18 +101,18 @@ impl PlotPoint {
 /// Colours of the series, in their order.
 pub(super) const COLOURS: [&str; 7] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b07b00", "#3a9bd9", "#8c6d31"];
-/// Least distance of names at the right, in units of the picture.
+/// Least distance between labels at the right, in units of the picture.
 const LINE: f64 = 15.0;
-/// Most points of a line that are marked one by one.
+/// Most points of a line that are drawn as marks.
 const MARKED: usize = 20;
-/// From so many points on marks are small.
+/// With more points marks are small.
 const CROWDED: usize = 60;
-/// Longest name of a series, in letters.
+/// Longest label of a series, in characters.
 const LETTERS: usize = 30;
-/// Width of a letter.
+/// Width of a character.
 const LETTER: f64 = 6.6;
 
-/// Places of the picture's parts.
+/// Size of the picture, and the rectangle of the axes.
 struct PlotFrame {
     width: f64,
     height: f64,
@@ -128,7 +128,7 @@ impl Plot {
         panels(std::slice::from_ref(self))
     }
 
-    /// What it shows as numbers: a row a point.
+    /// Its numbers as CSV, a row per point.
     pub fn to_csv(&self) -> String {
         let header = ["series", &self.x.label, &self.y.label, "low", "high", "firm"];
         let x = |p: &PlotPoint| match self.x.names.get(p.x.round() as usize) {
@@ -153,7 +153,7 @@ impl Plot {
         let names = self.series.iter().map(|s| &s.name).chain(self.levels.iter().map(|(_, name)| name));
         let longest = names.map(|name| name.chars().count().min(LETTERS)).max().unwrap_or(0);
         let right = width - 16.0 - LETTER * longest as f64;
-        // Names of values stand slanted where they would run into each other.
+        // Labels of categories are slanted where they would overlap.
         let bottom = height - if self.is_slanted(right - 66.0) { 92.0 } else { 46.0 };
         PlotFrame { width, height, left: 66.0, top: 12.0, right, bottom }
     }
@@ -178,7 +178,7 @@ impl Plot {
                 "<path d=\"M{left} {at:.1}H{right:.1}\" stroke=\"currentColor\" stroke-dasharray=\"5 4\" fill=\"none\"/>\n"
             );
         }
-        // A picture within the picture clips what lies outside the axes.
+        // A nested SVG clips what lies outside the axes.
         let (wide, high) = (right - left, bottom - top);
         svg += &format!(
             "<svg x=\"{left}\" y=\"{top}\" width=\"{wide:.1}\" height=\"{high:.1}\" viewBox=\"{left} {top} {wide:.1} {high:.1}\">\n"
@@ -190,7 +190,7 @@ impl Plot {
         svg + &self.names(&frame, &y)
     }
 
-    /// Guides are in ink and take none of the colours.
+    /// Guides have the colour of the text and use none of the palette.
     fn colours(&self) -> Vec<&'static str> {
         let mut palette = COLOURS.iter().cycle();
         let colour = |series: &Series| match series.style {
@@ -238,7 +238,7 @@ impl Plot {
         )
     }
 
-    /// Names at the right, each at the height where its line ends, moved apart.
+    /// Labels at the right, each at the height where its line ends, moved apart.
     fn names(&self, frame: &PlotFrame, y: &Scale) -> String {
         let end = |series: &Series| series.points.last().map_or(f64::NAN, |p| p.y);
         let series = self.series.iter().zip(self.colours());
@@ -269,7 +269,7 @@ impl Plot {
     }
 }
 
-/// Plots one above the other in one picture.
+/// Plots below each other in one picture.
 pub fn panels(plots: &[Plot]) -> String {
     let frames: Vec<PlotFrame> = plots.iter().map(Plot::frame).collect();
     let width = frames.iter().map(|f| f.width).fold(0.0, f64::max);
@@ -343,7 +343,7 @@ fn mark(x: f64, y: f64, radius: f64, (colour, is_firm): (&str, bool)) -> String 
     format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{fill}\" stroke=\"{colour}\"/>\n")
 }
 
-/// A name that finds room.
+/// A label, shortened to the longest that fits.
 fn shortened(name: &str) -> String {
     if name.chars().count() <= LETTERS {
         return name.into();

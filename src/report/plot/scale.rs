@@ -10,19 +10,19 @@ pub struct PlotAxis {
     pub label: String,
     /// Whether it is logarithmic.
     pub is_log: bool,
-    /// From and to, where it is not what the series need.
+    /// Lower and upper end; default: the range of the series.
     pub range: Option<[f64; 2]>,
-    /// Names of the values 0, 1, ..., where it shows those and no others.
+    /// Names of the values 0, 1, ... of an axis of categories.
     pub names: Vec<String>,
 }
 
 impl PlotAxis {
-    /// A linear axis for what the series need.
+    /// A linear axis over the range of the series.
     pub fn linear(label: impl Into<String>) -> PlotAxis {
         PlotAxis { label: label.into(), ..PlotAxis::default() }
     }
 
-    /// A logarithmic one.
+    /// A logarithmic axis over the range of the series.
     pub fn log(label: impl Into<String>) -> PlotAxis {
         PlotAxis { is_log: true, ..PlotAxis::linear(label) }
     }
@@ -36,7 +36,7 @@ pub(super) struct Scale<'a> {
 }
 
 impl<'a> Scale<'a> {
-    /// Of an axis that has to show `values` between two places.
+    /// The scale of an axis that shows `values` between two places.
     pub(super) fn new(
         axis: &'a PlotAxis,
         values: impl Iterator<Item = f64>,
@@ -111,7 +111,7 @@ impl<'a> Scale<'a> {
     }
 }
 
-/// A little more than a range, so that what lies at its ends is seen whole.
+/// A range with a margin, so that marks at its ends are not clipped.
 fn roomy([from, to]: [f64; 2], is_log: bool) -> [f64; 2] {
     const ROOM: f64 = 0.04;
     match is_log {
@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(scale.ticks(), [(0.0, "a".to_string()), (1.0, "b".to_string())]);
     }
 
-    /// What is not positive has no place on a logarithmic axis, and is not drawn on it.
+    /// Values that are not positive are not drawn on a logarithmic axis.
     #[test]
     fn nothing_is_infinite() {
         let axis = PlotAxis { is_log: true, ..PlotAxis::default() };

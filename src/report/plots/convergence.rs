@@ -1,11 +1,11 @@
 //! Error against time and against rays.
 //!
-//! How far means of m passes really lie apart: the batches of a record, taken 2^k at a time, are
+//! The spread of means of m passes, measured: the batches of a record, taken 2^k at a time, are
 //! independent means of m passes each; with G of them, s^2 = sum (mean_g - mean)^2 / (G - 1) estimates
 //! the variance of such a mean with G - 1 degrees of freedom, whatever m. For independent passes of
-//! finite variance s falls as 1/sqrt(m); what has a tail falls more slowly, or in steps. The interval
-//! is that of s for near-normal means, s sqrt((G - 1) / chi2). Beside it the standard error of m passes
-//! that the variance of all passes promises.
+//! finite variance s falls as 1/sqrt(m); with a heavy tail it falls more slowly, or in steps. The interval
+//! is that of s for near-normal means, s sqrt((G - 1) / chi2). Beside it stands the standard error
+//! of m passes that the variance of all passes predicts.
 
 use super::section::{Content, PlotFigure, Section, runs};
 use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
@@ -15,12 +15,12 @@ use crate::stats::moments::Moments;
 use crate::stats::tails::chi_square_critical;
 use crate::stats::tree::{Merge, total};
 
-/// Fewest groups that say how far means lie apart.
+/// Fewest groups for an estimate of the spread.
 const FEWEST: usize = 8;
 /// Confidence of the intervals.
 const CONFIDENCE: f64 = 0.95;
 
-/// Two plots a cell.
+/// Two plots per cell.
 pub(super) fn section(stored: &Stored) -> Section {
     let cells = stored.record.cells.iter().enumerate();
     Section {
@@ -35,7 +35,7 @@ pub(super) fn section(stored: &Stored) -> Section {
     }
 }
 
-/// What an estimator's passes cost.
+/// A measure of the cost of passes.
 struct Price {
     label: &'static str,
     name: &'static str,
@@ -90,7 +90,7 @@ struct Errors {
     measured: Vec<(f64, [f64; 3])>,
     /// Relative standard deviation of a pass.
     of_a_pass: f64,
-    /// Passes in all.
+    /// Total number of passes.
     passes: f64,
 }
 
@@ -109,7 +109,7 @@ fn of_run(errors: &Errors, name: &str, unit: f64) -> Vec<Series> {
     ]
 }
 
-/// Nothing where the first observable has a band without a mean.
+/// None where the mean of the first observable is 0 in a band.
 fn errors(stored: &Stored, run: &EstimatorRun) -> Option<Errors> {
     let bands = 0..stored.record.bands.len();
     let moments: Vec<Vec<Moments>> =
@@ -140,8 +140,8 @@ fn errors(stored: &Stored, run: &EstimatorRun) -> Option<Errors> {
     (!measured.is_empty()).then_some(Errors { measured, of_a_pass, passes })
 }
 
-/// Batches joined `size` at a time; those that are left over, and a last batch with fewer passes, are
-/// in none.
+/// Batches merged in groups of `size`; remaining batches, and a last batch with fewer passes, are not
+/// used.
 fn grouped(batches: &[Moments], size: usize) -> Vec<Moments> {
     let whole = batches.chunks_exact(size).map(|group| total(group.to_vec()).unwrap_or_default());
     let mut whole: Vec<Moments> = whole.collect();
@@ -177,7 +177,7 @@ mod tests {
         assert_eq!(grouped(&short, 1).len(), 2, "a last batch with fewer passes has another variance");
     }
 
-    /// Independent passes: every point's interval holds what the passes promise, but one in twenty.
+    /// Independent passes: 19 of 20 intervals cover the predicted error.
     #[test]
     fn independent_passes_follow_the_slope() {
         let stored = sample::stored(0.3);

@@ -1,12 +1,11 @@
-//! Chi-square in pictures: what was drawn from a sampler, what its density expects, and by how much
-//! they differ.
+//! The chi-square test as pictures: observed and expected shares of a sampler's bins, and residuals.
 
 use super::section::{Content, PlotFigure, Section};
 use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
 use crate::results::sampler::SamplerRun;
 use crate::results::store::Stored;
 
-/// A picture a sampler.
+/// One picture per sampler.
 pub(super) fn section(stored: &Stored) -> Section {
     let runs = stored.record.samplers.iter().enumerate();
     Section {
@@ -24,7 +23,7 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<PlotFig
     let bins = stored.bins(&run.coarse)?;
     let samples = run.samples as f64;
     let expected = |mass: f64| mass * samples;
-    // Outcomes that neither can be nor were have no place.
+    // Outcomes without mass and without draws are left out.
     let is_there = |(_, observed, mass): &(f64, f64, f64)| *observed > 0.0 || *mass > 0.0;
     let places = || {
         bins.observed
@@ -69,7 +68,7 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<PlotFig
                 points: vec![PlotPoint::bare(-0.5, 0.0), PlotPoint::bare(last, 0.0)],
                 style: Style::Guide,
             },
-            // As long a name as above, so that the bins stand below each other.
+            // As long a name as above, so that the bins of both plots are aligned.
             Series { name: "residual".into(), points: residuals, style: Style::Bars },
         ],
         size: Size::Flat,

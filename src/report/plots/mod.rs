@@ -10,13 +10,13 @@ pub use section::{Content, PlotFigure, Section};
 
 /// Error against time and rays.
 mod convergence;
-/// What was drawn from samplers, and what was expected.
+/// Observed and expected counts of samplers.
 mod goodness;
 /// Exitance by distance.
 mod profiles;
 /// Efficiency along the axes of a sweep.
 mod ratios;
-/// Means as passes add up.
+/// Running means.
 mod running;
 /// Plots under one heading.
 mod section;
@@ -37,7 +37,7 @@ pub fn sections(stored: &Stored, rows: &[Row], wanted: &[Wanted]) -> Vec<Section
         sections.into_iter().filter(|section| !section.drawn.is_empty()).collect();
     let mut taken = BTreeSet::new();
     for drawn in sections.iter_mut().flat_map(|section| &mut section.drawn) {
-        // Names of estimators may differ in what no file name has.
+        // Names of estimators may differ only in characters that file names do not keep.
         while !taken.insert(drawn.name.clone()) {
             drawn.name += "-2";
         }

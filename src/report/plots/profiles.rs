@@ -1,4 +1,4 @@
-//! Exitance by distance from where the light came in: the rings of a sensor.
+//! Exitance by the distance between entry and exit: the rings of a sensor.
 
 use std::f64::consts::PI;
 

@@ -11,9 +11,9 @@ use crate::results::record::CostMeasure;
 use crate::results::store::Stored;
 use crate::verify::comparisons::Row;
 
-/// Most lines of one plot: each has a colour of its own.
+/// Most lines of one plot: each has its own colour.
 const MOST_LINES: usize = COLOURS.len();
-/// Fewest numbers that make an axis of numbers.
+/// Fewest numbers that make a numeric axis.
 const FEWEST: usize = 3;
 
 /// A plot for each axis, pair of estimators and band.
@@ -44,7 +44,7 @@ pub(super) fn section(stored: &Stored, rows: &[Row]) -> Section {
     }
 }
 
-/// What a measure of cost is called, and its part of a file's name.
+/// The name of a measure of cost, and its part of a file name.
 fn words(cost: CostMeasure) -> (&'static str, &'static str) {
     match cost {
         CostMeasure::Cpu => ("CPU time", "cpu"),
@@ -61,18 +61,18 @@ fn axes(stored: &Stored) -> Vec<String> {
     names.into_iter().filter(varies).collect()
 }
 
-/// Where the labels of an axis stand in a plot.
+/// Places of the labels of an axis in a plot.
 struct Places {
-    /// What the numbers are, where they are some.
+    /// Label of the axis.
     what: String,
     /// Label -> place.
     at: BTreeMap<String, f64>,
-    /// Names of the places 0, 1, ..., where they are not numbers.
+    /// Names of the places 0, 1, ... of an axis of categories.
     names: Vec<String>,
 }
 
-/// The labels of an axis: as numbers where they are some, `albedo-0.5` among them, those of one word
-/// together; else by name in the order of the cells.
+/// The labels of an axis: as numbers where all labels have one (`0.2`, or `albedo-0.5`, grouped by word);
+/// else as categories in the order of the cells.
 fn places(stored: &Stored, axis: &str) -> Vec<Places> {
     let mut labels: Vec<&String> = Vec::new();
     for cell in &stored.record.cells {
@@ -184,7 +184,7 @@ fn lines(stored: &Stored, rows: &[&Row], axis: &str, places: &Places) -> Vec<Ser
             None => lines.push(Series { name, points: vec![point], style }),
         }
     }
-    // Marks of several lines at one name stand side by side.
+    // Marks of several lines in one category are placed side by side.
     let count = lines.len() as f64;
     for (number, line) in lines.iter_mut().enumerate() {
         line.points.sort_by(|a, b| a.x.total_cmp(&b.x));

@@ -7,10 +7,10 @@ use crate::report::plot::{Plot, panels, swatches};
 use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::{RecordFolder, Stored};
 
-/// One picture of one or more plots, one above the other.
+/// One picture of one or more plots below each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlotFigure {
-    /// Its files' stem under `plots/`, unique on its page.
+    /// Stem of its files under `plots/`, unique on its page.
     pub name: String,
     /// What it shows, in a few words.
     pub title: String,
@@ -34,11 +34,11 @@ pub enum Content {
 pub struct Section {
     /// The heading.
     pub heading: String,
-    /// What is said of all of them.
+    /// Text for all of them.
     pub text: String,
     /// The plots.
     pub drawn: Vec<PlotFigure>,
-    /// Whether they stand side by side.
+    /// Whether they are placed side by side.
     pub are_small: bool,
 }
 
@@ -60,7 +60,7 @@ impl Section {
         Ok(())
     }
 
-    /// What the page shows.
+    /// The blocks of the page.
     pub fn blocks(&self) -> Vec<PageBlock> {
         let mut blocks = vec![PageBlock::Heading(2, self.heading.clone())];
         if !self.text.is_empty() {
@@ -79,7 +79,7 @@ impl Section {
     }
 }
 
-/// Most plots of a section that are seen at once.
+/// With more plots a section is folded.
 const MOST_OPEN: usize = 12;
 
 impl PlotFigure {
@@ -114,12 +114,12 @@ pub(super) fn runs(cell: &Cell) -> impl Iterator<Item = &EstimatorRun> {
     cell.runs.iter().filter(|run| run.control_of.is_none())
 }
 
-/// Parts of a title that say something, joined.
+/// The parts of a title that are not empty, joined.
 pub(super) fn joined(parts: &[&str]) -> String {
     parts.iter().filter(|part| !part.is_empty()).copied().collect::<Vec<_>>().join(", ")
 }
 
-/// The name of a band in a title; nothing where there is only one.
+/// The name of a band in a title; empty if there is only one band.
 pub(super) fn band_name(stored: &Stored, band: usize) -> &str {
     if stored.record.bands.len() == 1 { "" } else { &stored.record.bands[band].name }
 }

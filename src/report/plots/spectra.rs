@@ -1,4 +1,4 @@
-//! Means by wavelength, and the colour that they give.
+//! Means by wavelength, and the resulting colour.
 
 use super::section::{Content, PlotFigure, Section, runs};
 use crate::report::number::with_error;

@@ -1,4 +1,4 @@
-//! False-colour maps: a number a pixel, as an index into a palette of 255 colours.
+//! False-colour maps: one number per pixel, as an index into a palette of 255 colours.
 
 use crate::math;
 use crate::results::image::{Picture, diverging};
@@ -9,7 +9,7 @@ pub(super) const Z_LIMIT: f64 = 4.0;
 pub(super) const NOISE_RANGE: (f64, f64) = (1e-3, 1.0);
 /// Relative differences are shown up to one of these.
 const LIMITS: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
-/// Part of the pixels that the range of differences holds.
+/// Fraction of the pixels within the range of differences.
 const SHOWN: f64 = 0.95;
 
 /// Index of a pixel that has no value.
@@ -91,7 +91,7 @@ fn sequential(x: f64) -> [u8; 3] {
     })
 }
 
-/// The colours of all indices as digits, six each: of noise, and of signed values.
+/// The colours of all indices as hexadecimal digits, six per colour: of noise, and of signed values.
 pub(super) fn palettes() -> [String; 2] {
     let grey = diverging(f64::NAN);
     let text = |colour: &dyn Fn(f64) -> [u8; 3]| {
