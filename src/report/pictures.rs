@@ -35,24 +35,35 @@ pub(super) fn write_figures(folder: &RecordFolder, stored: &Stored) -> Result<Ve
     let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
     let mut figures = Vec::new();
     for (index, cell) in stored.record.cells.iter().enumerate() {
-        for run in &cell.runs {
+        for (number, run) in cell.runs.iter().enumerate() {
             if let Some(picture) = Picture::of(stored, run) {
-                figures.push(write_figure(folder, stored, (index, cell), run, &picture, stops)?);
+                let stem = stem(index, number, &run.estimator);
+                figures.push(write_figure(folder, stored, cell, (run, stem), &picture, stops)?);
             }
         }
     }
     Ok(figures)
 }
 
+/// Path of a run's picture without extension: the estimator's name if it is plain, and otherwise the
+/// number of the run and the plain parts of the name.
+fn stem(cell: usize, run: usize, estimator: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+    if estimator.chars().all(is_plain) {
+        return format!("images/{cell:03}-{estimator}");
+    }
+    let words: Vec<&str> = estimator.split(|c| !is_plain(c)).filter(|word| !word.is_empty()).collect();
+    format!("images/{cell:03}-{run:03}.{}", words.join("-"))
+}
+
 fn write_figure(
     folder: &RecordFolder,
     stored: &Stored,
-    (index, cell): (usize, &Cell),
-    run: &EstimatorRun,
+    cell: &Cell,
+    (run, stem): (&EstimatorRun, String),
     picture: &Picture,
     stops: f64,
 ) -> Result<Figure> {
-    let stem = format!("images/{index:03}-{}", run.estimator);
     let path = |extension: &str| folder.root().join(format!("{stem}.{extension}"));
     atomic::create_folder(&folder.root().join("images"), "create the image folder")?;
     let attributes = [
