@@ -1,8 +1,8 @@
 //! scatterproof: a research testbed for light that enters a body through a refractive surface,
 //! scatters inside it, and leaves again.
 //!
-//! One TOML file is one experiment. It runs estimators per wavelength band and writes a record;
-//! a verification layer judges the record's claims, and reports are made from the record alone.
+//! One TOML file is one experiment. It runs estimators per wavelength band and writes a record; a
+//! verification layer judges the claims of the record, and reports are made from the record alone.
 //!
 //! # Two sides that never import each other
 //!
@@ -23,6 +23,8 @@
 //!
 //! # Words
 //!
+//! One word has one meaning, in code, files, tables and messages.
+//!
 //! | word | meaning |
 //! |---|---|
 //! | band | one wavelength interval with scalar optical properties; transport is scalar inside one band |
@@ -33,21 +35,32 @@
 //! | `mfp` | mean free path, `1 / sigma_t`, mm |
 //! | `mu` | cosine between propagation directions (phase functions) or to an axis (named so) |
 //! | `wo`, `wi` | unit directions, both away from the point: towards the sensor, towards the light |
+//! | transmittance | `exp(-sigma_t d)` |
+//! | `u` | uniform numbers in [0, 1) |
 //! | `pdf` | density per solid angle; other measures are named: `pdf_area`, `pdf_distance` |
 //! | weight | value over pdf of one sampling decision |
 //! | throughput | product of the weights along a path |
-//! | transmittance | `exp(-sigma_t d)` |
-//! | `u` | uniform numbers in [0, 1) |
 //! | technique | one way of drawing a sample |
+//! | sampler | a function from uniform numbers to samples, with the density that it claims |
 //! | estimator | techniques plus weights |
+//! | kind | what an entry of an experiment file is, by its name in a registry: `path`, `henyey_greenstein` |
+//! | skipped | of a light: not connected to by subdivision, and sampled by path tracing only |
+//! | cell | one point of an experiment's sweep, and nothing else |
+//! | observable | a pixel, the mean of a region or tile, a flux, each by transport class |
 //! | pass | one independent realisation of all observables of a cell: the unit of independence |
 //! | block | a fixed run of passes: the unit of scheduling and resuming; never enters a result |
 //! | batch | passes whose moments a record keeps together; set by the number of passes alone |
-//! | observable | a pixel, a region's or tile's mean, a flux, a transport class |
-//! | cell | one point of an experiment's sweep |
-//! | record | what a run writes |
+//! | run | all passes of one estimator in one cell, and what the record keeps of them |
+//! | arm | one of the runs that are timed side by side; the baseline has a second arm as a control |
+//! | campaign | all that one experiment plans and runs: cells with estimators, or samplers |
+//! | record | what a campaign writes |
+//! | re-run | to run a published experiment again and compare its record |
 //! | claim | what an experiment file says must hold |
-//! | verdict | what verification says of a claim: pass, fail, underpowered or invalid |
+//! | comparison | one test of a claim: one quantity against a value or another quantity |
+//! | verdict | the outcome of a comparison: pass, fail, underpowered or invalid |
+//! | look | one round of tests; what fails the first look is measured again for the second |
+//! | bin | a set of samples whose count a chi-square test compares with its expected mass |
+//! | gate | a check that a change must pass in continuous integration, and nothing else |
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -64,28 +77,28 @@ pub mod sampling;
 /// Fresnel, microfacets, boundaries, phase functions, media, spectra and materials.
 pub mod optics;
 
-/// Shapes, meshes and the border between f32 culling and f64 intersection.
+/// Shapes, meshes, and intersection: culling in f32, hits in f64.
 pub mod geometry;
 
 /// The immutable scene: body, lights, sensors.
 pub mod scene;
 
-/// The catalogue of samplers: what each draws, and the density that it claims to draw from.
+/// The catalogue of samplers: what each draws, and the density that it claims.
 pub mod samplers;
 
-/// The one open trait and the estimators, one file each.
+/// The trait of estimators, and the estimators, one file each.
 pub mod estimators;
 
-/// Oracles: a value and its stated error.
+/// Closed forms that tests compare with: a value and its stated error.
 pub mod reference;
 
-/// Moments, tests, multiplicity.
+/// Moments, hypothesis tests, multiple testing.
 pub mod stats;
 
 /// Records, provenance, the atomic store, images.
 pub mod results;
 
-/// Claims and records in, verdicts out.
+/// From claims and records to verdicts.
 pub mod verify;
 
 /// Tables and images for people.
@@ -97,5 +110,5 @@ pub mod experiment;
 /// Blocks, threads, checkpoints, ordered merge.
 pub mod run;
 
-/// The command line, one file a subcommand.
+/// The command line, one file per subcommand.
 pub mod cli;

@@ -243,7 +243,7 @@ fn plan_check_list_schema_completions() {
 fn init_run_verify_report() {
     let work = Work::new();
     work.run("init").exits(0).says("next: scatterproof run experiment.toml");
-    work.run("init").exits(2).complains("experiment.toml exists already").complains("name another file");
+    work.run("init").exits(2).complains("experiment.toml already exists").complains("name another file");
     work.run("init no/such/folder.toml").exits(3).complains("no/such/folder.toml");
     let ran = work.run("run experiment.toml --setting quick");
     ran.exits(0).says("report: results/furnace/report.html").says("\n 1.1  path");

@@ -160,7 +160,7 @@ fn efficiency_of_the_same_estimator_is_one() {
     }
     judged(&work, &format!("{names} --independent-pixels --seconds 1 --scale 1.2"))
         .exits(1)
-        .says("not compared, the means were not found equal");
+        .says("not compared, because the means were not found equal");
     judged(
         &work,
         "seed-0.exr seed-1.exr --independent-pixels --seconds seed-0.exr=1 --seconds seed-1.exr=2",

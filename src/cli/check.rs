@@ -8,15 +8,15 @@ use crate::error::{Error, Result};
 use crate::experiment::build::Builder;
 use crate::experiment::{LoadOptions, Loaded, Registry, load_any};
 
-/// Validate experiment files and say everything that is wrong with them.
+/// Validate experiment files and report all errors.
 ///
-/// Without `--setting`, every setting that a file offers is validated too.
+/// Without `--setting`, every setting of a file is validated too.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Experiment files.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Override a key, as `budget.passes=64` or `object.shape.sphere.radius_mm=2`; repeatable.
+    /// Override a key, such as `budget.passes=64` or `object.shape.sphere.radius_mm=2`; repeatable.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub sets: Vec<String>,
     /// Apply the overrides of `[setting.NAME]`.
@@ -24,7 +24,7 @@ pub struct Args {
     pub setting: Option<String>,
 }
 
-/// Checks every file, a line of output for each good one.
+/// Checks every file; prints one line for each valid one.
 ///
 /// # Errors
 /// The findings of all files together.

@@ -15,21 +15,22 @@ use crate::verify::junit;
 use crate::verify::timing_ratios::{self, TimingRatio, timing_ratios};
 use crate::verify::verdict::Verdict;
 
-/// Compare two records of one experiment: what was changed, and whether a mean differs.
+/// Compare two records of one experiment: what changed, and whether a mean differs.
 ///
-/// Says what differs between the two experiments, then compares every observable that both records hold,
-/// per cell, estimator and band: `identical` where every bit is the same, else by a t test (paired pass
-/// by pass where both played the same random numbers), all of them as one family at --level. Where both have
-/// efficiencies by CPU time it says whether these are compatible, which decides nothing: times are the machine's.
+/// Reports what differs between the two experiments, then compares every observable that both records
+/// hold, per cell, estimator and band: `identical` where every bit is the same, else by a t test (paired
+/// pass by pass where both used the same random numbers). All tests are one family at --level. If both
+/// records have efficiencies by CPU time, it reports whether these are compatible. This does not affect
+/// the exit code, because times depend on the machine.
 ///
-/// Exit code 0: no mean differs. 1: a mean differs, or the work per pass grew by more than --max-slowdown.
-/// 2: bad usage. 3: nothing can be compared, or the first observable of an estimator cannot be judged.
+/// --max-slowdown; 2 bad usage; 3 nothing can be compared, or the first observable of an estimator cannot
+/// be judged.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// The results folder to compare with, such as a baseline kept in git.
+    /// The reference: a results folder, such as a baseline kept in git.
     #[arg(value_name = "BEFORE")]
     before: PathBuf,
-    /// The results folder that is compared with it.
+    /// The results folder that is compared with BEFORE.
     #[arg(value_name = "AFTER")]
     after: PathBuf,
     /// Probability of any false alarm in the whole comparison.
@@ -39,19 +40,19 @@ pub struct Args {
     /// observable could go unseen.
     #[arg(long, value_name = "FRACTION", value_parser = super::positive)]
     detect: Option<f64>,
-    /// Also fail (exit code 1) where a counter of work per pass (paths, rays, events) grew by more than this
-    /// factor. Counters are exact and the same on every machine, where seconds are neither.
+    /// Also fail (exit code 1) where a counter of work per pass (paths, rays, events) grew by more than
+    /// this factor. Counters are exact and the same on every machine, where seconds are neither.
     #[arg(long, value_name = "FACTOR", value_parser = super::positive)]
     max_slowdown: Option<f64>,
     /// Write the verdicts as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// Print every verdict; without it those that are not green.
+    /// Print every verdict; default: only those that are not green.
     #[arg(long, short)]
     verbose: bool,
 }
 
-/// Compares, and says so.
+/// Compares the two records and prints the result.
 ///
 /// # Errors
 /// No record, a damaged one, nothing in common, I/O.
@@ -60,8 +61,7 @@ pub fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
     let (before, after) = (before?, after?);
     let terms = Terms { level: args.level, detect: args.detect, max_slowdown: args.max_slowdown };
     let compared = compare(&before, &after, &terms).ok_or_else(|| {
-        let words =
-            "nothing can be compared: no cell, estimator, observable and band is in both records";
+        let words = "nothing can be compared: the records share no cell, estimator, observable and band";
         Error::record(&args.after, words)
     })?;
     if let Some(path) = &args.junit {
@@ -80,7 +80,7 @@ pub fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
 
 fn tell(compared: &Compared, args: &Args, out: &mut impl Write) -> std::io::Result<()> {
     if !compared.changes.is_empty() {
-        writeln!(out, "not the same in the two records:")?;
+        writeln!(out, "differences between the two records:")?;
         compared.changes.iter().try_for_each(|change| writeln!(out, "  {change}"))?;
         writeln!(out)?;
     }
@@ -127,7 +127,7 @@ fn tell(compared: &Compared, args: &Args, out: &mut impl Write) -> std::io::Resu
     Ok(())
 }
 
-/// Whether efficiencies by CPU time came again; nothing where there are none.
+/// Whether efficiencies by CPU time are compatible; nothing where there are none.
 fn tell_timing(ratios: &[TimingRatio], out: &mut impl Write) -> std::io::Result<()> {
     let size = |ratio: &&TimingRatio| ratio.change.max(1.0 / ratio.change);
     let Some(largest) = ratios.iter().max_by(|a, b| size(a).total_cmp(&size(b))) else { return Ok(()) };

@@ -7,7 +7,8 @@ use clap_complete::Shell;
 
 use crate::error::{Error, Result};
 
-/// Print a completion script, as in `scatterproof completions bash > ~/.bash_completion.d/scatterproof`.
+/// Print a shell completion script, for example `scatterproof completions bash >
+/// ~/.bash_completion.d/scatterproof`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The shell.

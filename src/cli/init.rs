@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// A commented experiment with a known answer: light that nothing absorbs comes out again.
+/// A commented experiment with a known result: without absorption all light leaves the body.
 pub const EXAMPLE: &str = r#"# One file is one experiment. Keys carry units; `scatterproof schema` prints everything that a file
 # may say, `scatterproof check FILE` says what is wrong with it.
 
 name = "furnace"                # also its folder under results/
-description = "A sphere that absorbs nothing, in uniform light, cannot be told from the light."
+description = "A sphere without absorption in uniform light is indistinguishable from the light."
 seed = 2024                     # root of all random streams
 
 # Wavelength bands, each rendered by itself:
@@ -60,12 +60,12 @@ budget.passes = 8
 /// Write a commented example experiment.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Where to write it; an existing file is never overwritten.
+    /// The file to write; an existing file is never overwritten.
     #[arg(default_value = "experiment.toml", value_name = "FILE")]
     pub path: PathBuf,
 }
 
-/// Writes the example and says what to do next.
+/// Writes the example and prints the next step.
 ///
 /// # Errors
 /// The file exists, or it cannot be written.
@@ -73,7 +73,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<()> {
     let path = &args.path;
     let mut file = match OpenOptions::new().write(true).create_new(true).open(path) {
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-            let rule = format!("{} exists already", path.display());
+            let rule = format!("{} already exists", path.display());
             return Err(Error::input_help(rule, "name another file, or remove this one"));
         }
         opened => opened.map_err(Error::io(path, "create the example"))?,
@@ -100,6 +100,6 @@ mod tests {
             assert_eq!(experiment.cells.len(), 3);
         }
         let error = run(&args, &mut Vec::new()).expect_err("the file is there");
-        assert!(error.to_string().contains("exists already") && error.exit_code() == 2);
+        assert!(error.to_string().contains("already exists") && error.exit_code() == 2);
     }
 }

@@ -16,24 +16,26 @@ use crate::verify::foreign::{Answer, LEVEL, Map, Question, judge, run_of};
 use crate::verify::junit;
 use crate::verify::verdict::{self, Outcome, Verdict};
 
-/// z-scores of this size have the deepest colour.
+/// z-scores of this size have full colour.
 const Z_LIMIT: f64 = 5.0;
 
-/// Relative differences of this size have the deepest colour.
+/// Relative differences of this size have full colour.
 const RELATIVE_LIMIT: f64 = 0.1;
 
-/// Judge images that another renderer made of a scene, against a record of it.
+/// Test images of another renderer against a record of the same scene.
 ///
-/// IMAGES are OpenEXR files of the same scene, each with a seed of its own: linear radiance, the record's
-/// resolution, row 0 at the top, box filter. Tests the image mean, the 4 x 4 tiles and the squared bias of
-/// all pixels per band, with the errors of both sides, as one family at --level.
+/// IMAGES are OpenEXR files of the same scene, each rendered with a different seed: linear radiance,
+/// the resolution of the record, row 0 at the top, box filter. The tests cover the image mean, the 4 x
+/// 4 tiles and the squared bias of all pixels per band, use the errors of both sides, and are one
+/// family at
+/// --level.
 ///
 /// Without --independent-pixels a seed is one observation: two seeds have one degree of freedom and find
-/// nothing, eight and more are well spent. With it the pixels' spread is used, and two seeds will do.
+/// nothing; use eight or more. With it the spread of the pixels is used too, and two seeds suffice.
 ///
-/// Exit code 0: no bias found, and one of --detect of an image mean would have been. 1: a bias was found.
-/// 2: bad input. 3: such a bias could have gone unseen (underpowered), or the test would mean nothing
-/// (invalid).
+/// Exit codes: 0 no bias was found, and a bias of --detect of an image mean would have been found; 1 a
+/// bias was found; 2 bad input; 3 such a bias could have gone unseen (underpowered), or the test would
+/// be meaningless (invalid).
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// The images, two or more.
@@ -42,31 +44,31 @@ pub struct Args {
     /// The results folder that holds the record.
     #[arg(long, value_name = "DIR")]
     reference: PathBuf,
-    /// Label of the record's cell; needed where it has several.
+    /// Label of the cell; required if the record has several.
     #[arg(long, value_name = "LABEL")]
     cell: Option<String>,
-    /// The record's estimator; needed where the cell has several.
+    /// Estimator of the record; required if the cell has several.
     #[arg(long, value_name = "NAME")]
     estimator: Option<String>,
-    /// Transport class that the images hold. Of another than `all` the record has the image mean alone.
+    /// Transport class of the images. For classes other than `all` only the image mean is tested.
     #[arg(long, value_name = "CLASS", default_value = "all")]
     class: String,
-    /// Which channel is a band, where names do not say it; may be repeated.
+    /// Assign a channel to a band if the names do not tell; may be repeated.
     #[arg(long, value_name = "BAND=CHANNEL")]
     channel: Vec<String>,
     /// Factor from the images' unit to the record's.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = super::positive)]
     scale: f64,
-    /// CPU seconds of one image, or of each as FILE=SECONDS (repeated): compares the efficiency.
+    /// CPU seconds of one image, or of each as FILE=SECONDS (repeated); compares the efficiency.
     #[arg(long, value_name = "[FILE=]SECONDS")]
     seconds: Vec<String>,
-    /// Vouch that the noise of one pixel says nothing of another's: box filter, independent samples.
+    /// Assert that the noise of different pixels is independent: box filter, independent samples.
     #[arg(long)]
     independent_pixels: bool,
     /// Probability of any false alarm in the whole call.
     #[arg(long, value_name = "P", default_value_t = LEVEL, value_parser = super::probability)]
     level: f64,
-    /// The bias of an image mean that must not go unseen, as a fraction of it.
+    /// The bias of an image mean that must not go unseen, as a fraction of the mean.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = super::positive)]
     detect: f64,
     /// Write verdicts.csv, z-scores and relative differences (judge.exr, *.png) into this folder.
@@ -75,12 +77,12 @@ pub struct Args {
     /// Write the verdicts as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// Print every verdict; without it image means, pixels, and what is not green.
+    /// Print every verdict; default: image means, pixels, and verdicts that are not green.
     #[arg(long, short)]
     verbose: bool,
 }
 
-/// Judges the images, and says so.
+/// Judges the images and prints the result.
 ///
 /// # Errors
 /// Bad input, no record, I/O. A bias is no error: it is the exit code.
@@ -147,7 +149,7 @@ fn cell(stored: &Stored, label: Option<&str>) -> Result<usize> {
         None if cells.len() == 1 => Ok(0),
         None => Err(Error::input_help(
             format!("the record has {} cells", cells.len()),
-            format!("say which with --cell: {}", labels()),
+            format!("select one with --cell: {}", labels()),
         )),
         Some(label) => cells.iter().position(|c| plain(&c.label) == plain(label)).ok_or_else(|| {
             let rule = format!("the record has no cell `{label}`");
@@ -165,7 +167,7 @@ fn estimator(stored: &Stored, cell: usize, name: Option<&str>) -> Result<String>
             let names: Vec<&str> = runs.iter().map(|run| run.estimator.as_str()).collect();
             Err(Error::input_help(
                 format!("the record's cell has {} estimators", runs.len()),
-                format!("say which with --estimator: {}", names.join(", ")),
+                format!("select one with --estimator: {}", names.join(", ")),
             ))
         }
     }
@@ -218,7 +220,7 @@ fn cost(
     Ok(per_pass.map(|ours| ratios(stored, cell, run, planes, [theirs, ours * run.passes as f64])))
 }
 
-/// The pictures and the table.
+/// Writes the pictures and the table.
 fn write_views(folder: &Path, answer: &Answer, planes: &Planes) -> Result<()> {
     atomic::create_folder(folder, "create the folder")?;
     let csv = verdict::to_csv(&answer.verdicts);
@@ -289,19 +291,19 @@ fn tell(
         return Ok(());
     }
     let Some(cost) = cost else {
-        return writeln!(out, "efficiency: the record has no timing beside it");
+        return writeln!(out, "efficiency: there is no timing for the record");
     };
     cost.iter().try_for_each(|ratio| writeln!(out, "{}", efficiency(ratio, verdicts)))
 }
 
-/// What is said of one band's efficiency: nothing where the image means were not found equal, as the
-/// cheaper of two different things is no gain.
+/// The efficiency of one band as text; no ratio where the image means were not found equal, because the
+/// two sides then estimate different things.
 fn efficiency(ratio: &Ratio, verdicts: &[Verdict]) -> String {
     let head = format!("efficiency, band {}: ", ratio.band);
     let own = || verdicts.iter().filter(|v| v.band == ratio.band);
     let is_equal = own().any(|v| v.observable == "mean" && v.is_green());
     if !is_equal || own().any(|v| v.outcome == Outcome::Fail) {
-        return head + "not compared, the means were not found equal";
+        return head + "not compared, because the means were not found equal";
     }
     let number = |x: f64| significant(x, 3);
     let [low, high] = ratio.interval.map(number);

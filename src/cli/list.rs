@@ -11,10 +11,10 @@ use crate::experiment::schema_json::json_schema;
 use crate::experiment::validate::grammar::{Form, Grammar, doc, keys};
 use crate::optics::{dispersion, materials};
 
-/// Name what an experiment file may use: estimators, materials, shapes and more.
+/// List what an experiment file may use: estimators, materials, shapes and more.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Only this; everything without it.
+    /// The topic; default: all topics.
     pub topic: Option<Topic>,
 }
 
@@ -88,7 +88,8 @@ fn lines(topic: Topic, registry: &Registry) -> String {
         Topic::Lights => kinds(&["light", "0"]),
         Topic::Budgets => schema(&["budget"]),
         Topic::Claims => {
-            let of_samplers = "what the claim on samplers is, in an experiment on samplers";
+            let of_samplers =
+                "the claim of an experiment on samplers: samplers draw from their densities";
             kinds(&["claim", "0"]) + &table(&[("sampler".into(), of_samplers.into())])
         }
     }

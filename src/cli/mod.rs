@@ -24,11 +24,11 @@ use crate::experiment::registry::Registry;
 
 /// A research testbed for subsurface scattering: estimators with statistical proof.
 ///
-/// One TOML file is one experiment. `run` plays it and writes a record under results/; `verify` judges
-/// the claims that the file makes; `report` makes tables and images from the record alone.
+/// One TOML file is one experiment. `run` executes it and writes a record under results/; `verify`
+/// judges the claims of the file; `report` makes tables and images from the record alone.
 ///
-/// Exit codes: 0 all well, 1 a claim failed, 2 bad input or usage, 3 underpowered or invalid claim or
-/// I/O failure, 130 interrupted (what is done is kept; the same command goes on).
+/// Exit codes: 0 success, 1 a claim failed, 2 bad input or usage, 3 underpowered or invalid claim or
+/// I/O failure, 130 interrupted (completed work is kept; the same command resumes).
 #[derive(Parser)]
 #[command(name = "scatterproof", version, about, long_about)]
 struct Command {
@@ -54,7 +54,7 @@ enum Action {
 /// How an experiment file is read.
 #[derive(Args, Clone, Debug)]
 pub struct Reading {
-    /// Override a value: a dotted key and a TOML value, as `object.boundary.rough.alpha=0.1`.
+    /// Override a value: a dotted key and a TOML value, such as `object.boundary.rough.alpha=0.1`.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Use the overrides of `[setting.NAME]` in the file.
@@ -71,16 +71,16 @@ impl Reading {
 /// How work is carried out; nothing here changes a result.
 #[derive(Args, Clone, Debug)]
 pub struct Working {
-    /// Folder that receives a folder per experiment.
+    /// Folder for the results, one subfolder per experiment.
     #[arg(long, value_name = "DIR", default_value = "results")]
     out: PathBuf,
-    /// Number of threads; all cores without it.
+    /// Number of threads; default: all cores.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     /// No progress bar.
     #[arg(long, short)]
     quiet: bool,
-    /// Passes per block; chosen by time without it. For tests: results do not depend on it.
+    /// Passes per block; by default chosen by time. For tests: results do not depend on it.
     #[arg(long, value_name = "N", hide = true, value_parser = clap::value_parser!(u64).range(1..))]
     block_passes: Option<u64>,
 }
@@ -97,13 +97,13 @@ impl Working {
     }
 }
 
-/// Reads the process's arguments, does what they say with the estimators of `registry`, prints errors,
-/// and returns the exit code: all that a program of one's own needs.
+/// Reads the arguments of the process, runs the subcommand with the estimators of `registry`, prints
+/// errors, and returns the exit code: all that your own program needs.
 pub fn main(registry: &Registry) -> ExitCode {
     main_with(registry, std::env::args_os())
 }
 
-/// [`main`] with these arguments, the first of them the program's name.
+/// [`main`] with the given arguments; the first is the name of the program.
 pub fn main_with(registry: &Registry, arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let program = arguments.first().and_then(|path| Path::new(path).file_stem()?.to_str());

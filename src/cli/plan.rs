@@ -11,7 +11,7 @@ use crate::report::table::Table;
 use crate::run::memory::{available, readable};
 use crate::run::{self, estimate_seconds};
 
-/// Show what would run: cells, estimated cost and memory, and where each value comes from.
+/// Show what would run: cells, estimated time and memory, and where each value comes from.
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// An experiment file.
@@ -19,10 +19,10 @@ pub struct Args {
     file: PathBuf,
     #[command(flatten)]
     reading: Reading,
-    /// Number of threads that the estimate assumes; all cores without it.
+    /// Number of threads that the estimate assumes; default: all cores.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Do not play the few passes that the estimate of time rests on.
+    /// Do not run the few passes that the estimate of time is based on.
     #[arg(long)]
     dry: bool,
 }

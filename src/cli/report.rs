@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::report;
 use crate::results::store::RecordFolder;
 
-/// Make tables, images and pages again, from records alone.
+/// Make tables, images and pages again from records alone.
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// Results folders.

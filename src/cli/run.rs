@@ -11,9 +11,9 @@ use crate::report::{self, terminal};
 use crate::run::live::Live;
 use crate::run::tev::Address;
 
-/// Run experiments: progress on a terminal, then a table and the place of the report.
+/// Run experiments; print progress, then a table and the path of the report.
 ///
-/// A run that was stopped goes on where it was; a run that is complete is not repeated.
+/// An interrupted run resumes where it stopped; a complete run is not repeated.
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// Experiment files.
@@ -23,12 +23,12 @@ pub struct Args {
     reading: Reading,
     #[command(flatten)]
     working: Working,
-    /// Play as many passes as the record in DIR/NAME has, instead of what the budget pays for: a record whose budget is in
-    /// seconds comes again bit for bit.
+    /// Run as many passes as the record in DIR/NAME has, instead of those that the budget allows: a
+    /// record whose budget is in seconds reproduces bit for bit.
     #[arg(long, value_name = "DIR")]
     passes_of: Option<PathBuf>,
-    /// Show images in tev, a viewer that is running, while they are made; it listens at 127.0.0.1:14158 unless
-    /// told otherwise. Results do not depend on it.
+    /// Show images in a running tev viewer while they are rendered; default address 127.0.0.1:14158.
+    /// Results do not depend on it.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = Address::USUAL)]
     tev: Option<Address>,
 }

@@ -7,11 +7,11 @@ use crate::error::{Error, Result};
 use crate::experiment::Registry;
 use crate::experiment::schema_json::any_schema;
 
-/// Print the JSON Schema of experiment files, from which editors complete and check.
+/// Print the JSON Schema of experiment files, for completion and checks in editors.
 #[derive(Debug, clap::Args)]
 pub struct Args {}
 
-/// Prints the schema, the registered estimators and samplers in it.
+/// Prints the schema with the registered estimators and samplers.
 ///
 /// # Errors
 /// The output cannot be written.

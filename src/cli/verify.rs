@@ -18,12 +18,12 @@ use crate::verify::levels::{FAMILY_LEVEL, FIRST_LOOK, RETEST_FACTOR};
 use crate::verify::nights::Nights;
 use crate::verify::verdict::{self, Verdict};
 
-/// Judge the claims of experiments; runs what has no record yet.
+/// Judge the claims of experiments; run what has no record yet.
 ///
 /// All claims named in one call are one family: the probability that any of them fails by chance is at
-/// most 1e-6. What fails a first look is measured again on fresh streams with 4 times the passes.
+/// most 1e-6. A test that fails at the first look is repeated on fresh streams with 4 times the passes.
 ///
-/// Exit code 0: every claim is green. 1: a claim failed. 3: a claim is underpowered or invalid.
+/// Exit codes: 0 every claim is green; 1 a claim failed; 3 a claim is underpowered or invalid.
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// Experiment files, folders of them, or results folders (judged as they are).
@@ -33,12 +33,12 @@ pub struct Args {
     reading: Reading,
     #[command(flatten)]
     working: Working,
-    /// Play all streams anew, named by TOKEN (the date and the commit without it; the same TOKEN plays the
-    /// same streams again); results go to `fresh/` under the results folder.
+    /// Use fresh streams named by TOKEN (default: the date and the commit; the same TOKEN gives the same
+    /// streams); results go to `fresh/` under the results folder.
     #[arg(long, value_name = "TOKEN", num_args = 0..=1, default_missing_value = "")]
     fresh_seed: Option<String>,
-    /// With --fresh-seed: the file in which evidence adds up over nights (`evidence.json` in the folder of
-    /// fresh results without it).
+    /// With --fresh-seed: the file that accumulates evidence over nights; default: `evidence.json` in
+    /// the folder of fresh results.
     #[arg(long, value_name = "FILE", requires = "fresh_seed")]
     evidence: Option<PathBuf>,
     /// Write the verdicts as JUnit XML.
@@ -53,7 +53,7 @@ pub struct Args {
     /// Write the verdicts as a Markdown table.
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
-    /// Print every verdict; without it those that are not green and the tables' summaries.
+    /// Print every verdict; default: those that are not green and the summaries of tables.
     #[arg(long, short)]
     verbose: bool,
 }

@@ -161,8 +161,8 @@ impl BssrdfScene {
             .filter(|_| self.eta.iter().any(|&eta| eta != 1.0))
             .map(|light| {
                 format!(
-                    "surface reflections of directional light `{}` by the smooth boundary, and what goes straight \
-                     through, are missing (exactly 0), not dark",
+                    "surface reflections of directional light `{}` by the smooth boundary, and its light straight \
+                     through, are excluded from this estimator's result (exactly 0)",
                     light.name
                 )
             })

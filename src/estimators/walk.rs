@@ -640,8 +640,8 @@ pub(super) fn unscattered_notes(scene: &Scene) -> impl Iterator<Item = String> {
     let parallel = scene.lights.iter().filter(move |light| light.is_directional() && is_matched);
     parallel.map(|light| {
         format!(
-            "no path from a sensor follows directional light `{}` straight through the matched body: what is not \
-             scattered, class surface, is missing (not dark)",
+            "no path from a sensor follows directional light `{}` straight through the matched body: unscattered \
+             light (class surface) is excluded from this estimator's result",
             light.name
         )
     })

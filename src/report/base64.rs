@@ -1,8 +1,8 @@
-//! Bytes as text, for data URIs (RFC 4648, section 4).
+//! Base64, for data URIs (RFC 4648, section 4).
 
 const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// Three bytes become four letters of six bits; the last group is filled up with `=`.
+/// Three bytes become four letters of six bits; the last group is padded with `=`.
 pub(super) fn encode(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for group in bytes.chunks(3) {

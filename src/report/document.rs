@@ -1,7 +1,6 @@
 //! A page as blocks: one content, written as Markdown here and as HTML in `html`.
 
 use super::table::Table;
-use super::viewer::Viewer;
 
 /// A page.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -9,36 +8,36 @@ pub struct Document {
     /// Its title.
     pub title: String,
     /// Its blocks, from the top.
-    pub blocks: Vec<Block>,
+    pub blocks: Vec<PageBlock>,
 }
 
 /// A part of a page.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Block {
+pub enum PageBlock {
     /// A heading of level 2 or 3.
     Heading(u8, String),
     /// A paragraph of plain text.
     Text(String),
     /// Plain items.
     List(Vec<String>),
-    /// Lines as they are: a command.
+    /// Preformatted lines, such as a command.
     Code(String),
-    /// A table that can be taken elsewhere.
+    /// A table with its name and caption.
     Table(TableBlock),
-    /// Pictures that stand side by side.
+    /// Pictures side by side.
     Figures(Vec<FigureBlock>),
-    /// One picture over the width of the page.
+    /// One picture as wide as the page.
     Wide(FigureBlock),
-    /// The pictures of a cell, to be compared.
-    Viewer(Viewer),
-    /// What is opened on demand: its title, and what it holds.
-    Folded(String, Vec<Block>),
+    /// A viewer that compares the pictures of a cell.
+    Viewer(ViewerBlock),
+    /// Folded blocks under a title.
+    Folded(String, Vec<PageBlock>),
 }
 
-/// A table with what it takes to stand elsewhere.
+/// A table that can be used outside the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableBlock {
-    /// Unique on its page, and its files' stem under `tables/`: lower-case words joined by `-`.
+    /// Unique on its page; the stem of its files under `tables/`: lower-case words joined by `-`.
     pub name: String,
     /// What it shows and how to read it, in one or two sentences.
     pub caption: String,
@@ -55,7 +54,7 @@ impl TableBlock {
 
 /// The file of a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Picture {
+pub enum PictureFile {
     /// PNG.
     Png(Vec<u8>),
     /// SVG.
@@ -68,21 +67,32 @@ pub struct FigureBlock {
     /// Path relative to the page.
     pub path: String,
     /// What is shown.
-    pub picture: Picture,
+    pub picture: PictureFile,
     /// What it is, in a few words.
     pub title: String,
     /// What it shows.
     pub caption: String,
 }
 
+/// The pictures of one cell, in a viewer that compares them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ViewerBlock {
+    /// The cell's label; empty without a sweep.
+    pub cell: String,
+    /// One tone-mapped PNG per estimator; none where the page shows them above.
+    pub figures: Vec<FigureBlock>,
+    /// The input of the page's script, as JSON; none where the page has no more room.
+    pub data: Option<String>,
+}
+
 impl Document {
-    /// Every table that has a column, in the order of the page.
+    /// Every table that has columns, in the order of the page.
     pub fn tables(&self) -> Vec<&TableBlock> {
-        fn inside<'a>(blocks: &'a [Block], tables: &mut Vec<&'a TableBlock>) {
+        fn inside<'a>(blocks: &'a [PageBlock], tables: &mut Vec<&'a TableBlock>) {
             for block in blocks {
                 match block {
-                    Block::Table(table) if !table.table.header.is_empty() => tables.push(table),
-                    Block::Folded(_, blocks) => inside(blocks, tables),
+                    PageBlock::Table(table) if !table.table.header.is_empty() => tables.push(table),
+                    PageBlock::Folded(_, blocks) => inside(blocks, tables),
                     _ => (),
                 }
             }
@@ -92,32 +102,32 @@ impl Document {
         tables
     }
 
-    /// The page as Markdown; pictures stand beside it.
+    /// The page as Markdown; pictures are separate files.
     pub fn to_markdown(&self) -> String {
         let blocks: String = self.blocks.iter().map(|block| format!("\n{}", markdown(block))).collect();
         format!("# {}\n{blocks}", self.title)
     }
 }
 
-/// A text as the name of a file or a place on a page: ASCII letters and digits, else `-`.
+/// A text as a file name or an anchor: ASCII letters and digits in lower case, else `-`.
 pub fn slug(text: &str) -> String {
     let letters =
         text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
     letters.collect()
 }
 
-fn markdown(block: &Block) -> String {
+fn markdown(block: &PageBlock) -> String {
     match block {
-        Block::Heading(level, text) => format!("{} {text}\n", "#".repeat(usize::from(*level))),
-        Block::Text(text) => format!("{text}\n"),
-        Block::List(items) => items.iter().map(|item| format!("- {item}\n")).collect(),
-        Block::Code(code) => format!("```\n{code}\n```\n"),
-        Block::Table(t) if t.caption.is_empty() => t.table.to_markdown(),
-        Block::Table(t) => format!("{}\n\n{}", t.caption, t.table.to_markdown()),
-        Block::Figures(figures) => each(figures),
-        Block::Wide(f) => figure(f),
-        Block::Viewer(viewer) => each(&viewer.figures),
-        Block::Folded(title, blocks) => {
+        PageBlock::Heading(level, text) => format!("{} {text}\n", "#".repeat(usize::from(*level))),
+        PageBlock::Text(text) => format!("{text}\n"),
+        PageBlock::List(items) => items.iter().map(|item| format!("- {item}\n")).collect(),
+        PageBlock::Code(code) => format!("```\n{code}\n```\n"),
+        PageBlock::Table(t) if t.caption.is_empty() => t.table.to_markdown(),
+        PageBlock::Table(t) => format!("{}\n\n{}", t.caption, t.table.to_markdown()),
+        PageBlock::Figures(figures) => each(figures),
+        PageBlock::Wide(f) => figure(f),
+        PageBlock::Viewer(viewer) => each(&viewer.figures),
+        PageBlock::Folded(title, blocks) => {
             let blocks: Vec<String> = blocks.iter().map(markdown).collect();
             format!("**{title}**\n\n{}", blocks.join("\n"))
         }

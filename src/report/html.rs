@@ -1,17 +1,19 @@
 //! The page as one HTML file: no network, pictures as data URIs, light and dark, readable on a phone.
 
 use super::base64;
-use super::document::{Block, Document, FigureBlock, Picture, TableBlock, slug};
+use super::document::{Document, FigureBlock, PageBlock, PictureFile, TableBlock, slug};
 use super::latex::to_latex;
+use super::markup::escape;
 use super::viewer;
 
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// Most rows of a table that carries its sources with it; longer ones have them in files beside the page.
+/// Most rows of a table whose LaTeX, Markdown and CSV are part of the page; those of longer tables are
+/// in files only.
 const CARRIED_ROWS: usize = 200;
 
-/// The page as a file of its own.
+/// The page as one file.
 pub fn to_html(page: &Document) -> String {
     let title = escape(&page.title);
     let body: String = page.blocks.iter().map(block).collect();
@@ -28,7 +30,9 @@ pub fn to_html(page: &Document) -> String {
 /// Links to the sections, where there are several.
 fn contents(page: &Document) -> String {
     let headings = page.blocks.iter().filter_map(|block| match block {
-        Block::Heading(2, text) => Some(format!("<a href=\"#{}\">{}</a>\n", slug(text), escape(text))),
+        PageBlock::Heading(2, text) => {
+            Some(format!("<a href=\"#{}\">{}</a>\n", slug(text), escape(text)))
+        }
         _ => None,
     });
     let links: Vec<String> = headings.collect();
@@ -38,25 +42,25 @@ fn contents(page: &Document) -> String {
     }
 }
 
-fn block(of: &Block) -> String {
+fn block(of: &PageBlock) -> String {
     match of {
-        Block::Heading(2, text) => format!("<h2 id=\"{}\">{}</h2>\n", slug(text), escape(text)),
-        Block::Heading(level, text) => format!("<h{level}>{}</h{level}>\n", escape(text)),
-        Block::Text(text) => format!("<p>{}</p>\n", inline(text)),
-        Block::List(items) => {
+        PageBlock::Heading(2, text) => format!("<h2 id=\"{}\">{}</h2>\n", slug(text), escape(text)),
+        PageBlock::Heading(level, text) => format!("<h{level}>{}</h{level}>\n", escape(text)),
+        PageBlock::Text(text) => format!("<p>{}</p>\n", inline(text)),
+        PageBlock::List(items) => {
             let items: String =
                 items.iter().map(|item| format!("<li>{}</li>\n", inline(item))).collect();
             format!("<ul>\n{items}</ul>\n")
         }
-        Block::Code(code) => format!("<pre tabindex=\"0\">{}</pre>\n", escape(code)),
-        Block::Table(t) => table(t),
-        Block::Viewer(viewer) => viewer::to_html(viewer),
-        Block::Folded(title, blocks) => {
+        PageBlock::Code(code) => format!("<pre tabindex=\"0\">{}</pre>\n", escape(code)),
+        PageBlock::Table(t) => table(t),
+        PageBlock::Viewer(viewer) => viewer::to_html(viewer),
+        PageBlock::Folded(title, blocks) => {
             let inner: String = blocks.iter().map(block).collect();
             format!("<details>\n<summary>{}</summary>\n{inner}</details>\n", escape(title))
         }
-        Block::Wide(f) => format!("<div class=\"wide\">\n{}</div>\n", figure(f)),
-        Block::Figures(f) => figures(f),
+        PageBlock::Wide(f) => format!("<div class=\"wide\">\n{}</div>\n", figure(f)),
+        PageBlock::Figures(f) => figures(f),
     }
 }
 
@@ -64,7 +68,7 @@ fn figures(figures: &[FigureBlock]) -> String {
     format!("<div class=\"figures\">\n{}</div>\n", figures.iter().map(figure).collect::<String>())
 }
 
-/// A table with its caption, and what it takes to stand in a paper, a spreadsheet or a page.
+/// A table with its caption, and its text for a paper, a spreadsheet or a page.
 fn table(of: &TableBlock) -> String {
     let TableBlock { name, caption, table } = of;
     if table.header.is_empty() {
@@ -94,7 +98,7 @@ fn table(of: &TableBlock) -> String {
     )
 }
 
-/// The table as LaTeX, Markdown and CSV, to be copied.
+/// The table as LaTeX, Markdown and CSV, for copying.
 fn sources(of: &TableBlock) -> String {
     let TableBlock { name, caption, table } = of;
     let files = format!("tables/{name}.tex, .md, .csv");
@@ -118,7 +122,7 @@ fn sources(of: &TableBlock) -> String {
     )
 }
 
-/// A field; outcomes are coloured, and still say in words what they are.
+/// A field; outcomes are words in colour.
 fn field(text: &str) -> String {
     match text {
         "pass" | "fail" | "underpowered" | "invalid" => format!("<span class=\"{text}\">{text}</span>"),
@@ -129,11 +133,11 @@ fn field(text: &str) -> String {
 fn figure(f: &FigureBlock) -> String {
     let title = escape(&f.title);
     let picture = match &f.picture {
-        Picture::Png(png) => {
+        PictureFile::Png(png) => {
             format!("<img alt=\"{title}\" src=\"data:image/png;base64,{}\">", base64::encode(png))
         }
-        // In a page the name space goes without saying.
-        Picture::Svg(svg) => svg.replace(" xmlns=\"http://www.w3.org/2000/svg\"", ""),
+        // Inside an HTML page the name space is implied.
+        PictureFile::Svg(svg) => svg.replace(" xmlns=\"http://www.w3.org/2000/svg\"", ""),
     };
     let caption = inline(&f.caption);
     format!("<figure>{picture}<figcaption><b>{title}</b> {caption}</figcaption></figure>\n")
@@ -149,11 +153,6 @@ fn inline(text: &str) -> String {
     parts.map(part).collect()
 }
 
-/// Text as HTML shows it, in elements and in attributes.
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,9 +162,12 @@ mod tests {
         let mut table = Table::new(&["cell", "ratio"]);
         (0..rows).for_each(|_| table.push(vec!["a&b".into(), "1.2 [1.1, 1.3]".into()]));
         let blocks = vec![
-            Block::Heading(2, "How fast?".into()),
-            Block::Folded("More".into(), vec![Block::Table(TableBlock::new("speed", "Speed.", table))]),
-            Block::Heading(2, "Cost".into()),
+            PageBlock::Heading(2, "How fast?".into()),
+            PageBlock::Folded(
+                "More".into(),
+                vec![PageBlock::Table(TableBlock::new("speed", "Speed.", table))],
+            ),
+            PageBlock::Heading(2, "Cost".into()),
         ];
         to_html(&Document { title: "x".into(), blocks })
     }

@@ -1,6 +1,6 @@
 //! Tables for papers: LaTeX with booktabs, and longtable where a page may not hold them.
 
-use super::document::{Block, Document, FigureBlock, Picture};
+use super::document::{Document, FigureBlock, PageBlock, PictureFile};
 use super::table::Table;
 
 const PREAMBLE: &str = "% pdflatex report.tex, in its own folder. Plots are SVG, and what the page folds away is long: both stand in files.
@@ -12,55 +12,55 @@ const PREAMBLE: &str = "% pdflatex report.tex, in its own folder. Plots are SVG,
 \\begin{document}
 ";
 
-/// The page as a LaTeX document: what is open on the page, nothing of it afloat.
+/// The page as a LaTeX document: the blocks that are not folded, without floats.
 pub fn to_document(page: &Document) -> String {
     let body: String = page.blocks.iter().map(block).collect();
     let title = escaped(&page.title);
     format!("{PREAMBLE}\\begin{{center}}\\Large {title}\\end{{center}}\n{body}\\end{{document}}\n")
 }
 
-fn block(of: &Block) -> String {
+fn block(of: &PageBlock) -> String {
     match of {
-        Block::Heading(2, text) => format!("\n\\section*{{{}}}\n", escaped(text)),
-        Block::Heading(_, text) => format!("\n\\subsection*{{{}}}\n", escaped(text)),
-        Block::Text(text) => format!("{}\n\n", escaped(text)),
-        Block::List(items) => {
+        PageBlock::Heading(2, text) => format!("\n\\section*{{{}}}\n", escaped(text)),
+        PageBlock::Heading(_, text) => format!("\n\\subsection*{{{}}}\n", escaped(text)),
+        PageBlock::Text(text) => format!("{}\n\n", escaped(text)),
+        PageBlock::List(items) => {
             let item = |item: &String| format!("  \\item {}\n", escaped(item));
             let items: String = items.iter().map(item).collect();
             format!("\\begin{{itemize}}\n{items}\\end{{itemize}}\n")
         }
-        Block::Code(code) => format!("\\begin{{verbatim}}\n{code}\n\\end{{verbatim}}\n"),
-        Block::Table(t) => format!("{{\\scriptsize\n{}}}\n", long(&t.table, &t.name, &t.caption)),
-        Block::Figures(figures) => figures.iter().map(figure).collect(),
-        Block::Wide(f) => figure(f),
-        Block::Viewer(viewer) => viewer.figures.iter().map(figure).collect(),
-        Block::Folded(title, _) => format!("{} is not printed here.\n\n", escaped(title)),
+        PageBlock::Code(code) => format!("\\begin{{verbatim}}\n{code}\n\\end{{verbatim}}\n"),
+        PageBlock::Table(t) => format!("{{\\scriptsize\n{}}}\n", long(&t.table, &t.name, &t.caption)),
+        PageBlock::Figures(figures) => figures.iter().map(figure).collect(),
+        PageBlock::Wide(f) => figure(f),
+        PageBlock::Viewer(viewer) => viewer.figures.iter().map(figure).collect(),
+        PageBlock::Folded(title, _) => format!("{} is not printed here.\n\n", escaped(title)),
     }
 }
 
 fn figure(f: &FigureBlock) -> String {
     let words = format!("\\textbf{{{}}} {}", escaped(&f.title), escaped(&f.caption));
     match f.picture {
-        Picture::Png(_) => {
+        PictureFile::Png(_) => {
             let picture = format!("\\includegraphics[width=\\linewidth]{{{}}}", f.path);
             format!(
                 "\\begin{{minipage}}{{.3\\linewidth}}\\small\n{picture}\\\\\n{words}\n\\end{{minipage}}\\hfill\n"
             )
         }
-        Picture::Svg(_) => String::new(),
+        PictureFile::Svg(_) => String::new(),
     }
 }
 
 /// Most rows of a table that floats.
 const FLOATS: usize = 40;
 
-/// A table with its caption. Needs `\usepackage{booktabs}`, and `\usepackage{longtable}` where there are more than
-/// 40 rows.
+/// A table with its caption. Needs `\usepackage{booktabs}`, and `\usepackage{longtable}` where there
+/// are more than 40 rows.
 pub fn to_latex(table: &Table, name: &str, caption: &str) -> String {
     if table.rows.len() > FLOATS {
         return long(table, name, caption);
     }
-    let Some(Parts { columns, header, rows, caption }) = parts(table, name, caption) else {
+    let Some(TabularParts { columns, header, rows, caption }) = parts(table, name, caption) else {
         return String::new();
     };
     format!(
@@ -71,7 +71,7 @@ pub fn to_latex(table: &Table, name: &str, caption: &str) -> String {
 
 /// A table that may run over pages.
 fn long(table: &Table, name: &str, caption: &str) -> String {
-    let Some(Parts { columns, header, rows, caption }) = parts(table, name, caption) else {
+    let Some(TabularParts { columns, header, rows, caption }) = parts(table, name, caption) else {
         return String::new();
     };
     let caption = if caption.is_empty() { caption } else { format!("  {} \\\\\n", caption.trim_end()) };
@@ -80,16 +80,16 @@ fn long(table: &Table, name: &str, caption: &str) -> String {
     )
 }
 
-/// What both kinds of table are made of.
-struct Parts {
+/// The parts of a LaTeX table, floating or long.
+struct TabularParts {
     columns: String,
     header: String,
     rows: String,
     caption: String,
 }
 
-/// Nothing of a table without columns.
-fn parts(table: &Table, name: &str, caption: &str) -> Option<Parts> {
+/// None for a table without columns.
+fn parts(table: &Table, name: &str, caption: &str) -> Option<TabularParts> {
     if table.header.is_empty() {
         return None;
     }
@@ -98,7 +98,7 @@ fn parts(table: &Table, name: &str, caption: &str) -> Option<Parts> {
         format!("  {} \\\\\n", fields.join(" & "))
     };
     let columns = (0..table.header.len()).map(|column| if table.is_numeric(column) { 'r' } else { 'l' });
-    Some(Parts {
+    Some(TabularParts {
         columns: columns.collect(),
         header: format!("  \\toprule\n{}  \\midrule\n", row(&table.header)),
         rows: table.rows.iter().map(row).collect(),
@@ -139,7 +139,7 @@ pub fn escaped(text: &str) -> String {
     latex
 }
 
-/// The length of `-1.5(2)e-7` at the start of a text, where there is one that needs setting.
+/// The length of a number such as `-1.5(2)e-7` at the start of a text, if it has to be set as mathematics.
 fn number_length(text: &str) -> Option<usize> {
     let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
     let sign = usize::from(text.starts_with(['-', '+']));

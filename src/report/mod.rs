@@ -1,96 +1,60 @@
-//! Tables and images for people, made from a record and its timing alone, again at will.
+//! Tables and images for people, made from a record and its timing alone; they can be made again at any
+//! time.
 
 use serde_json::{Value, json};
 
+use self::data::ReportData;
 use crate::error::Result;
-use crate::results::exr_file::write_exr;
-use crate::results::image::{Picture, write_png};
-use crate::results::measurements::{self, Measurement, measurements};
-use crate::results::provenance::Provenance;
-use crate::results::record::{Cell, EstimatorRun};
+use crate::results::json::canonical;
+use crate::results::measurements::{self, measurements};
 use crate::results::store::{RecordFolder, Stored};
-use crate::results::timing::Timing;
-use crate::results::{atomic, json::canonical};
 use crate::verify::comparisons;
 use crate::verify::judge::{Case, Looks, judge};
-use crate::verify::model_errors::{self, ModelError, model_errors};
+use crate::verify::model_errors::{self, model_errors};
 use crate::verify::verdict::{self, Verdict};
 
-/// Bytes as text, for data URIs.
+/// Base64, for data URIs.
 mod base64;
+/// What the views are made from.
+pub mod data;
 /// A page as blocks, in Markdown.
 pub mod document;
 /// The same page as HTML.
 pub mod html;
 /// Tables for papers.
 pub mod latex;
+/// Text as HTML shows it.
+mod markup;
 /// Numbers with their uncertainty.
 pub mod number;
-/// What the page says.
+/// The content of the page.
 mod page;
+/// The pictures of runs.
+pub mod pictures;
 /// Plots as SVG.
 pub mod plot;
 /// The plots of a record.
 pub mod plots;
-/// Two estimators in one picture.
+/// Split pictures: two estimators in one picture.
 pub mod split;
-/// The tables that a text quotes.
+/// Tables that papers quote: a row per cell and band.
 pub mod summary;
 /// Aligned text, Markdown and CSV.
 pub mod table;
-/// The tables that everybody wants.
+/// Tables of claims, verdicts, measurements, efficiencies and model errors.
 pub mod tables;
-/// For the terminal.
+/// Tables for the terminal.
 pub mod terminal;
-/// How the tests were tested.
+/// How the tests themselves were tested.
 mod trust;
-/// Pictures to be compared.
+/// Viewers that compare pictures.
 pub mod viewer;
 
-/// Everything that a report is made from.
-pub struct Material {
-    /// The record.
-    pub stored: Stored,
-    /// What it cost, where it was measured.
-    pub timing: Option<Timing>,
-    /// What made it, where it was noted.
-    pub provenance: Option<Provenance>,
-    /// What verification says of it.
-    pub verdicts: Vec<Verdict>,
-    /// Everything that was measured.
-    pub rows: Vec<Measurement>,
-    /// Efficiencies of pairs of estimators.
-    pub comparisons: Vec<comparisons::Row>,
-    /// Models against light transport itself.
-    pub model_errors: Vec<ModelError>,
-    /// The pictures, in the order of cells and estimators.
-    pub figures: Vec<Figure>,
-    /// The same by cell, to be compared.
-    pub viewers: Vec<viewer::Viewer>,
-    /// Grids of split pictures.
-    pub splits: Vec<split::SplitFigure>,
-    /// Plots.
-    pub plots: Vec<plots::Section>,
-}
-
-/// A picture of one run.
-pub struct Figure {
-    /// Cell label.
-    pub cell: String,
-    /// Estimator name.
-    pub estimator: String,
-    /// Path relative to the results folder, without extension.
-    pub stem: String,
-    /// The PNG file.
-    pub png: Vec<u8>,
-    /// What it shows and what it cannot.
-    pub caption: String,
-}
-
-/// Makes every derived view of a results folder: `measurements.csv`, `comparisons.csv`, `model_errors.csv` where there are
-/// models, `verdicts.csv`, `summary.json`, `images/`, `plots/`, `tables/`, `report.md`, `report.tex` and `report.html`. The record is judged by itself, with the second look that a
-/// verification may have left beside it.
-pub fn write(folder: &RecordFolder) -> Result<Material> {
+/// Makes every view of a results folder: `measurements.csv`, `comparisons.csv`, `verdicts.csv`,
+/// `summary.json`, `model_errors.csv` where there are models, `images/`, `plots/`, `tables/`,
+/// `report.md`, `report.tex` and `report.html`. The record is judged by itself, together with the
+/// second look that a verification may have left beside it.
+pub fn write(folder: &RecordFolder) -> Result<ReportData> {
     let stored = folder.read()?;
     let retest = folder.retest_of(&stored)?;
     let looks = if retest.is_some() { Looks::Two } else { Looks::One };
@@ -98,13 +62,17 @@ pub fn write(folder: &RecordFolder) -> Result<Material> {
     write_judged(folder, stored, verdicts)
 }
 
-/// The same with verdicts at hand: those of this record, from a family of several.
-pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict>) -> Result<Material> {
-    let (timing, provenance) = (folder.read_timing()?, folder.read_provenance()?);
-    let rows = measurements(&stored, timing.as_ref());
-    let figures = write_figures(folder, &stored)?;
+/// The same with given verdicts on this record, from a family of several records.
+pub fn write_judged(
+    folder: &RecordFolder,
+    stored: Stored,
+    verdicts: Vec<Verdict>,
+) -> Result<ReportData> {
+    let stored = Stored { timing: folder.read_timing()?, ..stored };
+    let provenance = folder.read_provenance()?;
+    let rows = measurements(&stored, stored.timing.as_ref());
+    let figures = pictures::write_figures(folder, &stored)?;
     let viewers = viewer::viewers(&stored, &figures)?;
-    let stored = Stored { timing: timing.clone(), ..stored };
     let wanted = folder.read_pictures()?;
     let mut splits = split::write_splits(folder, &stored, &split::wanted(&wanted))?;
     viewer::keep_room(&viewers, splits.iter_mut().map(|split| &mut split.viewer));
@@ -113,9 +81,8 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     let plots = plots::sections(&stored, &comparisons, &wanted);
     folder.clear_views("plots")?;
     plots.iter().try_for_each(|section| section.write(folder))?;
-    let material = Material {
+    let data = ReportData {
         stored,
-        timing,
         provenance,
         verdicts,
         rows,
@@ -126,13 +93,13 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
         splits,
         plots,
     };
-    let page = page::page(&material);
+    let page = page::page(&data);
     write_tables(folder, &page)?;
     let views = [
-        ("measurements.csv", measurements::to_csv(&material.rows)),
-        ("comparisons.csv", comparisons::to_csv(&material.comparisons)),
-        ("verdicts.csv", verdict::to_csv(&material.verdicts)),
-        ("summary.json", canonical(&summary(&material))),
+        ("measurements.csv", measurements::to_csv(&data.rows)),
+        ("comparisons.csv", comparisons::to_csv(&data.comparisons)),
+        ("verdicts.csv", verdict::to_csv(&data.verdicts)),
+        ("summary.json", canonical(&summary(&data))),
         ("report.md", page.to_markdown()),
         ("report.tex", latex::to_document(&page)),
         ("report.html", html::to_html(&page)),
@@ -140,11 +107,10 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
     for (name, text) in views {
         folder.write_view(name, text.as_bytes())?;
     }
-    if !material.model_errors.is_empty() {
-        folder
-            .write_view("model_errors.csv", model_errors::to_csv(&material.model_errors).as_bytes())?;
+    if !data.model_errors.is_empty() {
+        folder.write_view("model_errors.csv", model_errors::to_csv(&data.model_errors).as_bytes())?;
     }
-    Ok(material)
+    Ok(data)
 }
 
 /// Every table of the page as Markdown, CSV and LaTeX.
@@ -165,83 +131,32 @@ fn write_tables(folder: &RecordFolder, page: &document::Document) -> Result<()> 
 }
 
 /// The numbers of a record for programs: what was measured and how many claims hold.
-fn summary(material: &Material) -> Value {
-    let count = |name: &str| material.verdicts.iter().filter(|v| v.outcome.to_string() == name).count();
-    let record = &material.stored.record;
+fn summary(data: &ReportData) -> Value {
+    let count = |name: &str| data.verdicts.iter().filter(|v| v.outcome.to_string() == name).count();
+    let record = &data.stored.record;
     json!({
         "experiment": record.experiment,
         "experiment_hash": record.experiment_hash,
         "claims_hash": record.claims_hash,
         "fingerprint": record.fingerprint,
-        "numbers": material.stored.numbers(),
-        "exit_code": verdict::exit_code(&material.verdicts),
+        "numbers": data.stored.numbers(),
+        "exit_code": verdict::exit_code(&data.verdicts),
         "verdicts": {
             "pass": count("pass"),
             "fail": count("fail"),
             "underpowered": count("underpowered"),
             "invalid": count("invalid"),
         },
-        "measurements": material.rows,
+        "measurements": data.rows,
     })
-}
-
-/// Of so many bands those that have pictures of their own: all of three, and of more the first, the middle and the last.
-fn few_bands(count: usize) -> Vec<usize> {
-    match count {
-        0..=3 => (0..count).collect(),
-        _ => vec![0, count / 2, count - 1],
-    }
-}
-
-fn write_figures(folder: &RecordFolder, stored: &Stored) -> Result<Vec<Figure>> {
-    let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
-    let mut figures = Vec::new();
-    for (index, cell) in stored.record.cells.iter().enumerate() {
-        for run in &cell.runs {
-            if let Some(picture) = Picture::of(stored, run) {
-                figures.push(write_figure(folder, stored, (index, cell), run, &picture, stops)?);
-            }
-        }
-    }
-    Ok(figures)
-}
-
-fn write_figure(
-    folder: &RecordFolder,
-    stored: &Stored,
-    (index, cell): (usize, &Cell),
-    run: &EstimatorRun,
-    picture: &Picture,
-    stops: f64,
-) -> Result<Figure> {
-    let stem = format!("images/{index:03}-{}", run.estimator);
-    let path = |extension: &str| folder.root().join(format!("{stem}.{extension}"));
-    atomic::create_folder(&folder.root().join("images"), "create the image folder")?;
-    let attributes = [
-        ("experiment", stored.record.experiment.as_str()),
-        ("cell", &cell.label),
-        ("estimator", &run.estimator),
-        ("passes", &run.passes.to_string()),
-        ("fingerprint", &stored.record.fingerprint),
-    ];
-    write_exr(&path("exr"), picture, &attributes)?;
-    let png = write_png(&path("png"), picture, stops)?;
-    let mut caption = format!("{} passes, exposure {stops:+} stops, clipped to sRGB", run.passes);
-    if png.clipped > 0 {
-        caption += &format!("; pixels too bright: {}", png.clipped);
-    }
-    if png.out_of_gamut > 0 {
-        caption += &format!("; pixels outside the gamut or not finite: {}", png.out_of_gamut);
-    }
-    let (cell, estimator) = (cell.label.clone(), run.estimator.clone());
-    Ok(Figure { cell, estimator, stem, png: png.bytes, caption })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::results::provenance::Provenance;
     use crate::results::sample;
-    use crate::results::timing::Cost;
+    use crate::results::timing::{Cost, Timing};
 
     #[test]
     fn views_are_made_from_the_folder_alone_and_again() {

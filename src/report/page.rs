@@ -1,8 +1,8 @@
-//! What the page says: what was asked, claims and verdicts first, then efficiency, pictures and plots, what was measured, what
-//! it cost, and how to make it again.
+//! The content of the page: the experiment, claims and verdicts, then efficiency, pictures and plots,
+//! measurements, cost, and how to reproduce it.
 
-use super::Material;
-use super::document::{Block, Document, TableBlock};
+use super::data::ReportData;
+use super::document::{Document, PageBlock, TableBlock};
 use super::number::significant;
 use super::plots::Section;
 use super::summary;
@@ -17,45 +17,45 @@ use crate::verify::levels::FAMILY_LEVEL;
 use crate::verify::verdict::Outcome;
 use crate::verify::weights::{self, DRIFT_LIMIT};
 
-/// Most rows of a table that is open when a page is.
+/// Tables with more rows are folded.
 const OPEN_ROWS: usize = 40;
-/// Most cells whose measurements are.
+/// With more cells their measurements are folded.
 const OPEN_CELLS: usize = 4;
 
 /// The page of one record.
-pub(super) fn page(material: &Material) -> Document {
-    let mut blocks = asked(material);
-    blocks.extend(claims(material));
-    if material.stored.record.samplers.is_empty() {
-        blocks.extend(efficiency(material));
-        blocks.extend(pictures(material));
-        blocks.extend(super::split::blocks(&material.splits));
-        blocks.extend(model_errors(material));
-        blocks.extend(material.plots.iter().flat_map(Section::blocks));
-        blocks.extend(measured(material));
-        blocks.extend(cost(material));
-        blocks.extend(notes(material));
+pub(super) fn page(data: &ReportData) -> Document {
+    let mut blocks = asked(data);
+    blocks.extend(claims(data));
+    if data.stored.record.samplers.is_empty() {
+        blocks.extend(efficiency(data));
+        blocks.extend(pictures(data));
+        blocks.extend(super::split::blocks(&data.splits));
+        blocks.extend(model_errors(data));
+        blocks.extend(data.plots.iter().flat_map(Section::blocks));
+        blocks.extend(measured(data));
+        blocks.extend(cost(data));
+        blocks.extend(notes(data));
     } else {
-        blocks.extend(samplers(material));
-        blocks.extend(material.plots.iter().flat_map(Section::blocks));
+        blocks.extend(samplers(data));
+        blocks.extend(data.plots.iter().flat_map(Section::blocks));
     }
-    if !material.verdicts.is_empty() {
+    if !data.verdicts.is_empty() {
         blocks.extend(super::trust::blocks());
     }
-    blocks.extend(origin(material));
-    Document { title: material.stored.record.experiment.clone(), blocks }
+    blocks.extend(origin(data));
+    Document { title: data.stored.record.experiment.clone(), blocks }
 }
 
-/// What the experiment says of itself, and its size.
-fn asked(material: &Material) -> Vec<Block> {
-    let record = &material.stored.record;
+/// The description of the experiment, and its size.
+fn asked(data: &ReportData) -> Vec<PageBlock> {
+    let record = &data.stored.record;
     let description = record.resolved["description"].as_str().unwrap_or_default();
     let mut blocks = Vec::new();
     if !description.is_empty() {
-        blocks.push(Block::Text(description.split_whitespace().collect::<Vec<_>>().join(" ")));
+        blocks.push(PageBlock::Text(description.split_whitespace().collect::<Vec<_>>().join(" ")));
     }
     if !record.samplers.is_empty() {
-        blocks.push(Block::Text(format!("{} samplers.", record.samplers.len())));
+        blocks.push(PageBlock::Text(format!("{} samplers.", record.samplers.len())));
         return blocks;
     }
     let bands: Vec<&str> = record.bands.iter().map(|band| band.name.as_str()).collect();
@@ -80,30 +80,30 @@ fn asked(material: &Material) -> Vec<Block> {
         1 => "One cell".into(),
         n => format!("{n} cells"),
     };
-    blocks.push(Block::Text(format!(
+    blocks.push(PageBlock::Text(format!(
         "{cells}, {bands}; estimators {}; {passes} passes each.",
         names.join(", ")
     )));
     blocks
 }
 
-fn heading(text: &str) -> Block {
-    Block::Heading(2, text.into())
+fn heading(text: &str) -> PageBlock {
+    PageBlock::Heading(2, text.into())
 }
 
-fn named(name: &str, table: Table) -> Block {
-    Block::Table(TableBlock::new(name, "", table))
+fn named(name: &str, table: Table) -> PageBlock {
+    PageBlock::Table(TableBlock::new(name, "", table))
 }
 
-/// Blocks that are open where a reader wants them at once.
-fn folded_if(is_long: bool, title: &str, blocks: Vec<Block>) -> Vec<Block> {
-    if is_long { vec![Block::Folded(title.into(), blocks)] } else { blocks }
+/// Blocks, folded under a title if they are long.
+fn folded_if(is_long: bool, title: &str, blocks: Vec<PageBlock>) -> Vec<PageBlock> {
+    if is_long { vec![PageBlock::Folded(title.into(), blocks)] } else { blocks }
 }
 
-fn claims(material: &Material) -> Vec<Block> {
-    let verdicts = &material.verdicts;
+fn claims(data: &ReportData) -> Vec<PageBlock> {
+    let verdicts = &data.verdicts;
     if verdicts.is_empty() {
-        return vec![heading("Claims"), Block::Text("This experiment claims nothing.".into())];
+        return vec![heading("Claims"), PageBlock::Text("This experiment makes no claim.".into())];
     }
     let green = verdicts.iter().filter(|v| v.is_green()).count();
     let failed = verdicts.iter().filter(|v| v.outcome == Outcome::Fail).count();
@@ -115,29 +115,30 @@ fn claims(material: &Material) -> Vec<Block> {
         verdicts.len() - green - failed,
     );
     let (green_ones, others): (Vec<_>, Vec<_>) = verdicts.iter().cloned().partition(|v| v.is_green());
-    let mut blocks = vec![heading("Claims"), Block::Text(text), named("claims", claim_table(verdicts))];
+    let mut blocks =
+        vec![heading("Claims"), PageBlock::Text(text), named("claims", claim_table(verdicts))];
     if !others.is_empty() {
-        blocks.push(Block::Heading(3, "What is not green".into()));
+        blocks.push(PageBlock::Heading(3, "Verdicts that are not green".into()));
         blocks.push(named("verdicts-not-green", verdict_table(&others)));
     }
     if !green_ones.is_empty() {
         let title = format!(
-            "The {} verdicts that are green, each with what it would have found",
+            "The {} verdicts that are green, each with the smallest defect that it would have found",
             green_ones.len()
         );
-        blocks.push(Block::Folded(title, vec![named("verdicts-green", verdict_table(&green_ones))]));
+        blocks.push(PageBlock::Folded(title, vec![named("verdicts-green", verdict_table(&green_ones))]));
     }
     blocks
 }
 
-/// What was drawn, and how exactly it is known what should have been.
-fn samplers(material: &Material) -> Vec<Block> {
-    let text = "Draws are counted in cells chosen by the density alone (coarse + fine). \"detectable\" is \
-                the relative error of the density, of one size in all coarse cells, that would have been \
+/// The tests of samplers, and the precision of their expected masses.
+fn samplers(data: &ReportData) -> Vec<PageBlock> {
+    let text = "Draws are counted in bins chosen from the density alone (coarse + fine). \"detectable\" is \
+                the relative error of the density, of equal magnitude in all coarse bins, that would have been \
                 found with 99 % probability. Seconds are of this machine and this run.";
-    let table = super::terminal::sampler_table(material);
+    let table = super::terminal::sampler_table(data);
     let mut masses = Table::new(&["sampler", "kind", "total mass - 1", "bound", "evaluations", "note"]);
-    for run in &material.stored.record.samplers {
+    for run in &data.stored.record.samplers {
         masses.push(vec![
             run.sampler.clone(),
             run.kind.clone(),
@@ -147,25 +148,25 @@ fn samplers(material: &Material) -> Vec<Block> {
             if run.exhausted { "the budget of evaluations was spent".into() } else { String::new() },
         ]);
     }
-    let quadrature = "The masses of the cells, by quadrature of the density.";
+    let quadrature = "The masses of the bins, by quadrature of the density.";
     vec![
         heading("Samplers"),
-        Block::Text(text.into()),
+        PageBlock::Text(text.into()),
         named("samplers", table),
         heading("Expected masses"),
-        Block::Text(quadrature.into()),
+        PageBlock::Text(quadrature.into()),
         named("masses", masses.without_empty_columns()),
     ]
 }
 
 /// The pictures of every cell.
-fn pictures(material: &Material) -> Vec<Block> {
+fn pictures(data: &ReportData) -> Vec<PageBlock> {
     let mut blocks = Vec::new();
-    for viewer in &material.viewers {
-        if material.viewers.len() > 1 {
-            blocks.push(Block::Heading(3, viewer.cell.clone()));
+    for viewer in &data.viewers {
+        if data.viewers.len() > 1 {
+            blocks.push(PageBlock::Heading(3, viewer.cell.clone()));
         }
-        blocks.push(Block::Viewer(viewer.clone()));
+        blocks.push(PageBlock::Viewer(viewer.clone()));
     }
     if !blocks.is_empty() {
         blocks.insert(0, heading("Pictures"));
@@ -173,64 +174,63 @@ fn pictures(material: &Material) -> Vec<Block> {
     blocks
 }
 
-fn measured(material: &Material) -> Vec<Block> {
-    let record = &material.stored.record;
+fn measured(data: &ReportData) -> Vec<PageBlock> {
+    let record = &data.stored.record;
     let bands: Vec<String> = record.bands.iter().map(|band| band.name.clone()).collect();
     let text = "Every observable, by class: means over passes; in brackets one standard error in units of the last digit.";
     let mut blocks = vec![heading("Measurements")];
-    blocks.extend(summary::means(&material.stored, &material.rows).map(Block::Table));
-    blocks.push(Block::Text(text.into()));
+    blocks.extend(summary::means(&data.stored, &data.rows).map(PageBlock::Table));
+    blocks.push(PageBlock::Text(text.into()));
     for (index, cell) in record.cells.iter().enumerate() {
-        let rows: Vec<&Measurement> =
-            material.rows.iter().filter(|row| row.cell == cell.label).collect();
+        let rows: Vec<&Measurement> = data.rows.iter().filter(|row| row.cell == cell.label).collect();
         let table = named(&format!("measurements-{index:03}"), measurement_table(&rows, &bands));
         let is_long = record.cells.len() > OPEN_CELLS || rows.len() / bands.len().max(1) > OPEN_ROWS;
         let title = if record.cells.len() == 1 { "All measurements" } else { &cell.label };
         if !is_long && record.cells.len() > 1 {
-            blocks.push(Block::Heading(3, cell.label.clone()));
+            blocks.push(PageBlock::Heading(3, cell.label.clone()));
         }
         blocks.extend(folded_if(is_long, title, vec![table]));
     }
     blocks
 }
 
-fn model_errors(material: &Material) -> Vec<Block> {
-    if material.model_errors.is_empty() {
+fn model_errors(data: &ReportData) -> Vec<PageBlock> {
+    if data.model_errors.is_empty() {
         return Vec::new();
     }
-    let text = "What a model's mean is off by, relative to light transport itself; in brackets the 95 % interval. A \
-                property of the model, not of an implementation: it is no claim and cannot fail.";
-    let table = named("model-errors", model_error_table(&material.model_errors));
-    let mut blocks = vec![heading("Model errors"), Block::Text(text.into())];
-    blocks.extend(summary::model_errors(&material.stored, &material.model_errors).map(Block::Table));
-    blocks.push(Block::Folded("By class".into(), vec![table]));
+    let text = "The error of a model's mean relative to light transport, with the 95 % interval in brackets. It is \
+                a property of the model, not of an implementation: it is not a claim and cannot fail.";
+    let table = named("model-errors", model_error_table(&data.model_errors));
+    let mut blocks = vec![heading("Model errors"), PageBlock::Text(text.into())];
+    blocks.extend(summary::model_errors(&data.stored, &data.model_errors).map(PageBlock::Table));
+    blocks.push(PageBlock::Folded("By class".into(), vec![table]));
     blocks
 }
 
-fn efficiency(material: &Material) -> Vec<Block> {
-    if material.comparisons.is_empty() {
+fn efficiency(data: &ReportData) -> Vec<PageBlock> {
+    if data.comparisons.is_empty() {
         return Vec::new();
     }
     let text = "Variance of a pass times its cost, of the first estimator over the other: above 1 the other is the \
                 better. In brackets the 95 % interval. By counters the cost is a weighted sum of counts, the same on \
                 every machine; by CPU time it is this machine's, and fair only where the two were timed side by side. \
-                A ratio is quoted where the two means agree; it is not resolved where more passes would still move \
-                it or a single pass may make it.";
-    let table = named("efficiency-by-class", comparison_table(&material.comparisons));
+                A ratio is quoted where the two means agree; it is not resolved where more passes could still \
+                change it or where a single pass may dominate it.";
+    let table = named("efficiency-by-class", comparison_table(&data.comparisons));
     let mut blocks = vec![heading("Efficiency")];
-    let by = |cost| summary::efficiency(&material.stored, &material.comparisons, cost).map(Block::Table);
+    let by = |cost| summary::efficiency(&data.stored, &data.comparisons, cost).map(PageBlock::Table);
     match (by(CostMeasure::Cpu), by(CostMeasure::Counters)) {
         (Some(cpu), counters) => {
             blocks.push(cpu);
-            let folded = |table| Block::Folded("The same by counted work".into(), vec![table]);
+            let folded = |table| PageBlock::Folded("The same by counted work".into(), vec![table]);
             blocks.extend(counters.map(folded));
         }
         (None, counters) => blocks.extend(counters),
     }
     let title = "By transport class, by counted work and by CPU time, with reasons";
-    blocks.push(Block::Folded(title.into(), vec![Block::Text(text.into()), table]));
-    if let Some(drift) = weights::drift(&weights::timed(&material.stored)).filter(|d| *d > DRIFT_LIMIT) {
-        blocks.push(Block::Text(format!(
+    blocks.push(PageBlock::Folded(title.into(), vec![PageBlock::Text(text.into()), table]));
+    if let Some(drift) = weights::drift(&weights::timed(&data.stored)).filter(|d| *d > DRIFT_LIMIT) {
+        blocks.push(PageBlock::Text(format!(
             "CPU times of these runs deviate by up to {:.0} % from what the counters' weights predict: measure the \
              weights again, or compare by CPU time.",
             100.0 * drift
@@ -239,17 +239,13 @@ fn efficiency(material: &Material) -> Vec<Block> {
     blocks
 }
 
-fn cost(material: &Material) -> Vec<Block> {
-    let runs = material
-        .stored
-        .record
-        .cells
-        .iter()
-        .flat_map(|cell| cell.runs.iter().map(move |run| (cell, run)));
+fn cost(data: &ReportData) -> Vec<PageBlock> {
+    let runs =
+        data.stored.record.cells.iter().flat_map(|cell| cell.runs.iter().map(move |run| (cell, run)));
     let mut table =
         Table::new(&["cell", "estimator", "passes", "CPU seconds", "wall seconds", "paths / s", "work"]);
     for (cell, run) in runs {
-        let cost = material.timing.as_ref().and_then(|timing| timing.of(&cell.label, &run.estimator));
+        let cost = data.stored.timing.as_ref().and_then(|timing| timing.of(&cell.label, &run.estimator));
         let seconds = |pick: fn(f64, f64) -> f64| {
             cost.map_or(String::new(), |c| significant(pick(c.cpu_seconds, c.wall_seconds), 3))
         };
@@ -272,12 +268,12 @@ fn cost(material: &Material) -> Vec<Block> {
     }
     let text = "Seconds are of this machine and this run, without an interval; counts of work are exactly \
                 reproducible. Paths are per CPU second.";
-    vec![heading("Cost"), Block::Text(text.into()), named("cost", table.without_empty_columns())]
+    vec![heading("Cost"), PageBlock::Text(text.into()), named("cost", table.without_empty_columns())]
 }
 
-fn notes(material: &Material) -> Vec<Block> {
+fn notes(data: &ReportData) -> Vec<PageBlock> {
     let mut items = Vec::new();
-    for cell in &material.stored.record.cells {
+    for cell in &data.stored.record.cells {
         for run in &cell.runs {
             let place = format!("{} {}", cell.label, run.estimator);
             let counted = run.anomalies.iter().filter(|(_, count)| **count > 0);
@@ -286,20 +282,20 @@ fn notes(material: &Material) -> Vec<Block> {
         }
     }
     if items.is_empty() {
-        items.push("No anomalies were counted, and no estimator has a reservation.".into());
+        items.push("No anomalies were counted, and no estimator has a note.".into());
     }
-    vec![heading("Anomalies and notes"), Block::List(items)]
+    vec![heading("Anomalies and notes"), PageBlock::List(items)]
 }
 
-fn origin(material: &Material) -> Vec<Block> {
-    let record = &material.stored.record;
+fn origin(data: &ReportData) -> Vec<PageBlock> {
+    let record = &data.stored.record;
     let mut table = Table::new(&["", "value"]);
     let mut row = |key: &str, value: String| table.push(vec![key.into(), value]);
     row("experiment, blake3", record.experiment_hash.clone());
     row("claims, blake3", record.claims_hash.clone());
     row("fingerprint", record.fingerprint.clone());
     let mut command = "scatterproof run FILE".to_string();
-    if let Some(p) = &material.provenance {
+    if let Some(p) = &data.provenance {
         let dirty = if p.dirty == Some(true) { ", with uncommitted changes" } else { "" };
         row("commit", format!("{}{dirty}", p.commit.as_deref().unwrap_or("unknown")));
         row("version", p.version.clone());
@@ -310,8 +306,8 @@ fn origin(material: &Material) -> Vec<Block> {
         row("date", p.date.clone());
         command = p.command.join(" ");
     }
-    let again = Block::Text("The command that made it:".into());
-    let resolved = Block::Code(canonical(&record.resolved));
-    let resolved = Block::Folded("The experiment as it was played, every value".into(), vec![resolved]);
-    vec![heading("Provenance"), named("provenance", table), again, Block::Code(command), resolved]
+    let again = PageBlock::Text("The command that made this report:".into());
+    let resolved = PageBlock::Code(canonical(&record.resolved));
+    let resolved = PageBlock::Folded("The experiment as it was run, every value".into(), vec![resolved]);
+    vec![heading("Provenance"), named("provenance", table), again, PageBlock::Code(command), resolved]
 }

@@ -1,11 +1,11 @@
-//! Split pictures: a grid with a picture a cell, its left half one estimator's and its right half another's,
-//! both shown alike, beside the CPU time that each half took. That they took the same is stated where it is
-//! so, and where it is not, by how much they differ.
+//! Split pictures: a grid with one picture per cell, its left half by one estimator and its right half by
+//! another, with the same exposure. The caption states the CPU time of each half, and either that the
+//! times are equal or by how much they differ.
 
-use super::document::{self, Block, Document, FigureBlock, TableBlock};
+use super::document::{Document, FigureBlock, PageBlock, PictureFile, TableBlock, ViewerBlock};
 use super::number::significant;
 use super::table::Table;
-use super::viewer::{self, Viewer};
+use super::viewer;
 use crate::error::Result;
 use crate::results::canvas::{Canvas, Unshown};
 use crate::results::image::{Picture, gain};
@@ -15,17 +15,17 @@ use crate::results::store::{RecordFolder, Stored};
 
 /// Times of two halves that differ by more than this factor are not called equal.
 const EQUAL: f64 = 1.1;
-/// Part of the pixels that are not black that a picture's own white leaves darker than itself. Below the
-/// brightest ones, so that a highlight does not darken the body.
+/// The fraction of non-black pixels that are darker than the white level of a picture. It is below 1, so
+/// that a highlight does not darken the body.
 const WHITE: f64 = 0.95;
-/// A picture narrower than this is shown with every pixel as a square of several.
+/// A picture narrower than this is enlarged by a whole factor.
 const WIDE_ENOUGH: usize = 192;
-/// Paper between the halves of a picture, in pixels of the sheet.
+/// Gap between the halves of a picture, in pixels of the sheet.
 const SEAM: usize = 1;
-/// Paper between pictures.
+/// Gap between pictures.
 const GAP: usize = 6;
 
-/// A grid, as it stands in the report.
+/// A grid of split pictures in the report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SplitFigure {
     /// Path relative to the results folder, without extension.
@@ -38,11 +38,11 @@ pub struct SplitFigure {
     pub caption: String,
     /// A row for each cell.
     pub table: Table,
-    /// The whole pictures of both, with seams to move.
-    pub viewer: Viewer,
+    /// The complete pictures of both estimators, with movable seams.
+    pub viewer: ViewerBlock,
 }
 
-/// The grids that are asked for.
+/// The grids that the experiment requests.
 pub(super) fn wanted(all: &[Wanted]) -> Vec<Split> {
     let split = |wanted: &Wanted| match wanted {
         Wanted::Split(split) => Some(split.clone()),
@@ -51,7 +51,7 @@ pub(super) fn wanted(all: &[Wanted]) -> Vec<Split> {
     all.iter().filter_map(split).collect()
 }
 
-/// Draws every grid that is asked for, and each of its pictures by itself, into `images/`.
+/// Writes every requested grid, and each of its pictures separately, into `images/`.
 pub(super) fn write_splits(
     folder: &RecordFolder,
     stored: &Stored,
@@ -74,34 +74,34 @@ pub(super) fn write_splits(
     Ok(figures)
 }
 
-/// What the page says of them.
-pub(super) fn blocks(figures: &[SplitFigure]) -> Vec<Block> {
+/// The section of the page.
+pub(super) fn blocks(figures: &[SplitFigure]) -> Vec<PageBlock> {
     if figures.is_empty() {
         return Vec::new();
     }
-    let heading = Block::Heading(2, "Split pictures".into());
+    let heading = PageBlock::Heading(2, "Split pictures".into());
     [heading].into_iter().chain(figures.iter().flat_map(SplitFigure::blocks)).collect()
 }
 
 impl SplitFigure {
-    fn blocks(&self) -> [Block; 3] {
+    fn blocks(&self) -> [PageBlock; 3] {
         let figure = FigureBlock {
             path: format!("{}.png", self.stem),
-            picture: document::Picture::Png(self.png.clone()),
+            picture: PictureFile::Png(self.png.clone()),
             title: self.title.clone(),
             caption: self.caption.clone(),
         };
-        [Block::Wide(figure), Block::Viewer(self.viewer.clone()), self.times()]
+        [PageBlock::Wide(figure), PageBlock::Viewer(self.viewer.clone()), self.times()]
     }
 
-    fn times(&self) -> Block {
+    fn times(&self) -> PageBlock {
         let name = self.stem.rsplit('/').next().unwrap_or_default();
-        Block::Table(TableBlock::new(name, "", self.table.clone()))
+        PageBlock::Table(TableBlock::new(name, "", self.table.clone()))
     }
 
-    /// The caption as a page of its own, beside the picture.
+    /// The caption as a page, for a file beside the picture.
     fn document(&self) -> Document {
-        let text = Block::Text(self.caption.clone());
+        let text = PageBlock::Text(self.caption.clone());
         Document { title: self.title.clone(), blocks: vec![text, self.times()] }
     }
 }
@@ -139,19 +139,19 @@ fn label<'a>(cell: &'a Cell, axis: Option<&String>) -> &'a str {
     axis.and_then(|axis| cell.axes.get(axis)).map_or("", String::as_str)
 }
 
-/// One cell's picture.
-struct Pair<'a> {
+/// The picture of one cell.
+struct SplitPair<'a> {
     index: usize,
     cell: &'a Cell,
     /// Row and column in the grid.
     at: (usize, usize),
     halves: [Half<'a>; 2],
-    /// The radiance shown as white, and whose pixels say so.
+    /// The radiance shown as white, and the estimator whose pixels determine it.
     white: f64,
     white_of: Option<&'a str>,
 }
 
-/// One estimator's part of it.
+/// The half of one estimator.
 struct Half<'a> {
     run: Option<&'a EstimatorRun>,
     picture: Option<Picture<'a>>,
@@ -163,7 +163,7 @@ struct Grid<'a> {
     split: &'a Split,
     rows: Vec<&'a str>,
     columns: Vec<&'a str>,
-    pairs: Vec<Pair<'a>>,
+    pairs: Vec<SplitPair<'a>>,
     /// Pixels of the largest picture.
     size: (usize, usize),
     zoom: usize,
@@ -179,9 +179,9 @@ impl<'a> Grid<'a> {
             let column = place(&columns, label(cell, split.columns.as_ref()));
             let halves = [&split.left, &split.right].map(|name| Half::of(stored, cell, name));
             let (white, white_of) = white(&halves, split.exposure_stops);
-            Pair { index, cell, at: (row, column), halves, white, white_of }
+            SplitPair { index, cell, at: (row, column), halves, white, white_of }
         };
-        let pairs: Vec<Pair> = cells.iter().map(pair).collect();
+        let pairs: Vec<SplitPair> = cells.iter().map(pair).collect();
         let pictures = || pairs.iter().flat_map(|pair| &pair.halves).filter_map(|half| half.picture);
         let width = pictures().map(|picture| picture.width).max().unwrap_or(1);
         let height = pictures().map(|picture| picture.height).max().unwrap_or(1);
@@ -217,14 +217,15 @@ impl<'a> Grid<'a> {
         Ok(SplitFigure { stem: stem.into(), title, png, caption, table, viewer })
     }
 
-    fn viewer(&self, title: &str) -> Result<Viewer> {
+    fn viewer(&self, title: &str) -> Result<ViewerBlock> {
         let columns = self.columns.len();
         let sheets = [(0, &self.split.left), (1, &self.split.right)];
         let sheets = sheets.map(|(half, name)| viewer::Sheet { name, rgb: self.sheet(half) });
         viewer::grid(title, sheets, columns * self.size.0, columns)
     }
 
-    /// The whole pictures of one side, over their whites, tile beside tile; black where there is none.
+    /// The complete pictures of one side, divided by their white levels, tile by tile; black where there is
+    /// none.
     fn sheet(&self, half: usize) -> Vec<[f64; 3]> {
         let (width, height) = self.size;
         let row_length = self.columns.len() * width;
@@ -240,8 +241,8 @@ impl<'a> Grid<'a> {
         rgb
     }
 
-    /// The left columns of the left half's estimator, the right ones of the other's.
-    fn paint(&self, canvas: &mut Canvas, pair: &Pair, (x, y): (usize, usize)) -> [Unshown; 2] {
+    /// Paints the left columns by the left estimator, the right columns by the right one.
+    fn paint(&self, canvas: &mut Canvas, pair: &SplitPair, (x, y): (usize, usize)) -> [Unshown; 2] {
         let gain = 1.0 / pair.white;
         let part = |half: &Half, is_left: bool, canvas: &mut Canvas| {
             let Some(picture) = half.picture else { return Unshown::default() };
@@ -287,7 +288,7 @@ impl<'a> Grid<'a> {
 
     /// Whether the halves took the same time, as measured.
     fn times(&self) -> String {
-        let ratios: Vec<f64> = self.pairs.iter().map(Pair::time_ratio).collect();
+        let ratios: Vec<f64> = self.pairs.iter().map(SplitPair::time_ratio).collect();
         let known: Vec<f64> = ratios.iter().copied().filter(|ratio| ratio.is_finite()).collect();
         let factor = |ratio: &f64| ratio.max(1.0 / ratio);
         let unequal = known.iter().filter(|ratio| factor(ratio) > EQUAL).count();
@@ -339,7 +340,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-impl Pair<'_> {
+impl SplitPair<'_> {
     /// CPU time of the right half over that of the left one; NaN where one is not known.
     fn time_ratio(&self) -> f64 {
         self.halves[1].seconds / self.halves[0].seconds
@@ -384,8 +385,8 @@ impl<'a> Half<'a> {
         }
     }
 
-    /// Squared standard errors over squared values, both summed over the image; infinite where nothing has
-    /// been seen, since black says nothing of how bright the body is.
+    /// Squared standard errors over squared values, both summed over the image; infinite for a
+    /// black image, which has no information on the brightness of the body.
     fn noise(&self) -> f64 {
         let Some(picture) = self.picture else { return f64::INFINITY };
         let squares = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>();
@@ -399,7 +400,7 @@ impl<'a> Half<'a> {
     }
 }
 
-/// The radiance that is shown as white, and the estimator whose pixels set it.
+/// The radiance that is shown as white, and the estimator whose pixels determine it.
 fn white<'a>(halves: &[Half<'a>; 2], stops: Option<f64>) -> (f64, Option<&'a str>) {
     if let Some(stops) = stops {
         return (1.0 / gain(stops), None);

@@ -12,8 +12,8 @@ fn wanted(exposure_stops: Option<f64>) -> Split {
     Split { left, right, rows: Some("boundary".into()), columns: Some("light".into()), exposure_stops }
 }
 
-/// Four cells, two boundaries times two lights. `mis` shows 1 everywhere in red with an error of 0.5, `snee`
-/// 2 with an error of 0.1, where its last pixel is 40; both times `brightness(cell)`.
+/// Four cells, two boundaries times two lights. `mis` shows 1 everywhere in red with an error of 0.5,
+/// `snee` 2 with an error of 0.1, where its last pixel is 40; both times `brightness(cell)`.
 fn grid(brightness: fn(usize) -> f64, seconds: [f64; 2]) -> Stored {
     let mut stored = sample::stored(0.1);
     let (mut cells, mut timing) = (Vec::new(), Timing::default());
@@ -65,7 +65,8 @@ fn halves_are_whose_they_should_be_and_share_a_white() {
     let stored = grid(|cell| [1.0, 10.0, 0.1, 3.0][cell], [2.0, 2.1]);
     let (folder, figures) = write(&stored, &wanted(None));
     let [figure] = &figures[..] else { panic!("{} grids", figures.len()) };
-    // `snee` has the lower noise; of its five pixels at 2 and one at 40, the 95th percentile is the last.
+    // `snee` has the lower noise; of its five pixels at 2 and one at 40, the 95th percentile is the
+    // last.
     assert_eq!(column(figure, "white"), ["40.0", "400", "4.00", "120"]);
     assert!(column(figure, "white of").iter().all(|name| *name == "snee"));
     // 3 x 2 pixels, 64 times: 1 column left, 2 right, 1 of paper between; 6 between pictures.

@@ -1,4 +1,4 @@
-//! The tables that a text quotes: a row for each cell and band, a column for each estimator.
+//! Tables that papers quote: a row for each cell and band, a column for each estimator.
 
 use super::document::TableBlock;
 use super::number::{significant, with_error};
@@ -9,8 +9,8 @@ use crate::results::store::Stored;
 use crate::verify::comparisons::Row;
 use crate::verify::model_errors::ModelError;
 
-/// The rows by one measure of cost that stand for a pair of estimators: all classes together, and pixels rather than
-/// their mean. Second arms of one estimator are left out.
+/// The rows by one measure of cost that stand for a pair of estimators: all classes together, and
+/// pixels rather than their mean. Second arms of one estimator are left out.
 pub fn chosen<'a>(stored: &Stored, rows: &'a [Row], cost: CostMeasure) -> Vec<&'a Row> {
     let is_control = |row: &Row| {
         let cell = stored.record.cells.iter().find(|cell| cell.label == row.cell);
@@ -27,7 +27,7 @@ pub fn chosen<'a>(stored: &Stored, rows: &'a [Row], cost: CostMeasure) -> Vec<&'
     rows.iter().filter(is_chosen).collect()
 }
 
-/// What the variance is of.
+/// The quantity whose variance is compared.
 pub fn metric_words(row: &Row) -> String {
     if row.metric == PIXELS {
         "a pixel (averaged over the image)".into()
@@ -41,7 +41,7 @@ pub fn efficiency(stored: &Stored, rows: &[Row], cost: CostMeasure) -> Option<Ta
     let rows = chosen(stored, rows, cost);
     let quoted = rows.iter().find(|row| row.efficiency_ratio.is_finite())?;
     let name = |row: &Row| format!("{} / {}", row.candidate, row.baseline);
-    let entries = rows.iter().map(|row| Entry {
+    let entries = rows.iter().map(|row| PivotEntry {
         cell: row.cell.clone(),
         names: vec![row.band.clone()],
         column: name(row),
@@ -89,7 +89,7 @@ pub fn means(stored: &Stored, rows: &[Measurement]) -> Option<TableBlock> {
     };
     let rows: Vec<&Measurement> = rows.iter().filter(|row| first(row) == Some(true)).collect();
     let observable = &rows.first()?.observable;
-    let entry = |row: &&Measurement| Entry {
+    let entry = |row: &&Measurement| PivotEntry {
         cell: row.cell.clone(),
         names: vec![row.band.clone()],
         column: row.estimator.clone(),
@@ -109,7 +109,7 @@ pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> 
         let (low, high) = row.interval();
         let percent = |x: f64| format!("{:+.1}", 100.0 * x);
         let star = if row.note.is_empty() { "" } else { "*" };
-        Entry {
+        PivotEntry {
             cell: row.cell.clone(),
             names: vec![row.band.clone(), row.observable.name.clone()],
             column: row.estimator.clone(),
@@ -127,23 +127,24 @@ pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> 
     Some(TableBlock::new("model-error", caption, table))
 }
 
-/// A field of a table: the label of its cell and what else names its row; its column; its text.
-struct Entry {
+/// A field of a table: the cell and the names that identify its row, its column, and its text.
+struct PivotEntry {
     cell: String,
     names: Vec<String>,
     column: String,
     text: String,
 }
 
-impl Entry {
+impl PivotEntry {
     fn row(&self) -> (&str, &[String]) {
         (&self.cell, &self.names)
     }
 }
 
-/// A row for each cell and name, a column for each axis of the sweep, each part of the names, and each column of the
-/// entries, in the order in which they come. Columns that say the same in every row are left out.
-fn pivot(stored: &Stored, parts: &[&str], entries: Vec<Entry>) -> Table {
+/// A row for each cell and name, a column for each axis of the sweep, each part of the names, and each
+/// column of the entries, in the order in which they come. Columns with the same text in every row
+/// are left out.
+fn pivot(stored: &Stored, parts: &[&str], entries: Vec<PivotEntry>) -> Table {
     let axes: Vec<&String> =
         stored.record.cells.first().map(|cell| cell.axes.keys().collect()).unwrap_or_default();
     let (mut rows, mut columns): (Vec<(&str, &[String])>, Vec<&String>) = (Vec::new(), Vec::new());

@@ -7,7 +7,7 @@ use crate::results::csv_text;
 pub struct Table {
     /// Column names.
     pub header: Vec<String>,
-    /// Rows, one field a column.
+    /// Rows, one field per column.
     pub rows: Vec<Vec<String>>,
 }
 
@@ -19,11 +19,11 @@ impl Table {
 
     /// Appends a row.
     pub fn push(&mut self, row: Vec<String>) {
-        assert_eq!(row.len(), self.header.len(), "one field a column");
+        assert_eq!(row.len(), self.header.len(), "one field per column");
         self.rows.push(row);
     }
 
-    /// Without the columns that say nothing: empty in every row.
+    /// Without the columns that are empty in every row.
     pub fn without_empty_columns(mut self) -> Table {
         for column in (0..self.header.len()).rev() {
             if self.rows.iter().all(|row| row[column].is_empty()) {
@@ -39,8 +39,8 @@ impl Table {
         self.rows.iter_mut().for_each(|row| drop(row.remove(column)));
     }
 
-    /// Aligned plain text: columns two spaces apart, numbers to the right. Nothing of a table without
-    /// columns.
+    /// Aligned plain text: columns two spaces apart, numbers to the right. Empty for a table
+    /// without columns.
     pub fn to_text(&self) -> String {
         if self.header.is_empty() {
             return String::new();
@@ -51,7 +51,7 @@ impl Table {
         lines.map(|row| format!("{}\n", aligned(row, &columns).join("  ").trim_end())).collect()
     }
 
-    /// A Markdown table, aligned so that it reads as text too.
+    /// A Markdown table, aligned so that it also reads as plain text.
     pub fn to_markdown(&self) -> String {
         let escaped =
             |row: &Vec<String>| row.iter().map(|f| f.replace('|', "\\|").replace('\n', " ")).collect();
@@ -73,7 +73,7 @@ impl Table {
         csv_text::to_text(&header, self.rows.iter().cloned())
     }
 
-    /// Do the fields of a column begin like numbers?
+    /// Whether the fields of a column begin like numbers.
     pub fn is_numeric(&self, column: usize) -> bool {
         let numeric =
             |field: &str| field.trim_start_matches('-').starts_with(|c: char| c.is_ascii_digit());
@@ -82,23 +82,25 @@ impl Table {
         fields.peek().is_some() && fields.all(numeric)
     }
 
-    fn columns(&self) -> Vec<Column> {
+    fn columns(&self) -> Vec<ColumnLayout> {
         let width = |c: usize| {
             let fields = self.rows.iter().map(|row| row[c].chars().count());
             fields.chain([self.header[c].chars().count()]).max().unwrap_or(0)
         };
-        (0..self.header.len()).map(|c| Column { width: width(c), numeric: self.is_numeric(c) }).collect()
+        (0..self.header.len())
+            .map(|c| ColumnLayout { width: width(c), numeric: self.is_numeric(c) })
+            .collect()
     }
 }
 
-/// How a column is set.
-struct Column {
+/// Width and alignment of a column.
+struct ColumnLayout {
     width: usize,
     numeric: bool,
 }
 
-fn aligned(row: &[String], columns: &[Column]) -> Vec<String> {
-    let pad = |(field, &Column { width, numeric }): (&String, &Column)| match numeric {
+fn aligned(row: &[String], columns: &[ColumnLayout]) -> Vec<String> {
+    let pad = |(field, &ColumnLayout { width, numeric }): (&String, &ColumnLayout)| match numeric {
         true => format!("{field:>width$}"),
         false => format!("{field:<width$}"),
     };

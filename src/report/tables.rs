@@ -1,4 +1,4 @@
-//! The tables that everybody wants: claims, verdicts, measurements, efficiencies, model errors.
+//! Tables of claims, verdicts, measurements, efficiencies and model errors.
 
 use super::number::{per_cent, significant, with_error};
 use super::table::Table;
@@ -8,7 +8,7 @@ use crate::verify::comparisons::{Row, measure_name};
 use crate::verify::model_errors::ModelError;
 use crate::verify::verdict::Verdict;
 
-/// Verdicts, with what each test could have seen.
+/// Verdicts, with the smallest defect that each test would have found.
 pub fn verdict_table(verdicts: &[Verdict]) -> Table {
     let mut table = Table::new(&[
         "outcome",
@@ -58,7 +58,7 @@ pub fn verdict_table(verdicts: &[Verdict]) -> Table {
     table.without_empty_columns()
 }
 
-/// Claims: how many of each one's comparisons came out how.
+/// Claims: the number of comparisons of each claim by outcome.
 pub fn claim_table(verdicts: &[Verdict]) -> Table {
     let mut table = Table::new(&["claim", "comparisons", "pass", "fail", "underpowered", "invalid"]);
     let mut labels: Vec<&str> = Vec::new();

@@ -1,6 +1,6 @@
-//! What `run` prints when it is done: a row per measurement, short enough for a terminal.
+//! The output of `run`: a row per measurement, short enough for a terminal.
 
-use super::Material;
+use super::data::ReportData;
 use super::document::TableBlock;
 use super::number::{per_cent, significant, with_error};
 use super::summary;
@@ -9,8 +9,8 @@ use crate::results::measurements::Measurement;
 use crate::results::record::CostMeasure;
 
 /// One row per cell and estimator: the sensor's first observable in every band, passes, CPU time, speed.
-pub fn run_table(material: &Material) -> Table {
-    let record = &material.stored.record;
+pub fn run_table(data: &ReportData) -> Table {
+    let record = &data.stored.record;
     let mut header = vec!["cell", "estimator", "observable"];
     header.extend(record.bands.iter().map(|band| band.name.as_str()));
     header.extend(["passes", "CPU s", "paths/s/core"]);
@@ -23,8 +23,8 @@ pub fn run_table(material: &Material) -> Table {
                 observable && m.cell == cell.label && m.estimator == run.estimator
             };
             let mut row = vec![cell.label.clone(), run.estimator.clone(), first.name.clone()];
-            row.extend(material.rows.iter().filter(own).map(|m| with_error(m.mean, m.std_error)));
-            let cost = material.timing.as_ref().and_then(|t| t.of(&cell.label, &run.estimator));
+            row.extend(data.rows.iter().filter(own).map(|m| with_error(m.mean, m.std_error)));
+            let cost = data.stored.timing.as_ref().and_then(|t| t.of(&cell.label, &run.estimator));
             let rate = cost.and_then(|c| c.paths_per_second());
             row.push(run.passes.to_string());
             row.push(cost.map_or(String::new(), |c| significant(c.cpu_seconds, 3)));
@@ -35,21 +35,20 @@ pub fn run_table(material: &Material) -> Table {
     if table.rows.is_empty() { Table::default() } else { table }
 }
 
-/// One row per sampler: how many of its tests came out how, and the smallest defect that they would have
-/// found.
-pub fn sampler_table(material: &Material) -> Table {
-    let record = &material.stored.record;
+/// One row per sampler: the number of its tests and of those that are green, and the smallest defect
+/// that they would have found.
+pub fn sampler_table(data: &ReportData) -> Table {
+    let record = &data.stored.record;
     let header = ["sampler", "draws", "bins", "tests", "green", "detectable", "CPU s", "draws/s/core"];
     let mut table = Table::new(&header);
     for run in &record.samplers {
-        let own =
-            || material.verdicts.iter().filter(|v| v.estimators == run.sampler && v.class.is_empty());
+        let own = || data.verdicts.iter().filter(|v| v.estimators == run.sampler && v.class.is_empty());
         let green = own().filter(|v| v.is_green()).count();
         let coarse = own().find(|v| v.test == "chi2 coarse");
         let bins = [Some(&run.coarse), run.fine.as_ref()].into_iter().flatten();
-        let bins = bins.filter_map(|path| material.stored.bins(path));
+        let bins = bins.filter_map(|path| data.stored.bins(path));
         let bins: Vec<String> = bins.map(|bins| (bins.mass.len() - 1).to_string()).collect();
-        let cost = material.timing.as_ref().and_then(|t| t.of("", &run.sampler));
+        let cost = data.stored.timing.as_ref().and_then(|t| t.of("", &run.sampler));
         let rate = cost.and_then(|c| c.paths_per_second());
         table.push(vec![
             run.sampler.clone(),
@@ -65,13 +64,14 @@ pub fn sampler_table(material: &Material) -> Table {
     if table.rows.is_empty() { Table::default() } else { table.without_empty_columns() }
 }
 
-/// Efficiencies that stand for the pairs of estimators: by CPU time where it was measured, else by counted work.
-pub fn efficiency_table(material: &Material) -> Option<TableBlock> {
-    let by = |cost| summary::efficiency(&material.stored, &material.comparisons, cost);
+/// One efficiency per pair of estimators: by CPU time where it was measured, else by
+/// counted work.
+pub fn efficiency_table(data: &ReportData) -> Option<TableBlock> {
+    let by = |cost| summary::efficiency(&data.stored, &data.comparisons, cost);
     by(CostMeasure::Cpu).or_else(|| by(CostMeasure::Counters))
 }
 
-/// A text in lines of at most `width` letters, broken at blanks.
+/// A text in lines of at most `width` characters, broken at blanks.
 pub fn wrapped(text: &str, width: usize) -> String {
     let (mut lines, mut length) = (String::new(), 0);
     for word in text.split_whitespace() {
@@ -89,14 +89,14 @@ pub fn wrapped(text: &str, width: usize) -> String {
     lines
 }
 
-/// Notes of estimators and counts of anomalies, each once with the cells that it concerns.
-pub fn notes(material: &Material) -> Vec<String> {
+/// Notes of estimators and counts of anomalies, each once, with its cells.
+pub fn notes(data: &ReportData) -> Vec<String> {
     let mut lines: Vec<(String, Vec<String>)> = Vec::new();
     let mut add = |text: String, cell: &str| match lines.iter_mut().find(|(known, _)| *known == text) {
         Some((_, cells)) => cells.push(cell.to_string()),
         None => lines.push((text, vec![cell.to_string()])),
     };
-    for cell in &material.stored.record.cells {
+    for cell in &data.stored.record.cells {
         for run in &cell.runs {
             run.notes.iter().for_each(|note| add(format!("{}: {note}", run.estimator), &cell.label));
             for (name, _) in run.anomalies.iter().filter(|(_, count)| **count > 0) {

@@ -1,7 +1,7 @@
 //! How the tests themselves were tested, as published with the program: which planted defects they find,
 //! and that they hold their levels.
 
-use super::document::{Block, TableBlock};
+use super::document::{PageBlock, TableBlock};
 use super::table::Table;
 use crate::results::csv_text::rows;
 
@@ -12,7 +12,7 @@ const BLINDNESS: &str = include_str!("../../results/published/blindness.csv");
 const CALIBRATION: &str = include_str!("../../results/published/calibration.csv");
 
 /// The section of the page.
-pub(super) fn blocks() -> Vec<Block> {
+pub(super) fn blocks() -> Vec<PageBlock> {
     let (defects, matrix) = matrix(&rows(BLINDNESS));
     let text = format!(
         "Before a test is believed it is seen to fail. {defects} defects were planted one by one in a second path \
@@ -21,14 +21,15 @@ pub(super) fn blocks() -> Vec<Block> {
     );
     let levels = "And it is seen to hold its level: runs with a true hypothesis, driven by another random generator, \
                   and the shares of p-values below 1e-2 and 1e-3.";
-    let matrix = Block::Table(TableBlock::new("planted-defects", "", matrix));
-    let calibration = Block::Table(TableBlock::new("calibration", "", calibration(&rows(CALIBRATION))));
+    let matrix = PageBlock::Table(TableBlock::new("planted-defects", "", matrix));
+    let calibration =
+        PageBlock::Table(TableBlock::new("calibration", "", calibration(&rows(CALIBRATION))));
     vec![
-        Block::Heading(2, "How these tests were tested".into()),
-        Block::Text(text),
-        Block::Folded("Planted defects, and what sees them".into(), vec![matrix]),
-        Block::Text(levels.into()),
-        Block::Folded("Levels, measured".into(), vec![calibration]),
+        PageBlock::Heading(2, "How these tests were tested".into()),
+        PageBlock::Text(text),
+        PageBlock::Folded("Planted defects, and what sees them".into(), vec![matrix]),
+        PageBlock::Text(levels.into()),
+        PageBlock::Folded("Levels, measured".into(), vec![calibration]),
     ]
 }
 

@@ -101,6 +101,9 @@ impl Estimator for Ballistic {
     }
 
     fn notes(&self) -> Vec<String> {
-        vec!["ballistic scores the class surface alone: light that scatters is missing, not dark".into()]
+        vec![
+            "ballistic scores the class surface alone: scattered light is excluded from its result"
+                .into(),
+        ]
     }
 }

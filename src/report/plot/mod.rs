@@ -1,64 +1,43 @@
-//! Plots as SVG, inline in the page and by themselves as files, and their numbers as CSV. Text is in the reader's colours,
-//! series are in the palette of Okabe & Ito, which colour-blind readers can tell apart, each named at its end too.
+//! Plots as SVG, inline in the page and as files, and their numbers as CSV. Text has the colour of the
+//! page. Series use the palette of Okabe & Ito, which is safe for colour-blind readers, and each series
+//! is also labelled at its end.
 
-use super::html::escape;
-use super::number::significant;
+use super::markup::escape;
 use crate::results::csv_text;
 use crate::stats::hypothesis::{Estimate, critical_value};
 use scale::Scale;
 
+pub use scale::PlotAxis;
+
 mod scale;
+/// Colours with their names.
+pub mod swatches;
 
 /// A plot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plot {
-    /// Horizontally.
-    pub x: Axis,
-    /// Vertically.
-    pub y: Axis,
+    /// The horizontal axis.
+    pub x: PlotAxis,
+    /// The vertical axis.
+    pub y: PlotAxis,
     /// The lines.
     pub series: Vec<Series>,
-    /// Horizontal lines with their names: values that are known.
+    /// Horizontal lines at known values, with their names.
     pub levels: Vec<(f64, String)>,
-    /// How large.
+    /// Size of the picture.
     pub size: Size,
 }
 
-/// How large a plot is.
+/// Size of a plot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Size {
-    /// Over the width of the page.
+    /// As wide as the page.
     #[default]
     Wide,
     /// One of several side by side.
     Small,
     /// A strip.
     Flat,
-}
-
-/// An axis.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Axis {
-    /// What it shows, with its unit.
-    pub label: String,
-    /// Whether it is logarithmic.
-    pub is_log: bool,
-    /// From and to, where it is not what the series need.
-    pub range: Option<[f64; 2]>,
-    /// Names of the values 0, 1, ..., where it shows those and no others.
-    pub names: Vec<String>,
-}
-
-impl Axis {
-    /// A linear axis for what the series need.
-    pub fn linear(label: impl Into<String>) -> Axis {
-        Axis { label: label.into(), ..Axis::default() }
-    }
-
-    /// A logarithmic one.
-    pub fn log(label: impl Into<String>) -> Axis {
-        Axis { is_log: true, ..Axis::linear(label) }
-    }
 }
 
 /// How a series is drawn.
@@ -69,72 +48,72 @@ pub enum Style {
     Line,
     /// Points with their intervals as bars.
     Marks,
-    /// Steps: each value holds for its point's place.
+    /// A bar per point.
     Bars,
-    /// A thin dashed line for the eye, in the ink of the text.
+    /// A thin dashed guide line in the colour of the text.
     Guide,
 }
 
-/// A line.
+/// A series of points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     /// Its name.
     pub name: String,
     /// Its points, by x.
-    pub points: Vec<Point>,
+    pub points: Vec<PlotPoint>,
     /// How it is drawn.
     pub style: Style,
 }
 
 /// A point with an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
-    /// Where.
+pub struct PlotPoint {
+    /// Abscissa.
     pub x: f64,
     /// The value.
     pub y: f64,
     /// Lower end of its interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of its interval.
     pub high: f64,
-    /// Is it one to rest on? Others are drawn hollow.
+    /// Whether it is resolved; others are drawn hollow.
     pub is_firm: bool,
 }
 
-impl Point {
+impl PlotPoint {
     /// A value with its interval.
-    pub fn new(x: f64, y: f64, [low, high]: [f64; 2]) -> Point {
-        Point { x, y, low, high, is_firm: true }
+    pub fn new(x: f64, y: f64, [low, high]: [f64; 2]) -> PlotPoint {
+        PlotPoint { x, y, low, high, is_firm: true }
     }
 
     /// An estimate with its 95 % interval.
-    pub fn of(x: f64, estimate: &Estimate) -> Point {
+    pub fn of(x: f64, estimate: &Estimate) -> PlotPoint {
         let reach = critical_value(0.05, estimate.dof) * estimate.std_error;
-        Point::new(x, estimate.value, [estimate.value - reach, estimate.value + reach])
+        PlotPoint::new(x, estimate.value, [estimate.value - reach, estimate.value + reach])
     }
 
-    /// A value without one.
-    pub fn bare(x: f64, y: f64) -> Point {
-        Point::new(x, y, [y, y])
+    /// A value without an interval.
+    pub fn bare(x: f64, y: f64) -> PlotPoint {
+        PlotPoint::new(x, y, [y, y])
     }
 }
 
 /// Colours of the series, in their order.
 pub(super) const COLOURS: [&str; 7] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b07b00", "#3a9bd9", "#8c6d31"];
-/// Least distance of names at the right, in units of the picture.
+/// Least distance between labels at the right, in units of the picture.
 const LINE: f64 = 15.0;
-/// Most points of a line that are marked one by one.
+/// Most points of a line that are drawn as marks.
 const MARKED: usize = 20;
-/// From so many points on marks are small.
+/// With more points marks are small.
 const CROWDED: usize = 60;
-/// Longest name of a series, in letters.
+/// Longest label of a series, in characters.
 const LETTERS: usize = 30;
-/// Width of a letter.
+/// Width of a character.
 const LETTER: f64 = 6.6;
 
-/// Places of the picture's parts.
-struct Frame {
+/// Size of the picture, and the rectangle of the axes.
+struct PlotFrame {
     width: f64,
     height: f64,
     left: f64,
@@ -149,10 +128,10 @@ impl Plot {
         panels(std::slice::from_ref(self))
     }
 
-    /// What it shows as numbers: a row a point.
+    /// Its numbers as CSV, a row per point.
     pub fn to_csv(&self) -> String {
         let header = ["series", &self.x.label, &self.y.label, "low", "high", "firm"];
-        let x = |p: &Point| match self.x.names.get(p.x.round() as usize) {
+        let x = |p: &PlotPoint| match self.x.names.get(p.x.round() as usize) {
             Some(name) => name.clone(),
             None => csv_text::number(p.x),
         };
@@ -165,7 +144,7 @@ impl Plot {
         csv_text::to_text(&header, rows)
     }
 
-    fn frame(&self) -> Frame {
+    fn frame(&self) -> PlotFrame {
         let (width, height) = match self.size {
             Size::Wide => (760.0, 380.0),
             Size::Small => (480.0, 320.0),
@@ -174,9 +153,9 @@ impl Plot {
         let names = self.series.iter().map(|s| &s.name).chain(self.levels.iter().map(|(_, name)| name));
         let longest = names.map(|name| name.chars().count().min(LETTERS)).max().unwrap_or(0);
         let right = width - 16.0 - LETTER * longest as f64;
-        // Names of values stand slanted where they would run into each other.
+        // Labels of categories are slanted where they would overlap.
         let bottom = height - if self.is_slanted(right - 66.0) { 92.0 } else { 46.0 };
-        Frame { width, height, left: 66.0, top: 12.0, right, bottom }
+        PlotFrame { width, height, left: 66.0, top: 12.0, right, bottom }
     }
 
     fn is_slanted(&self, width: f64) -> bool {
@@ -186,7 +165,7 @@ impl Plot {
 
     fn paint(&self) -> String {
         let frame = self.frame();
-        let Frame { left, top, right, bottom, .. } = frame;
+        let PlotFrame { left, top, right, bottom, .. } = frame;
         let points = || self.series.iter().flat_map(|series| &series.points);
         let x = Scale::new(&self.x, points().map(|p| p.x), [left, right]);
         let levels = self.levels.iter().map(|(value, _)| *value);
@@ -199,7 +178,7 @@ impl Plot {
                 "<path d=\"M{left} {at:.1}H{right:.1}\" stroke=\"currentColor\" stroke-dasharray=\"5 4\" fill=\"none\"/>\n"
             );
         }
-        // A picture within the picture clips what lies outside the axes.
+        // A nested SVG clips what lies outside the axes.
         let (wide, high) = (right - left, bottom - top);
         svg += &format!(
             "<svg x=\"{left}\" y=\"{top}\" width=\"{wide:.1}\" height=\"{high:.1}\" viewBox=\"{left} {top} {wide:.1} {high:.1}\">\n"
@@ -211,7 +190,7 @@ impl Plot {
         svg + &self.names(&frame, &y)
     }
 
-    /// Guides are in ink and take none of the colours.
+    /// Guides have the colour of the text and use none of the palette.
     fn colours(&self) -> Vec<&'static str> {
         let mut palette = COLOURS.iter().cycle();
         let colour = |series: &Series| match series.style {
@@ -221,8 +200,8 @@ impl Plot {
         self.series.iter().map(colour).collect()
     }
 
-    fn axes(&self, frame: &Frame, x: &Scale, y: &Scale) -> String {
-        let Frame { height, left, top, right, bottom, .. } = *frame;
+    fn axes(&self, frame: &PlotFrame, x: &Scale, y: &Scale) -> String {
+        let PlotFrame { height, left, top, right, bottom, .. } = *frame;
         let mut svg = String::new();
         let is_slanted = self.is_slanted(right - left);
         for (tick, name) in x.ticks() {
@@ -259,8 +238,8 @@ impl Plot {
         )
     }
 
-    /// Names at the right, each at the height where its line ends, moved apart.
-    fn names(&self, frame: &Frame, y: &Scale) -> String {
+    /// Labels at the right, each at the height where its line ends, moved apart.
+    fn names(&self, frame: &PlotFrame, y: &Scale) -> String {
         let end = |series: &Series| series.points.last().map_or(f64::NAN, |p| p.y);
         let series = self.series.iter().zip(self.colours());
         let mut names: Vec<(f64, &str, &str)> =
@@ -290,9 +269,9 @@ impl Plot {
     }
 }
 
-/// Plots one above the other in one picture.
+/// Plots below each other in one picture.
 pub fn panels(plots: &[Plot]) -> String {
-    let frames: Vec<Frame> = plots.iter().map(Plot::frame).collect();
+    let frames: Vec<PlotFrame> = plots.iter().map(Plot::frame).collect();
     let width = frames.iter().map(|f| f.width).fold(0.0, f64::max);
     let height: f64 = frames.iter().map(|f| f.height).sum();
     let mut svg = format!(
@@ -301,7 +280,7 @@ pub fn panels(plots: &[Plot]) -> String {
     );
     let mut below = 0.0;
     for (plot, frame) in plots.iter().zip(&frames) {
-        let Frame { width, height, .. } = frame;
+        let PlotFrame { width, height, .. } = frame;
         svg += &format!(
             "<svg y=\"{below}\" width=\"{width}\" height=\"{height}\">\n{}</svg>\n",
             plot.paint()
@@ -331,7 +310,7 @@ impl Series {
             Style::Line if self.points.len() > MARKED => stroked(1.8, ""),
             Style::Line => stroked(1.8, "") + &marks(),
             Style::Marks => {
-                let bar = |(at, _, p): (f64, f64, &Point)| {
+                let bar = |(at, _, p): (f64, f64, &PlotPoint)| {
                     format!("M{at:.1} {:.1}V{:.1}", y.at(p.low), y.at(p.high))
                 };
                 let bars: String = places().map(bar).collect();
@@ -364,7 +343,7 @@ fn mark(x: f64, y: f64, radius: f64, (colour, is_firm): (&str, bool)) -> String 
     format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{fill}\" stroke=\"{colour}\"/>\n")
 }
 
-/// A name that finds room.
+/// A label, shortened to the longest that fits.
 fn shortened(name: &str) -> String {
     if name.chars().count() <= LETTERS {
         return name.into();
@@ -379,7 +358,7 @@ mod tests {
     fn plot() -> Plot {
         let point = |k: i32| {
             let x = f64::from(1 << k);
-            Point::new(x, 1.0 + 1.0 / x, [1.0, 1.0 + 2.0 / x])
+            PlotPoint::new(x, 1.0 + 1.0 / x, [1.0, 1.0 + 2.0 / x])
         };
         let series = ["one & only", "another"].map(|name| Series {
             name: name.into(),
@@ -387,8 +366,8 @@ mod tests {
             ..Series::default()
         });
         Plot {
-            x: Axis::log("passes"),
-            y: Axis { range: Some([0.9, 2.1]), ..Axis::linear("mean") },
+            x: PlotAxis::log("passes"),
+            y: PlotAxis { range: Some([0.9, 2.1]), ..PlotAxis::linear("mean") },
             series: series.into(),
             levels: vec![(1.0, "truth".into())],
             size: Size::Wide,
@@ -409,10 +388,10 @@ mod tests {
     /// Marks that stand side by side at one name are of that name.
     #[test]
     fn numbers_stand_by_their_names() {
-        let points = vec![Point::bare(-0.2, 1.0), Point::bare(0.8, 2.0)];
+        let points = vec![PlotPoint::bare(-0.2, 1.0), PlotPoint::bare(0.8, 2.0)];
         let series = vec![Series { name: "a".into(), points, style: Style::Marks }];
-        let x = Axis { names: vec!["left".into(), "right".into()], ..Axis::linear("side") };
-        let csv = Plot { x, y: Axis::linear("ratio"), series, ..Plot::default() }.to_csv();
+        let x = PlotAxis { names: vec!["left".into(), "right".into()], ..PlotAxis::linear("side") };
+        let csv = Plot { x, y: PlotAxis::linear("ratio"), series, ..Plot::default() }.to_csv();
         assert_eq!(
             csv,
             "series,side,ratio,low,high,firm\na,left,1.0,1.0,1.0,true\na,right,2.0,2.0,2.0,true\n"
@@ -437,7 +416,8 @@ mod tests {
     fn nothing_to_draw_is_no_error() {
         let empty = Plot::default().to_svg();
         assert!(empty.starts_with("<svg") && !empty.contains("NaN"));
-        let flat = Series { points: vec![Point::new(1.0, 0.0, [f64::NAN, 0.0])], ..Series::default() };
+        let flat =
+            Series { points: vec![PlotPoint::new(1.0, 0.0, [f64::NAN, 0.0])], ..Series::default() };
         let svg = Plot { series: vec![flat], ..Plot::default() }.to_svg();
         assert!(!svg.contains("NaN"), "{svg}");
     }

@@ -1,18 +1,47 @@
-//! From values to places in a picture, and the round values that an axis names.
+//! Axes: from values to places in a picture, and the round values at the ticks.
 
-use super::{Axis, significant};
 use crate::math::log10;
+use crate::report::number::significant;
+
+/// An axis.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlotAxis {
+    /// What it shows, with its unit.
+    pub label: String,
+    /// Whether it is logarithmic.
+    pub is_log: bool,
+    /// Lower and upper end; default: the range of the series.
+    pub range: Option<[f64; 2]>,
+    /// Names of the values 0, 1, ... of an axis of categories.
+    pub names: Vec<String>,
+}
+
+impl PlotAxis {
+    /// A linear axis over the range of the series.
+    pub fn linear(label: impl Into<String>) -> PlotAxis {
+        PlotAxis { label: label.into(), ..PlotAxis::default() }
+    }
+
+    /// A logarithmic axis over the range of the series.
+    pub fn log(label: impl Into<String>) -> PlotAxis {
+        PlotAxis { is_log: true, ..PlotAxis::linear(label) }
+    }
+}
 
 /// From values to places in the picture.
 pub(super) struct Scale<'a> {
-    axis: &'a Axis,
+    axis: &'a PlotAxis,
     range: [f64; 2],
     place: [f64; 2],
 }
 
 impl<'a> Scale<'a> {
-    /// Of an axis that has to show `values` between two places.
-    pub(super) fn new(axis: &'a Axis, values: impl Iterator<Item = f64>, place: [f64; 2]) -> Scale<'a> {
+    /// The scale of an axis that shows `values` between two places.
+    pub(super) fn new(
+        axis: &'a PlotAxis,
+        values: impl Iterator<Item = f64>,
+        place: [f64; 2],
+    ) -> Scale<'a> {
         let usable = values.filter(|v| v.is_finite() && (!axis.is_log || *v > 0.0));
         let wide = usable.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
         let named = (!axis.names.is_empty()).then(|| [-0.5, axis.names.len() as f64 - 0.5]);
@@ -35,8 +64,8 @@ impl<'a> Scale<'a> {
         }
     }
 
-    /// Where a value is; what is far outside stays near the picture, where it is clipped. A logarithmic axis has
-    /// what is not positive below its lower end.
+    /// Where a value is; what is far outside stays near the picture, where it is clipped. A logarithmic
+    /// axis has what is not positive below its lower end.
     pub(super) fn at(&self, value: f64) -> f64 {
         let share = match self.axis.is_log && value <= 0.0 {
             true => -2.0,
@@ -82,7 +111,7 @@ impl<'a> Scale<'a> {
     }
 }
 
-/// A little more than a range, so that what lies at its ends is seen whole.
+/// A range with a margin, so that marks at its ends are not clipped.
 fn roomy([from, to]: [f64; 2], is_log: bool) -> [f64; 2] {
     const ROOM: f64 = 0.04;
     match is_log {
@@ -115,7 +144,7 @@ mod tests {
     use super::*;
 
     fn ticks(is_log: bool, range: [f64; 2]) -> String {
-        let axis = Axis { is_log, range: Some(range), ..Axis::default() };
+        let axis = PlotAxis { is_log, range: Some(range), ..PlotAxis::default() };
         let scale = Scale::new(&axis, [].into_iter(), [0.0, 1.0]);
         scale.ticks().into_iter().map(|(_, name)| name).collect::<Vec<_>>().join(" ")
     }
@@ -134,16 +163,16 @@ mod tests {
 
     #[test]
     fn names_have_places_of_their_own() {
-        let axis = Axis { names: vec!["a".into(), "b".into()], ..Axis::default() };
+        let axis = PlotAxis { names: vec!["a".into(), "b".into()], ..PlotAxis::default() };
         let scale = Scale::new(&axis, [].into_iter(), [0.0, 100.0]);
         assert_eq!((scale.at(0.0), scale.at(1.0)), (25.0, 75.0));
         assert_eq!(scale.ticks(), [(0.0, "a".to_string()), (1.0, "b".to_string())]);
     }
 
-    /// What is not positive has no place on a logarithmic axis, and is not drawn on it.
+    /// Values that are not positive are not drawn on a logarithmic axis.
     #[test]
     fn nothing_is_infinite() {
-        let axis = Axis { is_log: true, ..Axis::default() };
+        let axis = PlotAxis { is_log: true, ..PlotAxis::default() };
         let scale = Scale::new(&axis, [1.0, 10.0].into_iter(), [0.0, 1.0]);
         assert_eq!((scale.at(0.0), scale.at(-1.0), scale.at(1e300)), (-2.0, -2.0, 3.0));
     }

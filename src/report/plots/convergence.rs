@@ -1,25 +1,26 @@
 //! Error against time and against rays.
 //!
-//! How far means of m passes really lie apart: the batches of a record, taken 2^k at a time, are independent means
-//! of m passes each; with G of them, s^2 = sum (mean_g - mean)^2 / (G - 1) estimates the variance of such a mean with
-//! G - 1 degrees of freedom, whatever m. For independent passes of finite variance s falls as 1/sqrt(m); what
-//! has a tail falls more slowly, or in steps. The interval is that of s for near-normal means,
-//! s sqrt((G - 1) / chi2). Beside it the standard error of m passes that the variance of all passes promises.
+//! The spread of means of m passes, measured: the batches of a record, taken 2^k at a time, are
+//! independent means of m passes each; with G of them, s^2 = sum (mean_g - mean)^2 / (G - 1) estimates
+//! the variance of such a mean with G - 1 degrees of freedom, whatever m. For independent passes of
+//! finite variance s falls as 1/sqrt(m); with a heavy tail it falls more slowly, or in steps. The interval
+//! is that of s for near-normal means, s sqrt((G - 1) / chi2). Beside it stands the standard error
+//! of m passes that the variance of all passes predicts.
 
-use super::{Content, Drawn, Section, runs};
-use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
+use super::section::{Content, PlotFigure, Section, runs};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
 use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::Stored;
 use crate::stats::moments::Moments;
 use crate::stats::tails::chi_square_critical;
 use crate::stats::tree::{Merge, total};
 
-/// Fewest groups that say how far means lie apart.
+/// Fewest groups for an estimate of the spread.
 const FEWEST: usize = 8;
 /// Confidence of the intervals.
 const CONFIDENCE: f64 = 0.95;
 
-/// Two plots a cell.
+/// Two plots per cell.
 pub(super) fn section(stored: &Stored) -> Section {
     let cells = stored.record.cells.iter().enumerate();
     Section {
@@ -34,7 +35,7 @@ pub(super) fn section(stored: &Stored) -> Section {
     }
 }
 
-/// What an estimator's passes cost.
+/// A measure of the cost of passes.
 struct Price {
     label: &'static str,
     name: &'static str,
@@ -56,7 +57,7 @@ fn rays(_: &Stored, _: &Cell, run: &EstimatorRun) -> Option<f64> {
     (per_pass > 0.0).then_some(per_pass)
 }
 
-fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> Vec<Drawn> {
+fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> Vec<PlotFigure> {
     let plot = |price: &Price| {
         let series: Vec<Series> = runs(cell)
             .filter_map(|run| {
@@ -66,13 +67,13 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> Vec<Drawn> {
             .flatten()
             .collect();
         let plot = Plot {
-            x: Axis::log(price.label),
-            y: Axis::log("relative error"),
+            x: PlotAxis::log(price.label),
+            y: PlotAxis::log("relative error"),
             series,
             size: Size::Small,
             ..Plot::default()
         };
-        let drawn = Drawn {
+        let drawn = PlotFigure {
             name: format!("error-{}-{index:03}", price.name),
             title: cell.label.clone(),
             caption: format!("Against {}.", price.label),
@@ -89,14 +90,14 @@ struct Errors {
     measured: Vec<(f64, [f64; 3])>,
     /// Relative standard deviation of a pass.
     of_a_pass: f64,
-    /// Passes in all.
+    /// Total number of passes.
     passes: f64,
 }
 
 fn of_run(errors: &Errors, name: &str, unit: f64) -> Vec<Series> {
     let points = errors.measured.iter();
-    let points = points.map(|(n, [y, low, high])| Point::new(n * unit, *y, [*low, *high])).collect();
-    let guide = |n: f64| Point::bare(n * unit, errors.of_a_pass / n.sqrt());
+    let points = points.map(|(n, [y, low, high])| PlotPoint::new(n * unit, *y, [*low, *high])).collect();
+    let guide = |n: f64| PlotPoint::bare(n * unit, errors.of_a_pass / n.sqrt());
     let first = errors.measured.first().map_or(1.0, |(n, _)| *n);
     vec![
         Series { name: name.into(), points, style: Style::Marks },
@@ -108,7 +109,7 @@ fn of_run(errors: &Errors, name: &str, unit: f64) -> Vec<Series> {
     ]
 }
 
-/// Nothing where the first observable has a band without a mean.
+/// None where the mean of the first observable is 0 in a band.
 fn errors(stored: &Stored, run: &EstimatorRun) -> Option<Errors> {
     let bands = 0..stored.record.bands.len();
     let moments: Vec<Vec<Moments>> =
@@ -139,7 +140,8 @@ fn errors(stored: &Stored, run: &EstimatorRun) -> Option<Errors> {
     (!measured.is_empty()).then_some(Errors { measured, of_a_pass, passes })
 }
 
-/// Batches joined `size` at a time; those that are left over, and a last batch with fewer passes, are in none.
+/// Batches merged in groups of `size`; remaining batches, and a last batch with fewer passes, are not
+/// used.
 fn grouped(batches: &[Moments], size: usize) -> Vec<Moments> {
     let whole = batches.chunks_exact(size).map(|group| total(group.to_vec()).unwrap_or_default());
     let mut whole: Vec<Moments> = whole.collect();
@@ -175,7 +177,7 @@ mod tests {
         assert_eq!(grouped(&short, 1).len(), 2, "a last batch with fewer passes has another variance");
     }
 
-    /// Independent passes: every point's interval holds what the passes promise, but one in twenty.
+    /// Independent passes: 19 of 20 intervals cover the predicted error.
     #[test]
     fn independent_passes_follow_the_slope() {
         let stored = sample::stored(0.3);

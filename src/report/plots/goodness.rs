@@ -1,11 +1,11 @@
-//! Chi-square in pictures: what was drawn from a sampler, what its density expects, and by how much they differ.
+//! The chi-square test as pictures: observed and expected shares of a sampler's bins, and residuals.
 
-use super::{Content, Drawn, Section};
-use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
+use super::section::{Content, PlotFigure, Section};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
 use crate::results::sampler::SamplerRun;
 use crate::results::store::Stored;
 
-/// A picture a sampler.
+/// One picture per sampler.
 pub(super) fn section(stored: &Stored) -> Section {
     let runs = stored.record.samplers.iter().enumerate();
     Section {
@@ -19,11 +19,11 @@ pub(super) fn section(stored: &Stored) -> Section {
     }
 }
 
-fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> {
+fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<PlotFigure> {
     let bins = stored.bins(&run.coarse)?;
     let samples = run.samples as f64;
     let expected = |mass: f64| mass * samples;
-    // Outcomes that neither can be nor were have no place.
+    // Outcomes without mass and without draws are left out.
     let is_there = |(_, observed, mass): &(f64, f64, f64)| *observed > 0.0 || *mass > 0.0;
     let places = || {
         bins.observed
@@ -33,21 +33,21 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> 
             .map(|(i, (o, m))| (i as f64, *o, *m))
             .filter(is_there)
     };
-    let share = |(x, observed, _): (f64, f64, f64)| Point::bare(x, observed / samples);
-    let mass = |(x, _, mass): (f64, f64, f64)| Point::bare(x, mass);
+    let share = |(x, observed, _): (f64, f64, f64)| PlotPoint::bare(x, observed / samples);
+    let mass = |(x, _, mass): (f64, f64, f64)| PlotPoint::bare(x, mass);
     let possible = || places().filter(|(_, _, mass)| *mass > 0.0);
     let residual = |(x, observed, mass): (f64, f64, f64)| {
-        Point::bare(x, (observed - expected(mass)) / expected(mass).sqrt())
+        PlotPoint::bare(x, (observed - expected(mass)) / expected(mass).sqrt())
     };
-    let residuals: Vec<Point> = possible().map(residual).collect();
+    let residuals: Vec<PlotPoint> = possible().map(residual).collect();
     let largest = residuals.iter().map(|p| p.y.abs()).fold(0.0, f64::max);
     let impossible: f64 =
         places().filter(|(_, _, mass)| *mass <= 0.0).map(|(_, observed, _)| observed).sum();
     let last = bins.observed.len() as f64 - 0.5;
-    let x = |label: &str| Axis { range: Some([-0.5, last]), ..Axis::linear(label) };
+    let x = |label: &str| PlotAxis { range: Some([-0.5, last]), ..PlotAxis::linear(label) };
     let above = Plot {
         x: x(""),
-        y: Axis::linear("share"),
+        y: PlotAxis::linear("share"),
         series: vec![
             Series { name: "expected".into(), points: places().map(mass).collect(), style: Style::Line },
             Series {
@@ -61,14 +61,14 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> 
     };
     let below = Plot {
         x: x("bin"),
-        y: Axis::linear("residual"),
+        y: PlotAxis::linear("residual"),
         series: vec![
             Series {
                 name: String::new(),
-                points: vec![Point::bare(-0.5, 0.0), Point::bare(last, 0.0)],
+                points: vec![PlotPoint::bare(-0.5, 0.0), PlotPoint::bare(last, 0.0)],
                 style: Style::Guide,
             },
-            // As long a name as above, so that the bins stand below each other.
+            // As long a name as above, so that the bins of both plots are aligned.
             Series { name: "residual".into(), points: residuals, style: Style::Bars },
         ],
         size: Size::Flat,
@@ -79,7 +79,7 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<Drawn> 
     if impossible > 0.0 {
         caption += &format!(" {impossible} draws in bins without mass.");
     }
-    Some(Drawn {
+    Some(PlotFigure {
         name: format!("goodness-{index:03}"),
         title: run.sampler.clone(),
         caption,

@@ -1,9 +1,9 @@
-//! Exitance by distance from where the light came in: the rings of a sensor.
+//! Exitance by the distance between entry and exit: the rings of a sensor.
 
 use std::f64::consts::PI;
 
-use super::{Content, Drawn, Section, band_name, joined, runs, shown_bands};
-use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
+use super::section::{Content, PlotFigure, Section, band_name, joined, runs, shown_bands};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
 use crate::results::record::{Cell, EstimatorRun, Observable, Quantity};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::Estimate;
@@ -33,7 +33,7 @@ pub(super) fn section(stored: &Stored) -> Section {
     }
 }
 
-fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &[f64]) -> Drawn {
+fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &[f64]) -> PlotFigure {
     let line = |run: &EstimatorRun| {
         let point = |ring: usize| {
             let observable = Observable { name: format!("ring_{ring}"), class: "all".into() };
@@ -42,19 +42,20 @@ fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &
             let [from, to] = [edges[ring], edges[ring + 1]];
             let area = PI * (to - from) * (to + from);
             let (value, std_error) = (mean.value / area, mean.std_error / area);
-            Some(Point::of(0.5 * (from + to), &Estimate { value, std_error, ..mean }))
+            Some(PlotPoint::of(0.5 * (from + to), &Estimate { value, std_error, ..mean }))
         };
-        let points: Vec<Point> = (0..edges.len() - 1).filter_map(point).filter(|p| p.y > 0.0).collect();
+        let points: Vec<PlotPoint> =
+            (0..edges.len() - 1).filter_map(point).filter(|p| p.y > 0.0).collect();
         Series { name: run.estimator.clone(), points, style: Style::Line }
     };
     let plot = Plot {
-        x: Axis::log("distance / mm"),
-        y: Axis::log("exitance / area, W/mm^4"),
+        x: PlotAxis::log("distance / mm"),
+        y: PlotAxis::log("exitance / area, W/mm^4"),
         series: runs(cell).map(line).collect(),
         size: Size::Small,
         ..Plot::default()
     };
-    Drawn {
+    PlotFigure {
         name: format!("profile-{index:03}-{}", band + 1),
         title: joined(&[&cell.label, band_name(stored, band)]),
         caption: "A ring whose mean is not above 0 has no point.".into(),

@@ -1,18 +1,19 @@
-//! Efficiency along the axes of a sweep: a line for each of the other axes' labels, with the 95 % intervals.
+//! Efficiency along the axes of a sweep: a line for each of the other axes' labels, with the 95 %
+//! intervals.
 
 use std::collections::BTreeMap;
 
-use super::{Content, Drawn, Section, band_name, joined, shown_bands};
+use super::section::{Content, PlotFigure, Section, band_name, joined, shown_bands};
 use crate::report::document::slug;
-use crate::report::plot::{Axis, COLOURS, Plot, Point, Series, Size, Style};
+use crate::report::plot::{COLOURS, Plot, PlotAxis, PlotPoint, Series, Size, Style};
 use crate::report::summary;
 use crate::results::record::CostMeasure;
 use crate::results::store::Stored;
 use crate::verify::comparisons::Row;
 
-/// Most lines of one plot: each has a colour of its own.
+/// Most lines of one plot: each has its own colour.
 const MOST_LINES: usize = COLOURS.len();
-/// Fewest numbers that make an axis of numbers.
+/// Fewest numbers that make a numeric axis.
 const FEWEST: usize = 3;
 
 /// A plot for each axis, pair of estimators and band.
@@ -43,7 +44,7 @@ pub(super) fn section(stored: &Stored, rows: &[Row]) -> Section {
     }
 }
 
-/// What a measure of cost is called, and its part of a file's name.
+/// The name of a measure of cost, and its part of a file name.
 fn words(cost: CostMeasure) -> (&'static str, &'static str) {
     match cost {
         CostMeasure::Cpu => ("CPU time", "cpu"),
@@ -60,18 +61,18 @@ fn axes(stored: &Stored) -> Vec<String> {
     names.into_iter().filter(varies).collect()
 }
 
-/// Where the labels of an axis stand in a plot.
+/// Places of the labels of an axis in a plot.
 struct Places {
-    /// What the numbers are, where they are some.
+    /// Label of the axis.
     what: String,
     /// Label -> place.
     at: BTreeMap<String, f64>,
-    /// Names of the places 0, 1, ..., where they are not numbers.
+    /// Names of the places 0, 1, ... of an axis of categories.
     names: Vec<String>,
 }
 
-/// The labels of an axis: as numbers where they are some, `albedo-0.5` among them, those of one word together; else by
-/// name in the order of the cells.
+/// The labels of an axis: as numbers where all labels have one (`0.2`, or `albedo-0.5`, grouped by word);
+/// else as categories in the order of the cells.
 fn places(stored: &Stored, axis: &str) -> Vec<Places> {
     let mut labels: Vec<&String> = Vec::new();
     for cell in &stored.record.cells {
@@ -114,7 +115,7 @@ fn of_axis(
     places: &Places,
     (axis, cost): (&str, CostMeasure),
     name: &str,
-) -> Vec<Drawn> {
+) -> Vec<PlotFigure> {
     let mut pairs: Vec<(&str, &str)> =
         rows.iter().map(|row| (&*row.candidate, &*row.baseline)).collect();
     pairs.sort_unstable();
@@ -136,10 +137,10 @@ fn of_axis(
             let wide = values.iter().all(|x| *x > 0.0)
                 && values.iter().fold(0.0, |a: f64, b| a.max(*b))
                     > 5.0 * values.iter().fold(f64::MAX, |a, b| a.min(*b));
-            let x = Axis {
+            let x = PlotAxis {
                 is_log: wide && places.names.is_empty(),
                 names: places.names.clone(),
-                ..Axis::linear(&places.what)
+                ..PlotAxis::linear(&places.what)
             };
             let dropped = lines.len().saturating_sub(MOST_LINES);
             let mut caption =
@@ -149,12 +150,12 @@ fn of_axis(
             }
             let plot = Plot {
                 x,
-                y: Axis::log("efficiency"),
+                y: PlotAxis::log("efficiency"),
                 series: lines.into_iter().take(MOST_LINES).collect(),
                 levels: vec![(1.0, "equal".into())],
                 size: Size::Small,
             };
-            drawn.push(Drawn {
+            drawn.push(PlotFigure {
                 name: slug(&joined(&[name, candidate, band_name(stored, band)])).replace("--", "-"),
                 title: joined(&[&format!("{candidate} over {baseline}"), band_name(stored, band)]),
                 caption,
@@ -176,14 +177,14 @@ fn lines(stored: &Stored, rows: &[&Row], axis: &str, places: &Places) -> Vec<Ser
         let Some(place) = cell.axes.get(axis).and_then(|label| places.at.get(label)) else { continue };
         let others = cell.axes.iter().filter(|(name, _)| *name != axis).map(|(_, label)| label.as_str());
         let name = joined(&others.collect::<Vec<_>>());
-        let mut point = Point::new(*place, row.efficiency_ratio, [row.ci_low, row.ci_high]);
+        let mut point = PlotPoint::new(*place, row.efficiency_ratio, [row.ci_low, row.ci_high]);
         point.is_firm = row.resolved;
         match lines.iter_mut().find(|line| line.name == name) {
             Some(line) => line.points.push(point),
             None => lines.push(Series { name, points: vec![point], style }),
         }
     }
-    // Marks of several lines at one name stand side by side.
+    // Marks of several lines in one category are placed side by side.
     let count = lines.len() as f64;
     for (number, line) in lines.iter_mut().enumerate() {
         line.points.sort_by(|a, b| a.x.total_cmp(&b.x));

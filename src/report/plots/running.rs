@@ -1,9 +1,9 @@
-//! Means as passes add up: a plot a cell, with the 95 % interval that each estimator states after so many passes and the
-//! value that a claim expects. An interval that is valid covers the expected value, now and later, in 19 of 20
-//! estimators; one whose scores have too heavy a tail sits beside it, and is narrow.
+//! Running means: one plot per cell of the mean against the number of passes, with the 95 % interval of
+//! each estimator and the expected value of a claim. A valid interval covers the expected value for 19 of
+//! 20 estimators. With too heavy a tail the interval is narrow and lies beside it.
 
-use super::{Content, Drawn, Section};
-use crate::report::plot::{Axis, Plot, Point, Series, Size};
+use super::section::{Content, PlotFigure, Section};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size};
 use crate::results::pictures::{Running, Wanted};
 use crate::results::record::{Against, Cell, EstimatorRun, Observable, Quantity};
 use crate::results::store::Stored;
@@ -14,7 +14,7 @@ use crate::stats::tree::Merge;
 /// Confidence of the bands.
 const CONFIDENCE: f64 = 0.95;
 
-/// A plot for each cell and each wish.
+/// A plot for each cell and each requested picture.
 pub(super) fn section(stored: &Stored, wanted: &[Wanted]) -> Section {
     let running = wanted.iter().filter_map(|wanted| match wanted {
         Wanted::Running(running) => Some(running),
@@ -24,7 +24,7 @@ pub(super) fn section(stored: &Stored, wanted: &[Wanted]) -> Section {
     for (number, running) in running.enumerate() {
         for (index, cell) in stored.record.cells.iter().enumerate() {
             let Some((plot, title)) = plot(stored, index, cell, running) else { continue };
-            drawn.push(Drawn {
+            drawn.push(PlotFigure {
                 name: format!("running-{}-{index:03}", number + 1),
                 title,
                 caption: CAPTION.into(),
@@ -75,8 +75,8 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
         .collect::<Vec<_>>()
         .join(", ");
     let plot = Plot {
-        x: Axis::log("passes"),
-        y: Axis { range, ..Axis::linear("mean") },
+        x: PlotAxis::log("passes"),
+        y: PlotAxis { range, ..PlotAxis::linear("mean") },
         series,
         levels,
         size: Size::Wide,
@@ -84,8 +84,8 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
     Some((plot, title))
 }
 
-/// Mean and interval after each batch but the first few, which have none.
-fn means(batches: &[Moments]) -> Vec<Point> {
+/// Mean and interval after each batch, except the first few, which have no interval.
+fn means(batches: &[Moments]) -> Vec<PlotPoint> {
     let mut all = Moments::default();
     let mut points = Vec::new();
     for batch in batches {
@@ -94,12 +94,13 @@ fn means(batches: &[Moments]) -> Vec<Point> {
             continue;
         }
         let reach = critical_value(1.0 - CONFIDENCE, all.n as f64 - 1.0) * all.std_error();
-        points.push(Point::new(all.n as f64, all.mean, [all.mean - reach, all.mean + reach]));
+        points.push(PlotPoint::new(all.n as f64, all.mean, [all.mean - reach, all.mean + reach]));
     }
     points
 }
 
-/// Heights that show the second half of every line with its band, and what is expected.
+/// The range of the vertical axis: the last three quarters of every line with its band, and the
+/// expected value.
 fn range(series: &[Series], expected: Option<f64>) -> Option<[f64; 2]> {
     let late = series.iter().flat_map(|series| &series.points[series.points.len() / 4..]);
     let heights = late.flat_map(|p| [p.low, p.high]).chain(expected).filter(|y| y.is_finite());

@@ -1,9 +1,8 @@
-//! Means by wavelength, and the colour that they give.
+//! Means by wavelength, and the resulting colour.
 
-use super::{Content, Drawn, Section, runs};
-use crate::report::html::escape;
+use super::section::{Content, PlotFigure, Section, runs};
 use crate::report::number::with_error;
-use crate::report::plot::{Axis, Plot, Point, Series, Size, Style};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
 use crate::results::image::{gain, shown_bytes};
 use crate::results::record::{Band, Cell, EstimatorRun};
 use crate::results::store::Stored;
@@ -31,7 +30,7 @@ pub(super) fn section(stored: &Stored) -> Section {
     }
 }
 
-fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [Drawn; 2] {
+fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [PlotFigure; 2] {
     let means = |run: &EstimatorRun| -> Vec<Estimate> {
         let bands = 0..stored.record.bands.len();
         bands.filter_map(|band| Some(Estimate::of_batches(&stored.moments(run, 0, band)?))).collect()
@@ -40,13 +39,13 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [Drawn; 2] {
     let line = |(run, means): &(&EstimatorRun, Vec<Estimate>)| {
         let points = means.iter().zip(&stored.record.bands).map(|(mean, band)| {
             let [from, to] = band.range_nm.unwrap_or_default();
-            Point::of(0.5 * (from + to), mean)
+            PlotPoint::of(0.5 * (from + to), mean)
         });
         Series { name: run.estimator.clone(), points: points.collect(), style: Style::Line }
     };
     let plot = Plot {
-        x: Axis::linear("wavelength / nm"),
-        y: Axis::linear("mean"),
+        x: PlotAxis::linear("wavelength / nm"),
+        y: PlotAxis::linear("mean"),
         series: runs.iter().map(line).collect(),
         size: Size::Small,
         ..Plot::default()
@@ -63,13 +62,13 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [Drawn; 2] {
         |(name, rgb): (String, [Estimate; 3])| (name, shown_bytes(rgb.map(|c| c.value), gain(stops)));
     let swatches = colours.into_iter().map(shown).collect();
     [
-        Drawn {
+        PlotFigure {
             name: format!("spectrum-{index:03}"),
             title: cell.label.clone(),
             caption: "Bands at their middle.".into(),
             content: Content::Plots(vec![plot]),
         },
-        Drawn {
+        PlotFigure {
             name: format!("colour-{index:03}"),
             title: cell.label.clone(),
             caption: format!("{caption} Exposure {stops:+} stops."),
@@ -78,7 +77,8 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [Drawn; 2] {
     ]
 }
 
-/// Linear sRGB of a run's spectrum. Its error is that of the sums over bands in each batch: bands may share their paths.
+/// Linear sRGB of a run's spectrum. Its error is that of the sums over bands in each batch: bands may
+/// share their paths.
 fn colour(stored: &Stored, run: &EstimatorRun) -> Option<[Estimate; 3]> {
     let bands = &stored.record.bands;
     let moments: Vec<Vec<Moments>> =
@@ -99,28 +99,10 @@ fn colour(stored: &Stored, run: &EstimatorRun) -> Option<[Estimate; 3]> {
     Some([0, 1, 2].map(channel))
 }
 
-/// Colours with their names.
-pub(super) fn swatches(colours: &[(String, [u8; 3])]) -> String {
-    let height = 12.0 + 44.0 * colours.len() as f64;
-    let row = |(place, (name, [r, g, b])): (usize, &(String, [u8; 3]))| {
-        let top = 12.0 + 44.0 * place as f64;
-        let name = escape(name);
-        format!(
-            "<rect x=\"12\" y=\"{top}\" width=\"120\" height=\"36\" rx=\"4\" fill=\"rgb({r},{g},{b})\" stroke=\"currentColor\" \
-             stroke-opacity=\"0.3\"/><text x=\"146\" y=\"{}\" fill=\"currentColor\">{name}, rgb({r}, {g}, {b})</text>\n",
-            top + 22.0
-        )
-    };
-    let rows: String = colours.iter().enumerate().map(row).collect();
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 480 {height}\" role=\"img\" font-family=\"system-ui, \
-         sans-serif\" font-size=\"12\" style=\"color: var(--ink, #1d2433)\">\n{rows}</svg>\n"
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::plot::swatches;
     use crate::results::record::Band;
     use crate::results::sample;
 
@@ -157,6 +139,6 @@ mod tests {
             section.drawn[1].caption.contains("linear sRGB 0.4")
                 && section.drawn[1].caption.contains('(')
         );
-        assert!(swatches(colours).contains("rgb("));
+        assert!(swatches::to_svg(colours).contains("rgb("));
     }
 }

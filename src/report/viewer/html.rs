@@ -1,11 +1,11 @@
 //! The viewer in HTML: data for the script, and the pictures beside the page for a reader without it.
 
-use super::super::document::{Block, FigureBlock};
-use super::super::html::escape;
-use super::{Viewer, maps};
+use super::maps;
+use crate::report::document::{FigureBlock, PageBlock, ViewerBlock};
+use crate::report::markup::escape;
 
 const STYLE: &str = include_str!("viewer.css");
-/// In the order in which each uses the ones before it.
+/// In this order: each uses the ones before it.
 const SCRIPTS: [&str; 4] = [
     include_str!("values.js"),
     include_str!("canvases.js"),
@@ -13,8 +13,8 @@ const SCRIPTS: [&str; 4] = [
     include_str!("viewer.js"),
 ];
 
-/// A viewer's place on the page.
-pub fn to_html(viewer: &Viewer) -> String {
+/// A viewer on the page.
+pub fn to_html(viewer: &ViewerBlock) -> String {
     let figures: String = viewer.figures.iter().map(figure).collect();
     let figures = format!("<div class=\"figures\">\n{figures}</div>");
     let label = match viewer.cell.as_str() {
@@ -23,7 +23,7 @@ pub fn to_html(viewer: &Viewer) -> String {
     };
     match &viewer.data {
         Some(data) if viewer.figures.is_empty() => format!(
-            "<details>\n<summary>The same with seams to move</summary>\n\
+            "<details>\n<summary>The same with movable seams</summary>\n\
              <div class=\"viewer\" role=\"group\" aria-label=\"{label}\">\n\
              <script type=\"application/json\">{data}</script>\n<noscript>This needs a script.</noscript>\n</div>\n\
              </details>\n"
@@ -33,24 +33,24 @@ pub fn to_html(viewer: &Viewer) -> String {
              <script type=\"application/json\">{data}</script>\n<noscript>{figures}</noscript>\n</div>\n"
         ),
         None if viewer.figures.is_empty() => {
-            "<p class=\"viewer-left-out\">The page has no room for the same with seams to move.</p>\n"
+            "<p class=\"viewer-left-out\">The page has no room for the same with movable seams.</p>\n"
                 .into()
         }
         None => format!(
-            "<p class=\"viewer-left-out\">The page has no room for more pictures that a script can compare. These \
-             stand beside it, with EXR files of all values.</p>\n{figures}\n"
+            "<p class=\"viewer-left-out\">The page has no room for more pictures that a script can compare. Their \
+             PNG and EXR files are beside the page.</p>\n{figures}\n"
         ),
     }
 }
 
-/// What a page with viewers needs once: a style for its head, and a script for its end.
-pub fn parts(blocks: &[Block]) -> (String, String) {
+/// Style and script of a page with viewers, for its head and its end.
+pub fn parts(blocks: &[PageBlock]) -> (String, String) {
     if !blocks.iter().any(has_viewer) {
         return Default::default();
     }
     let [noise, signed] = maps::palettes();
     let scripts = SCRIPTS.join("\n");
-    // One function around all, so that nothing of it is global.
+    // One function around everything, so that nothing is global.
     let script = format!(
         "<script type=\"application/json\" id=\"viewer-palettes\">{{\"noise\":\"{noise}\",\"signed\":\"{signed}\"}}\
          </script>\n<script>\n\"use strict\";\n(() => {{\n{scripts}}})();\n</script>\n"
@@ -58,15 +58,15 @@ pub fn parts(blocks: &[Block]) -> (String, String) {
     (STYLE.into(), script)
 }
 
-fn has_viewer(block: &Block) -> bool {
+fn has_viewer(block: &PageBlock) -> bool {
     match block {
-        Block::Viewer(_) => true,
-        Block::Folded(_, blocks) => blocks.iter().any(has_viewer),
+        PageBlock::Viewer(_) => true,
+        PageBlock::Folded(_, blocks) => blocks.iter().any(has_viewer),
         _ => false,
     }
 }
 
-/// A picture by its file: the page holds its values already.
+/// A picture by its file: the page already contains its values.
 fn figure(f: &FigureBlock) -> String {
     let (title, caption) = (escape(&f.title), escape(&f.caption));
     let path =

@@ -1,4 +1,4 @@
-//! False-colour maps: a number a pixel, as an index into a palette of 255 colours.
+//! False-colour maps: one number per pixel, as an index into a palette of 255 colours.
 
 use crate::math;
 use crate::results::image::{Picture, diverging};
@@ -9,7 +9,7 @@ pub(super) const Z_LIMIT: f64 = 4.0;
 pub(super) const NOISE_RANGE: (f64, f64) = (1e-3, 1.0);
 /// Relative differences are shown up to one of these.
 const LIMITS: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
-/// Part of the pixels that the range of differences holds.
+/// Fraction of the pixels within the range of differences.
 const SHOWN: f64 = 0.95;
 
 /// Index of a pixel that has no value.
@@ -28,7 +28,8 @@ pub(super) fn difference(a: &Picture, b: &Picture, band: usize) -> Vec<f64> {
     a.mean(band).zip(b.mean(band)).map(|(a, b)| (a - b) / b.abs()).collect()
 }
 
-/// (a - b) over its standard error, of two that are independent; not a number where neither has an error.
+/// (a - b) over its standard error, of two that are independent; not a number where neither has an
+/// error.
 pub(super) fn z_scores(a: &Picture, b: &Picture, band: usize) -> Vec<f64> {
     let errors = a.std_error(band).zip(b.std_error(band));
     let score = |((a, b), (ea, eb)): ((f64, f64), (f64, f64))| {
@@ -63,8 +64,8 @@ pub(super) fn noise_index(value: f64) -> u8 {
     (1.0 + 254.0 * part).round() as u8
 }
 
-/// Ten steps of viridis (S. van der Walt, N. Smith, Matplotlib; in the public domain), which is ordered by lightness
-/// for every kind of colour vision.
+/// Ten steps of viridis (S. van der Walt, N. Smith, Matplotlib; in the public domain), which is ordered
+/// by lightness for every kind of colour vision.
 const VIRIDIS: [[u8; 3]; 11] = [
     [0x44, 0x01, 0x54],
     [0x48, 0x24, 0x75],
@@ -90,7 +91,7 @@ fn sequential(x: f64) -> [u8; 3] {
     })
 }
 
-/// The colours of all indices as digits, six each: of noise, and of signed values.
+/// The colours of all indices as hexadecimal digits, six per colour: of noise, and of signed values.
 pub(super) fn palettes() -> [String; 2] {
     let grey = diverging(f64::NAN);
     let text = |colour: &dyn Fn(f64) -> [u8; 3]| {

@@ -1,44 +1,35 @@
-//! The pictures of one cell, to be compared: one PNG an estimator for a reader without scripts, and what the page's
-//! viewer needs beside: linear values, and maps of noise, of differences and of their z-scores.
+//! The pictures of one cell in a viewer that compares them: one PNG per estimator for a reader without
+//! scripts, and the input of the page's script: linear values, and maps of noise, of differences and of
+//! their z-scores.
 
 use serde::Serialize;
 
 use super::base64;
-use super::document::{self, FigureBlock};
-use super::{Figure, few_bands, number::significant};
+use super::document::{FigureBlock, PictureFile, ViewerBlock};
+use super::number::significant;
+use super::pictures::{Figure, few_bands};
 use crate::error::Result;
 use crate::results::image::{Picture, to_byte_png, to_linear_png};
 use crate::results::record::{Bias, Cell, EstimatorRun};
 use crate::results::store::Stored;
 use crate::stats::tails::student_two_sided;
 
-/// How it stands on the page.
+/// The viewer in HTML.
 mod html;
-/// False colours.
+/// False-colour maps.
 mod maps;
 
 pub use html::{parts, to_html};
 
-/// Bytes that the viewers of a page may hold together; a browser opens that much at once.
+/// Bytes of all viewers of a page together; a browser opens that much at once.
 const ROOM: usize = 24_000_000;
-
-/// The pictures of one cell.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Viewer {
-    /// The cell's label; empty without a sweep.
-    pub cell: String,
-    /// One tone-mapped PNG an estimator; none where the page shows them above.
-    pub figures: Vec<FigureBlock>,
-    /// What the page's script reads, as JSON; none where the page has no more room.
-    pub data: Option<String>,
-}
 
 #[derive(Serialize)]
 struct Data<'a> {
     cell: &'a str,
     width: usize,
     height: usize,
-    /// Tiles a row: each has a seam of its own.
+    /// Tiles per row; each has its own seam.
     columns: usize,
     /// The exposure of the PNG files.
     stops: f64,
@@ -60,11 +51,11 @@ struct PictureData<'a> {
     noise: Vec<String>,
     difference: Option<Maps<'a>>,
     z: Option<Maps<'a>>,
-    /// Why no other is of the same integral.
+    /// Why there is no z-score: no other estimator has the same integral.
     alone: String,
 }
 
-/// A map a band, with a note a band.
+/// One map per band, with one note per band.
 #[derive(Serialize)]
 struct Maps<'a> {
     of: &'a str,
@@ -76,11 +67,11 @@ struct Maps<'a> {
 ///
 /// # Errors
 /// Pictures without pixels.
-pub(super) fn viewers(stored: &Stored, figures: &[Figure]) -> Result<Vec<Viewer>> {
+pub(super) fn viewers(stored: &Stored, figures: &[Figure]) -> Result<Vec<ViewerBlock>> {
     viewers_within(stored, figures, ROOM)
 }
 
-fn viewers_within(stored: &Stored, figures: &[Figure], room: usize) -> Result<Vec<Viewer>> {
+fn viewers_within(stored: &Stored, figures: &[Figure], room: usize) -> Result<Vec<ViewerBlock>> {
     let (mut viewers, mut left) = (Vec::new(), Some(room));
     for cell in &stored.record.cells {
         let figures: Vec<FigureBlock> =
@@ -94,7 +85,7 @@ fn viewers_within(stored: &Stored, figures: &[Figure], room: usize) -> Result<Ve
             left = room.checked_sub(text.len());
             data = left.map(|_| text);
         }
-        viewers.push(Viewer { cell: cell.label.clone(), figures, data });
+        viewers.push(ViewerBlock { cell: cell.label.clone(), figures, data });
     }
     Ok(viewers)
 }
@@ -102,7 +93,7 @@ fn viewers_within(stored: &Stored, figures: &[Figure], room: usize) -> Result<Ve
 fn block(figure: &Figure) -> FigureBlock {
     FigureBlock {
         path: format!("{}.png", figure.stem),
-        picture: document::Picture::Png(figure.png.clone()),
+        picture: PictureFile::Png(figure.png.clone()),
         title: figure.estimator.clone(),
         caption: figure.caption.clone(),
     }
@@ -144,13 +135,13 @@ fn json(stored: &Stored, cell: &Cell) -> Result<String> {
 }
 
 impl Data<'_> {
-    /// A name may hold `</script>`; in JSON `<` may as well be written by its number.
+    /// A name may contain `</script>`; JSON allows `<` to be escaped by its number.
     fn to_text(&self) -> String {
         serde_json::to_string(self).unwrap_or_default().replace('<', "\\u003c")
     }
 }
 
-/// Pictures in a grid, tile beside tile without a gap, as one estimator shows them.
+/// The pictures of one estimator in a grid, tile by tile without a gap.
 pub(super) struct Sheet<'a> {
     /// The estimator.
     pub name: &'a str,
@@ -158,11 +149,17 @@ pub(super) struct Sheet<'a> {
     pub rgb: Vec<[f64; 3]>,
 }
 
-/// The viewer of a grid whose pictures stand on the page already: two sheets of one size, so many tiles a row.
+/// The viewer of a grid whose pictures are already on the page: two sheets of one size with `columns`
+/// tiles per row.
 ///
 /// # Errors
 /// Sheets without pixels.
-pub(super) fn grid(title: &str, sheets: [Sheet; 2], width: usize, columns: usize) -> Result<Viewer> {
+pub(super) fn grid(
+    title: &str,
+    sheets: [Sheet; 2],
+    width: usize,
+    columns: usize,
+) -> Result<ViewerBlock> {
     let height = sheets[0].rgb.len() / width.max(1);
     let picture =
         |sheet: &Sheet<'_>| Ok(base64::encode(&to_linear_png(width, sheet.rgb.iter().copied())?));
@@ -187,12 +184,12 @@ pub(super) fn grid(title: &str, sheets: [Sheet; 2], width: usize, columns: usize
         noise_range: maps::NOISE_RANGE,
         pictures: pictures.collect(),
     };
-    Ok(Viewer { cell: title.into(), figures: Vec::new(), data: Some(data.to_text()) })
+    Ok(ViewerBlock { cell: title.into(), figures: Vec::new(), data: Some(data.to_text()) })
 }
 
-/// Takes the data off viewers that come when the page's room is spent.
-pub(super) fn keep_room<'a>(first: &[Viewer], more: impl Iterator<Item = &'a mut Viewer>) {
-    let size = |viewer: &Viewer| viewer.data.as_ref().map_or(0, String::len);
+/// Removes the data of viewers that exceed the room of the page.
+pub(super) fn keep_room<'a>(first: &[ViewerBlock], more: impl Iterator<Item = &'a mut ViewerBlock>) {
+    let size = |viewer: &ViewerBlock| viewer.data.as_ref().map_or(0, String::len);
     let mut used: usize = first.iter().map(size).sum();
     for viewer in more {
         used += size(viewer);
@@ -202,7 +199,7 @@ pub(super) fn keep_room<'a>(first: &[Viewer], more: impl Iterator<Item = &'a mut
     }
 }
 
-/// The bands that have maps, and a note where that is not all of them.
+/// The bands that have maps, and a note if these are not all.
 fn mapped(bands: usize) -> (Vec<usize>, String) {
     let few = few_bands(bands);
     let note = match few.len() == bands {
@@ -212,14 +209,15 @@ fn mapped(bands: usize) -> (Vec<usize>, String) {
     (few, note)
 }
 
-/// The first of the cell's estimators of the same integral, where that is another one.
+/// The first estimator of the cell with the same integral, if it is another one.
 fn same_integral<'a>(shots: &[Shot<'a>], index: usize) -> Option<Shot<'a>> {
     let of_model = |shot: &&Shot| shot.run.model == shots[index].run.model;
     let first = shots.iter().position(|shot| of_model(&shot))?;
     (first != index).then(|| shots[first])
 }
 
-/// What differences are taken from: the same integral, or light transport itself where a model has no other estimator.
+/// The reference of differences: an estimator of the same integral, or light transport where a model has
+/// no other estimator.
 fn other<'a>(shots: &[Shot<'a>], index: usize) -> Option<Shot<'a>> {
     let truth = || shots.iter().find(|shot| shot.run.model.is_none()).copied();
     same_integral(shots, index).or_else(|| shots[index].run.model.as_ref().and_then(|_| truth()))
@@ -276,7 +274,7 @@ fn about(run: &EstimatorRun) -> String {
     format!("{} passes{model}", run.passes)
 }
 
-/// Why there is no z-score of a picture, nor one of another against it; empty where there is one.
+/// Why there is no z-score of a picture, nor of another picture against it; empty if there is one.
 fn alone(shots: &[Shot], index: usize) -> String {
     let of_model = |shot: &&Shot| shot.run.model == shots[index].run.model;
     if shots.iter().filter(of_model).count() > 1 {
@@ -296,13 +294,13 @@ fn model_note(run: &EstimatorRun, other: &EstimatorRun) -> String {
     )
 }
 
-/// How many scores are beyond the scale, and how many chance would put there.
+/// The number of z-scores beyond the scale, and the number expected by chance.
 fn beyond(z: &[f64], passes: u64) -> String {
     let judged = z.iter().filter(|z| !z.is_nan()).count();
     let found = z.iter().filter(|z| z.abs() > maps::Z_LIMIT).count();
     let grey = z.len() - judged;
     let mut text = format!("{found} of {judged} pixels are beyond ±{}", maps::Z_LIMIT);
-    // Of two sides' degrees of freedom the fewer: the tail is then at least as heavy as theirs together.
+    // The smaller degrees of freedom of the two sides: their tail is at least as heavy as that of both.
     if passes > 1 && judged > 0 {
         let dof = passes as f64 - 1.0;
         let chance = student_two_sided(maps::Z_LIMIT, dof) * judged as f64;
@@ -318,7 +316,7 @@ fn beyond(z: &[f64], passes: u64) -> String {
     text
 }
 
-/// What stands against reading a difference as a defect.
+/// Reasons not to read a difference as a defect.
 fn caution(runs: &[&EstimatorRun], band: usize) -> String {
     let mut text = String::new();
     for run in runs {

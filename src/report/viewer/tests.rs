@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use super::super::document::Block;
 use super::*;
+use crate::report::document::PageBlock;
 use crate::results::image::decoded_plane;
 use crate::results::npy::Array;
 use crate::results::sample;
@@ -149,9 +149,9 @@ fn what_the_page_has_no_room_for_is_said() {
     assert_eq!(left_out.data, None);
     let html = to_html(&left_out);
     assert!(html.contains("no room") && html.contains("src=\"images/000-mis.png\""), "{html}");
-    let blocks = [Block::Folded("more".into(), vec![Block::Viewer(left_out)])];
+    let blocks = [PageBlock::Folded("more".into(), vec![PageBlock::Viewer(left_out)])];
     assert_eq!(parts(&blocks).1.matches("<script").count(), 2);
-    assert_eq!(parts(&[Block::Text("x".into())]), Default::default());
+    assert_eq!(parts(&[PageBlock::Text("x".into())]), Default::default());
 }
 
 #[test]
@@ -169,7 +169,7 @@ fn a_grid_is_two_sheets_without_maps() {
     assert_eq!((&data["bands"], &data["pictures"][1]["z"]), (&serde_json::json!([]), &Value::Null));
     assert!(to_html(&viewer).starts_with("<details>"));
 
-    let full = Viewer { data: Some(" ".repeat(ROOM)), ..Viewer::default() };
+    let full = ViewerBlock { data: Some(" ".repeat(ROOM)), ..ViewerBlock::default() };
     keep_room(&[], [&mut viewer].into_iter());
     assert!(viewer.data.is_some());
     keep_room(&[full], [&mut viewer].into_iter());

@@ -1,0 +1,36 @@
+//! What the views of a record are made from.
+
+use super::document::ViewerBlock;
+use super::pictures::Figure;
+use super::plots::Section;
+use super::split::SplitFigure;
+use crate::results::measurements::Measurement;
+use crate::results::provenance::Provenance;
+use crate::results::store::Stored;
+use crate::verify::comparisons::Row;
+use crate::verify::model_errors::ModelError;
+use crate::verify::verdict::Verdict;
+
+/// Everything that a report is made from.
+pub struct ReportData {
+    /// The record, with its timing where it was measured.
+    pub stored: Stored,
+    /// Build and machine, where they were noted.
+    pub provenance: Option<Provenance>,
+    /// The verdicts on its claims.
+    pub verdicts: Vec<Verdict>,
+    /// The mean of every observable.
+    pub rows: Vec<Measurement>,
+    /// Efficiencies of pairs of estimators.
+    pub comparisons: Vec<Row>,
+    /// Errors of models against light transport.
+    pub model_errors: Vec<ModelError>,
+    /// The pictures, in the order of cells and estimators.
+    pub figures: Vec<Figure>,
+    /// The pictures by cell, in viewers that compare them.
+    pub viewers: Vec<ViewerBlock>,
+    /// Grids of split pictures.
+    pub splits: Vec<SplitFigure>,
+    /// Plots.
+    pub plots: Vec<Section>,
+}

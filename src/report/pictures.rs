@@ -1,0 +1,87 @@
+//! The pictures of a record's runs, and the bands that have pictures of their own.
+
+use crate::error::Result;
+use crate::results::atomic;
+use crate::results::exr_file::write_exr;
+use crate::results::image::{Picture, write_png};
+use crate::results::record::{Cell, EstimatorRun};
+use crate::results::store::{RecordFolder, Stored};
+
+/// A picture of one run.
+pub struct Figure {
+    /// Cell label.
+    pub cell: String,
+    /// Estimator name.
+    pub estimator: String,
+    /// Path relative to the results folder, without extension.
+    pub stem: String,
+    /// The PNG file.
+    pub png: Vec<u8>,
+    /// Passes, exposure, and pixels that could not be shown.
+    pub caption: String,
+}
+
+/// The bands that have pictures of their own: up to three bands all of them, else the first, the
+/// middle and the last.
+pub(super) fn few_bands(count: usize) -> Vec<usize> {
+    match count {
+        0..=3 => (0..count).collect(),
+        _ => vec![0, count / 2, count - 1],
+    }
+}
+
+/// Writes the picture of every run as OpenEXR and PNG into `images/`.
+pub(super) fn write_figures(folder: &RecordFolder, stored: &Stored) -> Result<Vec<Figure>> {
+    let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
+    let mut figures = Vec::new();
+    for (index, cell) in stored.record.cells.iter().enumerate() {
+        for (number, run) in cell.runs.iter().enumerate() {
+            if let Some(picture) = Picture::of(stored, run) {
+                let stem = stem(index, number, &run.estimator);
+                figures.push(write_figure(folder, stored, cell, (run, stem), &picture, stops)?);
+            }
+        }
+    }
+    Ok(figures)
+}
+
+/// Path of a run's picture without extension: the estimator's name if it is plain, and otherwise the
+/// number of the run and the plain parts of the name.
+fn stem(cell: usize, run: usize, estimator: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+    if estimator.chars().all(is_plain) {
+        return format!("images/{cell:03}-{estimator}");
+    }
+    let words: Vec<&str> = estimator.split(|c| !is_plain(c)).filter(|word| !word.is_empty()).collect();
+    format!("images/{cell:03}-{run:03}.{}", words.join("-"))
+}
+
+fn write_figure(
+    folder: &RecordFolder,
+    stored: &Stored,
+    cell: &Cell,
+    (run, stem): (&EstimatorRun, String),
+    picture: &Picture,
+    stops: f64,
+) -> Result<Figure> {
+    let path = |extension: &str| folder.root().join(format!("{stem}.{extension}"));
+    atomic::create_folder(&folder.root().join("images"), "create the image folder")?;
+    let attributes = [
+        ("experiment", stored.record.experiment.as_str()),
+        ("cell", &cell.label),
+        ("estimator", &run.estimator),
+        ("passes", &run.passes.to_string()),
+        ("fingerprint", &stored.record.fingerprint),
+    ];
+    write_exr(&path("exr"), picture, &attributes)?;
+    let png = write_png(&path("png"), picture, stops)?;
+    let mut caption = format!("{} passes, exposure {stops:+} stops, clipped to sRGB", run.passes);
+    if png.clipped > 0 {
+        caption += &format!("; pixels too bright: {}", png.clipped);
+    }
+    if png.out_of_gamut > 0 {
+        caption += &format!("; pixels outside the gamut or not finite: {}", png.out_of_gamut);
+    }
+    let (cell, estimator) = (cell.label.clone(), run.estimator.clone());
+    Ok(Figure { cell, estimator, stem, png: png.bytes, caption })
+}

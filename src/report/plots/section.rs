@@ -1,0 +1,125 @@
+//! Plots under one heading, as blocks of a page and as files.
+
+use crate::error::Result;
+use crate::report::document::{FigureBlock, PageBlock, PictureFile};
+use crate::report::pictures::few_bands;
+use crate::report::plot::{Plot, panels, swatches};
+use crate::results::record::{Cell, EstimatorRun};
+use crate::results::store::{RecordFolder, Stored};
+
+/// One picture of one or more plots below each other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlotFigure {
+    /// Stem of its files under `plots/`, unique on its page.
+    pub name: String,
+    /// What it shows, in a few words.
+    pub title: String,
+    /// How to read it.
+    pub caption: String,
+    /// What is drawn.
+    pub content: Content,
+}
+
+/// What is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Content {
+    /// Plots.
+    Plots(Vec<Plot>),
+    /// Names with their 8-bit sRGB colours.
+    Swatches(Vec<(String, [u8; 3])>),
+}
+
+/// Plots under one heading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Section {
+    /// The heading.
+    pub heading: String,
+    /// Text for all of them.
+    pub text: String,
+    /// The plots.
+    pub drawn: Vec<PlotFigure>,
+    /// Whether they are placed side by side.
+    pub are_small: bool,
+}
+
+impl Section {
+    /// Writes the pictures and their numbers into `plots/`.
+    ///
+    /// # Errors
+    /// I/O.
+    pub fn write(&self, folder: &RecordFolder) -> Result<()> {
+        for drawn in &self.drawn {
+            folder.write_view(&drawn.path(), drawn.to_svg().as_bytes())?;
+            let Content::Plots(plots) = &drawn.content else { continue };
+            for (number, plot) in plots.iter().enumerate() {
+                let part = if number == 0 { String::new() } else { format!("-{}", number + 1) };
+                let path = format!("plots/{}{part}.csv", drawn.name);
+                folder.write_view(&path, plot.to_csv().as_bytes())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The blocks of the page.
+    pub fn blocks(&self) -> Vec<PageBlock> {
+        let mut blocks = vec![PageBlock::Heading(2, self.heading.clone())];
+        if !self.text.is_empty() {
+            blocks.push(PageBlock::Text(self.text.clone()));
+        }
+        let figures: Vec<FigureBlock> = self.drawn.iter().map(PlotFigure::figure).collect();
+        let pictures = match self.are_small {
+            true => vec![PageBlock::Figures(figures)],
+            false => figures.into_iter().map(PageBlock::Wide).collect(),
+        };
+        match self.drawn.len() > MOST_OPEN {
+            true => blocks.push(PageBlock::Folded(format!("All {} plots", self.drawn.len()), pictures)),
+            false => blocks.extend(pictures),
+        }
+        blocks
+    }
+}
+
+/// With more plots a section is folded.
+const MOST_OPEN: usize = 12;
+
+impl PlotFigure {
+    fn path(&self) -> String {
+        format!("plots/{}.svg", self.name)
+    }
+
+    fn to_svg(&self) -> String {
+        match &self.content {
+            Content::Plots(plots) => panels(plots),
+            Content::Swatches(colours) => swatches::to_svg(colours),
+        }
+    }
+
+    fn figure(&self) -> FigureBlock {
+        FigureBlock {
+            path: self.path(),
+            picture: PictureFile::Svg(self.to_svg()),
+            title: self.title.clone(),
+            caption: self.caption.clone(),
+        }
+    }
+}
+
+/// Indices of the bands that have plots of their own.
+pub(super) fn shown_bands(stored: &Stored) -> Vec<usize> {
+    few_bands(stored.record.bands.len())
+}
+
+/// The estimators of a cell, without second arms of one.
+pub(super) fn runs(cell: &Cell) -> impl Iterator<Item = &EstimatorRun> {
+    cell.runs.iter().filter(|run| run.control_of.is_none())
+}
+
+/// The parts of a title that are not empty, joined.
+pub(super) fn joined(parts: &[&str]) -> String {
+    parts.iter().filter(|part| !part.is_empty()).copied().collect::<Vec<_>>().join(", ")
+}
+
+/// The name of a band in a title; empty if there is only one band.
+pub(super) fn band_name(stored: &Stored, band: usize) -> &str {
+    if stored.record.bands.len() == 1 { "" } else { &stored.record.bands[band].name }
+}
