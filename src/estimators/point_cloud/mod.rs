@@ -188,7 +188,7 @@ impl Estimator for PointCloud {
     }
 
     /// Under p = e^(-m d) an accepted term of a band with effective transport s weighs like e^((m - s) d), with a Pareto
-    /// tail of index m / (m - s) on an unbounded surface: without variance where m > 2 s. A finite body cuts the tail off
+    /// tail of index m / (m - s) on an unbounded surface: the variance is infinite where m > 2 s. A finite body cuts the tail off
     /// at its diameter D; the variance has then grown by about e^((m - 2 s) D).
     fn heavy_tails(&self) -> Vec<HeavyTail> {
         if self.options.acceptance != Acceptance::Mean {

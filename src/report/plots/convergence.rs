@@ -3,9 +3,9 @@
 //! The spread of means of m passes, measured: the batches of a record, taken 2^k at a time, are
 //! independent means of m passes each; with G of them, s^2 = sum (mean_g - mean)^2 / (G - 1) estimates
 //! the variance of such a mean with G - 1 degrees of freedom, whatever m. For independent passes of
-//! finite variance s falls as 1/sqrt(m); with a heavy tail it falls more slowly, or in steps. The interval
-//! is that of s for near-normal means, s sqrt((G - 1) / chi2). Beside it stands the standard error
-//! of m passes that the variance of all passes predicts.
+//! finite variance s falls as 1/sqrt(m); with a heavy tail it falls more slowly, or in steps. The
+//! interval is that of s for near-normal means, s sqrt((G - 1) / chi2). Beside it stands the standard
+//! error of m passes that the variance of all passes predicts.
 
 use super::section::{PlotFigure, Section, runs};
 use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Style};

@@ -1,6 +1,6 @@
 //! Running means: one plot per cell of the mean against the number of passes, with the 95 % interval of
-//! each estimator and the expected value of a claim. A valid interval covers the expected value for 19 of
-//! 20 estimators. With too heavy a tail the interval is narrow and lies beside it.
+//! each estimator and the expected value of a claim. A valid interval covers the expected value for 19
+//! of 20 estimators. With too heavy a tail the interval is narrow and lies beside it.
 
 use super::section::{PlotFigure, Section, joined};
 use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
