@@ -1,7 +1,6 @@
 //! What the views of a record are made from.
 
 use super::document::ViewerBlock;
-use super::pictures::Figure;
 use super::plots::Section;
 use super::split::SplitFigure;
 use crate::results::measurements::Measurement;
@@ -25,8 +24,6 @@ pub struct ReportData {
     pub comparisons: Vec<Row>,
     /// Errors of models against light transport.
     pub model_errors: Vec<ModelError>,
-    /// The pictures, in the order of cells and estimators.
-    pub figures: Vec<Figure>,
     /// The pictures by cell, in viewers that compare them.
     pub viewers: Vec<ViewerBlock>,
     /// Grids of split pictures.

@@ -139,7 +139,8 @@ pub fn escaped(text: &str) -> String {
     latex
 }
 
-/// The length of a number such as `-1.5(2)e-7` at the start of a text, if it has to be set as mathematics.
+/// The length of a number such as `-1.5(2)e-7` at the start of a text, if it has to be set as
+/// mathematics.
 fn number_length(text: &str) -> Option<usize> {
     let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
     let sign = usize::from(text.starts_with(['-', '+']));

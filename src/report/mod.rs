@@ -71,8 +71,8 @@ pub fn write_judged(
     let stored = Stored { timing: folder.read_timing()?, ..stored };
     let provenance = folder.read_provenance()?;
     let rows = measurements(&stored, stored.timing.as_ref());
-    let figures = pictures::write_figures(folder, &stored)?;
-    let viewers = viewer::viewers(&stored, &figures)?;
+    let pictures = pictures::write_pictures(folder, &stored)?;
+    let viewers = viewer::viewers(&stored, &pictures)?;
     let wanted = folder.read_pictures()?;
     let mut splits = split::write_splits(folder, &stored, &split::wanted(&wanted))?;
     viewer::keep_room(&viewers, splits.iter_mut().map(|split| &mut split.viewer));
@@ -88,7 +88,6 @@ pub fn write_judged(
         rows,
         comparisons,
         model_errors,
-        figures,
         viewers,
         splits,
         plots,

@@ -1,5 +1,6 @@
 //! The pictures of a record's runs, and the bands that have pictures of their own.
 
+use super::document::{FigureBlock, PictureFile};
 use crate::error::Result;
 use crate::results::atomic;
 use crate::results::exr_file::write_exr;
@@ -8,17 +9,11 @@ use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::{RecordFolder, Stored};
 
 /// A picture of one run.
-pub struct Figure {
+pub struct RunPicture {
     /// Cell label.
     pub cell: String,
-    /// Estimator name.
-    pub estimator: String,
-    /// Path relative to the results folder, without extension.
-    pub stem: String,
-    /// The PNG file.
-    pub png: Vec<u8>,
-    /// Passes, exposure, and pixels that could not be shown.
-    pub caption: String,
+    /// The PNG file, named by the estimator, with its exposure and the pixels that could not be shown.
+    pub figure: FigureBlock,
 }
 
 /// The bands that have pictures of their own: up to three bands all of them, else the first, the
@@ -31,18 +26,18 @@ pub(super) fn few_bands(count: usize) -> Vec<usize> {
 }
 
 /// Writes the picture of every run as OpenEXR and PNG into `images/`.
-pub(super) fn write_figures(folder: &RecordFolder, stored: &Stored) -> Result<Vec<Figure>> {
+pub(super) fn write_pictures(folder: &RecordFolder, stored: &Stored) -> Result<Vec<RunPicture>> {
     let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
-    let mut figures = Vec::new();
+    let mut pictures = Vec::new();
     for (index, cell) in stored.record.cells.iter().enumerate() {
         for (number, run) in cell.runs.iter().enumerate() {
             if let Some(picture) = Picture::of(stored, run) {
                 let stem = stem(index, number, &run.estimator);
-                figures.push(write_figure(folder, stored, cell, (run, stem), &picture, stops)?);
+                pictures.push(write_picture(folder, stored, cell, (run, stem), &picture, stops)?);
             }
         }
     }
-    Ok(figures)
+    Ok(pictures)
 }
 
 /// Path of a run's picture without extension: the estimator's name if it is plain, and otherwise the
@@ -56,14 +51,14 @@ fn stem(cell: usize, run: usize, estimator: &str) -> String {
     format!("images/{cell:03}-{run:03}.{}", words.join("-"))
 }
 
-fn write_figure(
+fn write_picture(
     folder: &RecordFolder,
     stored: &Stored,
     cell: &Cell,
     (run, stem): (&EstimatorRun, String),
     picture: &Picture,
     stops: f64,
-) -> Result<Figure> {
+) -> Result<RunPicture> {
     let path = |extension: &str| folder.root().join(format!("{stem}.{extension}"));
     atomic::create_folder(&folder.root().join("images"), "create the image folder")?;
     let attributes = [
@@ -82,6 +77,11 @@ fn write_figure(
     if png.out_of_gamut > 0 {
         caption += &format!("; pixels outside the gamut or not finite: {}", png.out_of_gamut);
     }
-    let (cell, estimator) = (cell.label.clone(), run.estimator.clone());
-    Ok(Figure { cell, estimator, stem, png: png.bytes, caption })
+    let figure = FigureBlock {
+        path: format!("{stem}.png"),
+        picture: PictureFile::Png(png.bytes),
+        title: run.estimator.clone(),
+        caption,
+    };
+    Ok(RunPicture { cell: cell.label.clone(), figure })
 }

@@ -1,6 +1,6 @@
-//! Split pictures: a grid with one picture per cell, its left half by one estimator and its right half by
-//! another, with the same exposure. The caption states the CPU time of each half, and either that the
-//! times are equal or by how much they differ.
+//! Split pictures: a grid with one picture per cell, its left half by one estimator and its right half
+//! by another, with the same exposure. The caption states the CPU time of each half, and either that
+//! the times are equal or by how much they differ.
 
 use super::document::{Document, FigureBlock, PageBlock, PictureFile, TableBlock, ViewerBlock};
 use super::number::significant;
@@ -224,8 +224,8 @@ impl<'a> Grid<'a> {
         viewer::grid(title, sheets, columns * self.size.0, columns)
     }
 
-    /// The complete pictures of one side, divided by their white levels, tile by tile; black where there is
-    /// none.
+    /// The complete pictures of one side, divided by their white levels, tile by tile; black where
+    /// there is none.
     fn sheet(&self, half: usize) -> Vec<[f64; 3]> {
         let (width, height) = self.size;
         let row_length = self.columns.len() * width;

@@ -193,7 +193,7 @@ impl Estimator for PointCloud {
         Some(self.options.model.to_string())
     }
 
-    /// Under p = e^(-m d) an accepted term of a band with effective transport s weighs like e^((m - s)
+    /// Under p = e^(-m d) an accepted term of a band with effective transport s has weights like e^((m - s)
     /// d), with a Pareto tail of index m / (m - s) on an unbounded surface: of infinite variance where m
     /// > 2 s. A finite body cuts the tail off at its diameter D; the variance has then grown by about
     /// e^((m - 2 s) D).

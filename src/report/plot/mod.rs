@@ -65,6 +65,13 @@ pub struct Series {
     pub style: Style,
 }
 
+impl Series {
+    /// A named series.
+    pub fn new(name: impl Into<String>, style: Style, points: Vec<PlotPoint>) -> Series {
+        Series { name: name.into(), points, style }
+    }
+}
+
 /// A point with an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlotPoint {
@@ -123,6 +130,11 @@ struct PlotFrame {
 }
 
 impl Plot {
+    /// A small plot of some series.
+    pub fn small(x: PlotAxis, y: PlotAxis, series: Vec<Series>) -> Plot {
+        Plot { x, y, series, size: Size::Small, ..Plot::default() }
+    }
+
     /// The picture.
     pub fn to_svg(&self) -> String {
         panels(std::slice::from_ref(self))

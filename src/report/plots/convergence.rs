@@ -3,12 +3,12 @@
 //! The spread of means of m passes, measured: the batches of a record, taken 2^k at a time, are
 //! independent means of m passes each; with G of them, s^2 = sum (mean_g - mean)^2 / (G - 1) estimates
 //! the variance of such a mean with G - 1 degrees of freedom, whatever m. For independent passes of
-//! finite variance s falls as 1/sqrt(m); with a heavy tail it falls more slowly, or in steps. The interval
-//! is that of s for near-normal means, s sqrt((G - 1) / chi2). Beside it stands the standard error
-//! of m passes that the variance of all passes predicts.
+//! finite variance s falls as 1/sqrt(m); with a heavy tail it falls more slowly, or in steps. The
+//! interval is that of s for near-normal means, s sqrt((G - 1) / chi2). Beside it stands the standard
+//! error of m passes that the variance of all passes predicts.
 
-use super::section::{Content, PlotFigure, Section, runs};
-use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
+use super::section::{PlotFigure, Section, runs};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Style};
 use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::Stored;
 use crate::stats::moments::Moments;
@@ -66,20 +66,11 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> Vec<PlotFigure> {
             })
             .flatten()
             .collect();
-        let plot = Plot {
-            x: PlotAxis::log(price.label),
-            y: PlotAxis::log("relative error"),
-            series,
-            size: Size::Small,
-            ..Plot::default()
-        };
-        let drawn = PlotFigure {
-            name: format!("error-{}-{index:03}", price.name),
-            title: cell.label.clone(),
-            caption: format!("Against {}.", price.label),
-            content: Content::Plots(vec![plot.clone()]),
-        };
-        (!plot.series.is_empty()).then_some(drawn)
+        let is_measured = !series.is_empty();
+        let plot = Plot::small(PlotAxis::log(price.label), PlotAxis::log("relative error"), series);
+        let name = format!("error-{}-{index:03}", price.name);
+        let caption = format!("Against {}.", price.label);
+        is_measured.then(|| PlotFigure::of(name, cell.label.clone(), caption, plot))
     };
     PRICES.iter().filter_map(plot).collect()
 }
@@ -100,12 +91,8 @@ fn of_run(errors: &Errors, name: &str, unit: f64) -> Vec<Series> {
     let guide = |n: f64| PlotPoint::bare(n * unit, errors.of_a_pass / n.sqrt());
     let first = errors.measured.first().map_or(1.0, |(n, _)| *n);
     vec![
-        Series { name: name.into(), points, style: Style::Marks },
-        Series {
-            name: String::new(),
-            points: vec![guide(first), guide(errors.passes)],
-            style: Style::Guide,
-        },
+        Series::new(name, Style::Marks, points),
+        Series::new("", Style::Guide, vec![guide(first), guide(errors.passes)]),
     ]
 }
 

@@ -45,35 +45,17 @@ fn of_sampler(stored: &Stored, index: usize, run: &SamplerRun) -> Option<PlotFig
         places().filter(|(_, _, mass)| *mass <= 0.0).map(|(_, observed, _)| observed).sum();
     let last = bins.observed.len() as f64 - 0.5;
     let x = |label: &str| PlotAxis { range: Some([-0.5, last]), ..PlotAxis::linear(label) };
-    let above = Plot {
-        x: x(""),
-        y: PlotAxis::linear("share"),
-        series: vec![
-            Series { name: "expected".into(), points: places().map(mass).collect(), style: Style::Line },
-            Series {
-                name: "observed".into(),
-                points: places().map(share).collect(),
-                style: Style::Marks,
-            },
-        ],
-        size: Size::Small,
-        ..Plot::default()
-    };
-    let below = Plot {
-        x: x("bin"),
-        y: PlotAxis::linear("residual"),
-        series: vec![
-            Series {
-                name: String::new(),
-                points: vec![PlotPoint::bare(-0.5, 0.0), PlotPoint::bare(last, 0.0)],
-                style: Style::Guide,
-            },
-            // As long a name as above, so that the bins of both plots are aligned.
-            Series { name: "residual".into(), points: residuals, style: Style::Bars },
-        ],
-        size: Size::Flat,
-        ..Plot::default()
-    };
+    let shares = vec![
+        Series::new("expected", Style::Line, places().map(mass).collect()),
+        Series::new("observed", Style::Marks, places().map(share).collect()),
+    ];
+    let zero = vec![PlotPoint::bare(-0.5, 0.0), PlotPoint::bare(last, 0.0)];
+    // As long a name as above, so that the bins of both plots are aligned.
+    let residuals =
+        vec![Series::new("", Style::Guide, zero), Series::new("residual", Style::Bars, residuals)];
+    let above = Plot::small(x(""), PlotAxis::linear("share"), shares);
+    let below =
+        Plot { size: Size::Flat, ..Plot::small(x("bin"), PlotAxis::linear("residual"), residuals) };
     let mut caption =
         format!("{} draws, {} bins; largest residual {largest:.2}.", run.samples, bins.observed.len());
     if impossible > 0.0 {

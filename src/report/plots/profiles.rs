@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::section::{Content, PlotFigure, Section, band_name, joined, runs, shown_bands};
-use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
+use super::section::{PlotFigure, Section, band_name, joined, runs, shown_bands};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Style};
 use crate::results::record::{Cell, EstimatorRun, Observable, Quantity};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::Estimate;
@@ -46,25 +46,20 @@ fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &
         };
         let points: Vec<PlotPoint> =
             (0..edges.len() - 1).filter_map(point).filter(|p| p.y > 0.0).collect();
-        Series { name: run.estimator.clone(), points, style: Style::Line }
+        Series::new(&run.estimator, Style::Line, points)
     };
-    let plot = Plot {
-        x: PlotAxis::log("distance / mm"),
-        y: PlotAxis::log("exitance / area, W/mm^4"),
-        series: runs(cell).map(line).collect(),
-        size: Size::Small,
-        ..Plot::default()
-    };
-    PlotFigure {
-        name: format!("profile-{index:03}-{}", band + 1),
-        title: joined(&[&cell.label, band_name(stored, band)]),
-        caption: "A ring whose mean is not above 0 has no point.".into(),
-        content: Content::Plots(vec![plot]),
-    }
+    let (x, y) = (PlotAxis::log("distance / mm"), PlotAxis::log("exitance / area, W/mm^4"));
+    PlotFigure::of(
+        format!("profile-{index:03}-{}", band + 1),
+        joined(&[&cell.label, band_name(stored, band)]),
+        "A ring whose mean is not above 0 has no point.".into(),
+        Plot::small(x, y, runs(cell).map(line).collect()),
+    )
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::section::Content;
     use super::*;
     use crate::results::sample;
 

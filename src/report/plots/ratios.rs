@@ -71,8 +71,8 @@ struct Places {
     names: Vec<String>,
 }
 
-/// The labels of an axis: as numbers where all labels have one (`0.2`, or `albedo-0.5`, grouped by word);
-/// else as categories in the order of the cells.
+/// The labels of an axis: as numbers where all labels have one (`0.2`, or `albedo-0.5`, grouped by
+/// word); else as categories in the order of the cells.
 fn places(stored: &Stored, axis: &str) -> Vec<Places> {
     let mut labels: Vec<&String> = Vec::new();
     for cell in &stored.record.cells {

@@ -1,9 +1,9 @@
 //! Running means: one plot per cell of the mean against the number of passes, with the 95 % interval of
-//! each estimator and the expected value of a claim. A valid interval covers the expected value for 19 of
-//! 20 estimators. With too heavy a tail the interval is narrow and lies beside it.
+//! each estimator and the expected value of a claim. A valid interval covers the expected value for 19
+//! of 20 estimators. With too heavy a tail the interval is narrow and lies beside it.
 
-use super::section::{Content, PlotFigure, Section};
-use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size};
+use super::section::{PlotFigure, Section, joined};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
 use crate::results::pictures::{Running, Wanted};
 use crate::results::record::{Against, Cell, EstimatorRun, Observable, Quantity};
 use crate::results::store::Stored;
@@ -24,12 +24,8 @@ pub(super) fn section(stored: &Stored, wanted: &[Wanted]) -> Section {
     for (number, running) in running.enumerate() {
         for (index, cell) in stored.record.cells.iter().enumerate() {
             let Some((plot, title)) = plot(stored, index, cell, running) else { continue };
-            drawn.push(PlotFigure {
-                name: format!("running-{}-{index:03}", number + 1),
-                title,
-                caption: CAPTION.into(),
-                content: Content::Plots(vec![plot]),
-            });
+            let name = format!("running-{}-{index:03}", number + 1);
+            drawn.push(PlotFigure::of(name, title, CAPTION.into(), plot));
         }
     }
     Section { heading: "Means as passes add up".into(), text: String::new(), drawn, are_small: false }
@@ -54,7 +50,7 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
             let estimator = run.estimator.clone();
             let quantity = Quantity { cell: index, estimator, observable: observable.clone(), band };
             let points = means(&stored.batches(&quantity)?);
-            Some(Series { name: run.estimator.clone(), points, ..Series::default() })
+            Some(Series::new(&run.estimator, Style::Line, points))
         })
         .collect();
     let expected = stored.record.comparisons.iter().find_map(|comparison| {
@@ -69,11 +65,7 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
     let levels: Vec<(f64, String)> =
         expected.map(|value| (value, "expected".into())).into_iter().collect();
     let range = Some(range(&series, expected)?);
-    let title = [&*cell.label, &observable.name, &observable.class, &running.band]
-        .into_iter()
-        .filter(|part| !part.is_empty())
-        .collect::<Vec<_>>()
-        .join(", ");
+    let title = joined(&[&cell.label, &observable.name, &observable.class, &running.band]);
     let plot = Plot {
         x: PlotAxis::log("passes"),
         y: PlotAxis { range, ..PlotAxis::linear("mean") },

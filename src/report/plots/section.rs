@@ -83,6 +83,11 @@ impl Section {
 const MOST_OPEN: usize = 12;
 
 impl PlotFigure {
+    /// A picture of one plot.
+    pub(super) fn of(name: String, title: String, caption: String, plot: Plot) -> PlotFigure {
+        PlotFigure { name, title, caption, content: Content::Plots(vec![plot]) }
+    }
+
     fn path(&self) -> String {
         format!("plots/{}.svg", self.name)
     }

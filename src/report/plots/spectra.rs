@@ -2,7 +2,7 @@
 
 use super::section::{Content, PlotFigure, Section, runs};
 use crate::report::number::with_error;
-use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
+use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Style};
 use crate::results::image::{gain, shown_bytes};
 use crate::results::record::{Band, Cell, EstimatorRun};
 use crate::results::store::Stored;
@@ -41,15 +41,10 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [PlotFigure; 2] {
             let [from, to] = band.range_nm.unwrap_or_default();
             PlotPoint::of(0.5 * (from + to), mean)
         });
-        Series { name: run.estimator.clone(), points: points.collect(), style: Style::Line }
+        Series::new(&run.estimator, Style::Line, points.collect())
     };
-    let plot = Plot {
-        x: PlotAxis::linear("wavelength / nm"),
-        y: PlotAxis::linear("mean"),
-        series: runs.iter().map(line).collect(),
-        size: Size::Small,
-        ..Plot::default()
-    };
+    let series = runs.iter().map(line).collect();
+    let plot = Plot::small(PlotAxis::linear("wavelength / nm"), PlotAxis::linear("mean"), series);
     let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
     let colours: Vec<(String, [Estimate; 3])> =
         runs.iter().filter_map(|(run, _)| Some((run.estimator.clone(), colour(stored, run)?))).collect();
@@ -62,12 +57,12 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [PlotFigure; 2] {
         |(name, rgb): (String, [Estimate; 3])| (name, shown_bytes(rgb.map(|c| c.value), gain(stops)));
     let swatches = colours.into_iter().map(shown).collect();
     [
-        PlotFigure {
-            name: format!("spectrum-{index:03}"),
-            title: cell.label.clone(),
-            caption: "Bands at their middle.".into(),
-            content: Content::Plots(vec![plot]),
-        },
+        PlotFigure::of(
+            format!("spectrum-{index:03}"),
+            cell.label.clone(),
+            "Bands at their middle.".into(),
+            plot,
+        ),
         PlotFigure {
             name: format!("colour-{index:03}"),
             title: cell.label.clone(),

@@ -5,9 +5,9 @@
 use serde::Serialize;
 
 use super::base64;
-use super::document::{FigureBlock, PictureFile, ViewerBlock};
+use super::document::{FigureBlock, ViewerBlock};
 use super::number::significant;
-use super::pictures::{Figure, few_bands};
+use super::pictures::{RunPicture, few_bands};
 use crate::error::Result;
 use crate::results::image::{Picture, to_byte_png, to_linear_png};
 use crate::results::record::{Bias, Cell, EstimatorRun};
@@ -67,15 +67,15 @@ struct Maps<'a> {
 ///
 /// # Errors
 /// Pictures without pixels.
-pub(super) fn viewers(stored: &Stored, figures: &[Figure]) -> Result<Vec<ViewerBlock>> {
-    viewers_within(stored, figures, ROOM)
+pub(super) fn viewers(stored: &Stored, pictures: &[RunPicture]) -> Result<Vec<ViewerBlock>> {
+    viewers_within(stored, pictures, ROOM)
 }
 
-fn viewers_within(stored: &Stored, figures: &[Figure], room: usize) -> Result<Vec<ViewerBlock>> {
+fn viewers_within(stored: &Stored, pictures: &[RunPicture], room: usize) -> Result<Vec<ViewerBlock>> {
     let (mut viewers, mut left) = (Vec::new(), Some(room));
     for cell in &stored.record.cells {
         let figures: Vec<FigureBlock> =
-            figures.iter().filter(|figure| figure.cell == cell.label).map(block).collect();
+            pictures.iter().filter(|p| p.cell == cell.label).map(|p| p.figure.clone()).collect();
         if figures.is_empty() {
             continue;
         }
@@ -88,15 +88,6 @@ fn viewers_within(stored: &Stored, figures: &[Figure], room: usize) -> Result<Ve
         viewers.push(ViewerBlock { cell: cell.label.clone(), figures, data });
     }
     Ok(viewers)
-}
-
-fn block(figure: &Figure) -> FigureBlock {
-    FigureBlock {
-        path: format!("{}.png", figure.stem),
-        picture: PictureFile::Png(figure.png.clone()),
-        title: figure.estimator.clone(),
-        caption: figure.caption.clone(),
-    }
 }
 
 /// A run with its pixels.

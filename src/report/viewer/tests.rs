@@ -3,25 +3,27 @@
 use serde_json::Value;
 
 use super::*;
-use crate::report::document::PageBlock;
+use crate::report::document::{PageBlock, PictureFile};
 use crate::results::image::decoded_plane;
 use crate::results::npy::Array;
 use crate::results::sample;
 
-fn figures(stored: &Stored) -> Vec<Figure> {
+fn pictures(stored: &Stored) -> Vec<RunPicture> {
     let cell = &stored.record.cells[0];
-    let figure = |run: &EstimatorRun| Figure {
+    let picture = |run: &EstimatorRun| RunPicture {
         cell: cell.label.clone(),
-        estimator: run.estimator.clone(),
-        stem: format!("images/000-{}", run.estimator),
-        png: vec![1, 2, 3],
-        caption: "a caption".into(),
+        figure: FigureBlock {
+            path: format!("images/000-{}.png", run.estimator),
+            picture: PictureFile::Png(vec![1, 2, 3]),
+            title: run.estimator.clone(),
+            caption: "a caption".into(),
+        },
     };
-    cell.runs.iter().map(figure).collect()
+    cell.runs.iter().map(picture).collect()
 }
 
 fn data(stored: &Stored) -> (String, Value) {
-    let viewers = viewers(stored, &figures(stored)).expect("viewers");
+    let viewers = viewers(stored, &pictures(stored)).expect("viewers");
     let text = viewers[0].data.clone().expect("data");
     let value = serde_json::from_str(&text).expect("JSON");
     (text, value)
@@ -133,7 +135,7 @@ fn names_are_escaped() {
     assert!(!text.contains('<'));
     let names = [&value["cell"], &value["pictures"][0]["name"], &value["bands"][0]];
     assert!(names.iter().all(|n| *n == name), "{names:?}");
-    let viewer = viewers(&stored, &figures(&stored)).expect("viewers").remove(0);
+    let viewer = viewers(&stored, &pictures(&stored)).expect("viewers").remove(0);
     let html = to_html(&viewer);
     assert_eq!(html.matches("</script>").count(), 1, "{html}");
     assert!(!html.contains("<b>\"&'"), "{html}");
@@ -143,7 +145,7 @@ fn names_are_escaped() {
 fn what_the_page_has_no_room_for_is_said() {
     let stored = sample::stored(0.5);
     let size = data(&stored).0.len();
-    let within = |room| viewers_within(&stored, &figures(&stored), room).expect("viewers").remove(0);
+    let within = |room| viewers_within(&stored, &pictures(&stored), room).expect("viewers").remove(0);
     assert!(within(size).data.is_some());
     let left_out = within(size - 1);
     assert_eq!(left_out.data, None);
