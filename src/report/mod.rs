@@ -42,8 +42,6 @@ pub mod table;
 pub mod tables;
 /// For the terminal.
 pub mod terminal;
-/// How the tests were tested.
-mod trust;
 /// Pictures to be compared.
 pub mod viewer;
 
@@ -144,6 +142,7 @@ pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict
         folder
             .write_view("model_errors.csv", model_errors::to_csv(&material.model_errors).as_bytes())?;
     }
+    folder.write_manifest(&material.stored.record)?;
     Ok(material)
 }
 

@@ -39,9 +39,6 @@ pub(super) fn page(material: &Material) -> Document {
         blocks.extend(samplers(material));
         blocks.extend(material.plots.iter().flat_map(Section::blocks));
     }
-    if !material.verdicts.is_empty() {
-        blocks.extend(super::trust::blocks());
-    }
     blocks.extend(origin(material));
     Document { title: material.stored.record.experiment.clone(), blocks }
 }
@@ -110,7 +107,8 @@ fn claims(material: &Material) -> Vec<Block> {
     let text = format!(
         "{green} of {} comparisons hold, {failed} fail, {} could not be judged. The probability of any false \
          failure in the verification that judged them is at most {FAMILY_LEVEL:.0e} (Holm). \"detectable\" is the smallest true difference, relative \
-         to the expected value (absolute where that is 0), that its test would have found with 99 % probability.",
+         to the expected value (absolute where that is 0), that its test would have found with 99 % probability. \
+         That the tests find planted defects and hold their levels is measured: docs/verification.md of the program.",
         verdicts.len(),
         verdicts.len() - green - failed,
     );
