@@ -411,7 +411,8 @@ fn misused(source: &Source) -> Vec<String> {
         for (at, name) in names.iter().enumerate() {
             let is_defined = at > 0 && ["struct", "enum", "type", "fn", "mod"].contains(&names[at - 1]);
             let is_first = at == 0 || names[at - 1] == "pub";
-            if !is_defined && !(is_field && is_first) {
+            let is_named = is_defined || (is_field && is_first);
+            if !is_named {
                 continue;
             }
             let spaced: String = name
