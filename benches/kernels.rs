@@ -1,5 +1,5 @@
 //! Speed of the kernels and of whole paths, at fixed seeds: every run of a benchmark does the same
-//! work, so two builds are compared on equal terms. `cargo bench --bench kernels -- --quick` for a
+//! work, so two builds are compared on equal terms. `cargo bench -p benches --bench kernels -- --quick` for a
 //! look, without `--quick` for figures to compare.
 
 use std::f64::consts::PI;

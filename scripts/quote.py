@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Puts published tables into the pages that quote them, and published pictures beside them.
+"""Puts published tables into the pages that quote them.
 
     scripts/quote.py [--check]
 
@@ -8,9 +8,8 @@ A page quotes a table by a comment and what follows it up to an empty line:
     <!-- results/published/short/NAME/tables/TABLE.md rows: WORDS; WORDS -->
     | ... |
 
-With `rows:` only those rows are quoted that hold one of the words (between the bars, as they stand there). Pictures in
-docs/figures/NAME/ are copies of those of the same name in results/published/short/NAME/images/ or plots/.
-Without --check pages and copies are brought up to date; with it, exit code 1 says that one is not.
+With `rows:` only those rows are quoted that hold one of the words (between the bars, as they stand there).
+Without --check pages are brought up to date; with it, exit code 1 says that one is not. Pictures: `scripts/publish`.
 """
 import pathlib
 import re
@@ -49,15 +48,6 @@ def main():
             stale.append(page)
             if not check:
                 path.write_text(new)
-    for copy in sorted((ROOT / "docs" / "figures").glob("*/*")):
-        published = ROOT / "results" / "published" / "short" / copy.parent.name
-        source = next((published / part / copy.name for part in ("images", "plots") if (published / part / copy.name).exists()), None)
-        if source is None:
-            sys.exit(f"{copy.relative_to(ROOT)}: there is no {copy.name} in {published.relative_to(ROOT)}")
-        if source.read_bytes() != copy.read_bytes():
-            stale.append(str(copy.relative_to(ROOT)))
-            if not check:
-                copy.write_bytes(source.read_bytes())
     for name in stale:
         print(f"{name}: {'not what is published' if check else 'brought up to date'}")
     return 1 if check and stale else 0

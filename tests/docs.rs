@@ -35,25 +35,25 @@ const PAGES: [&str; 20] = [
     "scripts/README.md",
 ];
 
-pub fn package() -> &'static Path {
+fn package() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-pub fn text(path: &str) -> String {
+fn text(path: &str) -> String {
     fs::read_to_string(package().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
 /// A fenced block of a page.
 #[derive(Debug)]
-pub struct Block<'a> {
+struct Block<'a> {
     /// What stands behind the opening fence.
-    pub tag: &'a str,
+    tag: &'a str,
     /// The lines between the fences, numbered as in the page.
-    pub lines: Vec<(usize, &'a str)>,
+    lines: Vec<(usize, &'a str)>,
 }
 
 impl Block<'_> {
-    pub fn text(&self) -> String {
+    fn text(&self) -> String {
         self.lines.iter().map(|(_, line)| format!("{line}\n")).collect()
     }
 
@@ -79,7 +79,7 @@ fn split(page: &str) -> (Vec<Block<'_>>, String) {
 }
 
 /// The blocks of a language.
-pub fn blocks<'a>(page: &'a str, language: &str) -> Vec<Block<'a>> {
+fn blocks<'a>(page: &'a str, language: &str) -> Vec<Block<'a>> {
     split(page).0.into_iter().filter(|block| block.is(language)).collect()
 }
 
@@ -259,7 +259,7 @@ fn every_relative_link_points_to_a_file() {
 }
 
 /// The commands of a page, from code in its prose and from blocks: line and what follows `scatterproof`.
-pub fn commands(page: &str) -> Vec<(usize, String)> {
+fn commands(page: &str) -> Vec<(usize, String)> {
     let (blocks, prose) = split(page);
     let spans = pieces(&prose).into_iter().skip(1).step_by(2);
     let spans = spans.map(|(line, span)| (line, span.replace('\n', " ")));

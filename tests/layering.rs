@@ -1,11 +1,10 @@
-//! The picture in `src/lib.rs`, held against the sources: who uses whom, which module is the door of
-//! which crate, where transcendental functions come from, and how long a file may be.
+//! What neither the compiler nor clippy can say of the sources: who uses whom (the picture in `src/lib.rs`), which module is
+//! the door of which crate, that one name stands for one type, and how long a file may be. Functions that differ between
+//! machines are in `clippy.toml`.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
-
-use super::tokens::{Token, module_path, test_modules, tokens};
+use std::path::Path;
 
 /// What a module may use, besides itself and `error`.
 const LAYERS: [(&str, &[&str]); 18] = [
@@ -96,250 +95,232 @@ const DOORS: [(&str, &[&str]); 21] = [
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("serde", &SERDE),
-    ("serde_json", &SERDE),
+    ("serde_json", &["results", "verify", "report", "experiment", "run", "cli"]),
 ];
 const SERDE: [&str; 6] = ["stats", "results", "verify", "report", "experiment", "run"];
 
-/// Crates that test code may name anywhere.
-const TEST_CRATES: [&str; 1] = ["serde_json"];
+/// Type names that may stand for several types: clap's arguments of each subcommand, and nodes of trees.
+const SHARED_NAMES: [&str; 2] = ["Args", "Node"];
 
-/// Functions of std (and of glam, which calls std's) whose last digits depend on the machine.
-const NOT_PORTABLE: [&str; 39] = [
-    "sin",
-    "cos",
-    "tan",
-    "sin_cos",
-    "asin",
-    "acos",
-    "atan",
-    "atan2",
-    "sinh",
-    "cosh",
-    "tanh",
-    "asinh",
-    "acosh",
-    "atanh",
-    "exp",
-    "exp2",
-    "exp_m1",
-    "ln",
-    "ln_1p",
-    "log",
-    "log2",
-    "log10",
-    "powf",
-    "powi",
-    "cbrt",
-    "hypot",
-    "gamma",
-    "ln_gamma",
-    "erf",
-    "erfc",
-    "angle_between",
-    "angle_to",
-    "from_angle",
-    "to_angle",
-    "rotate_towards",
-    "rotate_axis",
-    "rotate_x",
-    "rotate_y",
-    "rotate_z",
+/// Words that mean one thing, and where nothing may bear them: a cell is a point of a sweep, which geometry, estimators and
+/// chi-square (bins) know nothing of; stored moments are of observables, and gates are those of continuous integration.
+const WORDS: [(&str, &[&str]); 3] = [
+    (
+        "cell",
+        &[
+            "src/geometry/",
+            "src/optics/",
+            "src/sampling/",
+            "src/samplers/",
+            "src/scene/",
+            "src/estimators/",
+            "src/stats/",
+            "src/run/chi_square/",
+        ],
+    ),
+    ("gate", &["src/"]),
+    ("gates", &["src/"]),
 ];
 
 /// Files that may be longer than [`LONGEST`], and how long.
 const LONG: [(&str, usize); 1] = [("src/experiment/schema.rs", 800)];
 const LONGEST: usize = 700;
 
-/// Everything that a file breaks, as `path:line: rule`.
-fn violations(path: &str, text: &str, is_test: bool) -> Vec<String> {
-    let tokens: Vec<Token> =
-        tokens(text).into_iter().map(|t| Token { is_test: t.is_test || is_test, ..t }).collect();
-    let file = File { path, tokens: &tokens };
-    let mut found = Vec::new();
-    found.extend(file.edges());
-    found.extend(file.doors());
-    found.extend(file.numbers());
-    if !text.starts_with("//! ") {
-        found.push(format!("{path}:1: the first line does not say, after `//! `, what the file is"));
-    }
-    let longest = LONG.iter().find(|(long, _)| *long == path).map_or(LONGEST, |(_, lines)| *lines);
-    let lines = text.lines().count();
-    if lines > longest {
-        found.push(format!("{path}:{lines}: longer than {longest} lines"));
-    }
-    found
+/// A source file.
+struct Source {
+    /// Path from the package's folder.
+    path: String,
+    text: String,
+    /// Modules from the crate's root to this file's.
+    module: Vec<String>,
+    /// Is all of it test code?
+    is_test: bool,
 }
 
-struct File<'a> {
-    path: &'a str,
-    tokens: &'a [Token<'a>],
-}
+impl Source {
+    fn new(path: &str, text: &str) -> Source {
+        let names = path.trim_start_matches("src/").trim_end_matches(".rs").split('/');
+        let module: Vec<String> =
+            names.filter(|name| !["mod", "lib", "main"].contains(name)).map(str::to_string).collect();
+        let is_test = module.iter().any(|name| {
+            name.ends_with("tests") || ["testing", "throughput", "sample"].contains(&name.as_str())
+        });
+        Source { path: path.into(), text: text.into(), module, is_test }
+    }
 
-impl File<'_> {
     /// The top module.
-    fn module(&self) -> String {
-        let first = module_path(Path::new(self.path)).into_iter().next();
-        first.unwrap_or_else(|| if self.path.ends_with("main.rs") { "main" } else { "lib" }.to_string())
+    fn top(&self) -> &str {
+        let root = if self.path.ends_with("main.rs") { "main" } else { "lib" };
+        self.module.first().map_or(root, String::as_str)
     }
 
-    fn text(&self, i: usize) -> &str {
-        self.tokens.get(i).map_or("", |token| token.text)
-    }
-
-    fn at(&self, i: usize, rule: String) -> String {
-        format!("{}:{}: {rule}", self.path, self.tokens[i].line)
-    }
-
-    fn edges(&self) -> Vec<String> {
-        let module = self.module();
-        let allowed = LAYERS.iter().find(|(name, _)| *name == module).map(|(_, allowed)| *allowed);
-        let Some(allowed) = allowed else {
-            return vec![format!("{}:1: `{module}` has no row in the table of layers", self.path)];
+    /// What stands before the unit tests, without comments and texts.
+    fn shipped(&self) -> String {
+        let text = if self.is_test {
+            ""
+        } else {
+            self.text.split("#[cfg(test)]\nmod tests {").next().unwrap_or("")
         };
-        let forbidden = |used: &str| used != module && used != "error" && !allowed.contains(&used);
-        let mut found = Vec::new();
-        for i in 0..self.tokens.len() {
-            let Some((root, is_certain)) = self.root(i) else { continue };
-            for used in self.first_words(root) {
-                let is_module = is_certain || LAYERS.iter().any(|(name, _)| *name == used);
-                if is_module && forbidden(used) {
-                    found.push(self.at(i, format!("`{module}` may not use `{used}`")));
-                }
-            }
-        }
-        found
+        text.lines().map(|line| code(line) + "\n").collect()
     }
 
-    /// Where a path that begins at token `i` goes on from the crate's root; and whether it surely does
-    /// (a file under `#[path]` stands deeper than it looks).
-    fn root(&self, i: usize) -> Option<(usize, bool)> {
-        let begins = i == 0 || self.text(i - 1) != "::";
-        match self.text(i) {
-            "crate" if self.text(i + 1) == "as" => Some((i, true)),
-            "crate" if self.text(i + 1) == "::" => Some((i + 2, true)),
-            "scatterproof" if self.text(i + 1) == "::" => Some((i + 2, true)),
-            "super" if begins || self.text(i - 2) == "self" => {
-                let mut ups = 0;
-                while self.text(i + 2 * ups) == "super" && self.text(i + 2 * ups + 1) == "::" {
-                    ups += 1;
-                }
-                let depth = module_path(Path::new(self.path)).len() + self.tokens[i].depth;
-                (ups >= depth && ups > 0).then_some((i + 2 * ups, false))
-            }
-            _ => None,
-        }
-    }
-
-    /// The word at `i`, or the first words of a group that begins there.
-    fn first_words(&self, i: usize) -> Vec<&str> {
-        if self.text(i) != "{" {
-            return vec![self.text(i)];
-        }
-        let (mut words, mut nesting, mut expected) = (Vec::new(), 0, false);
-        for token in &self.tokens[i..] {
-            match token.text {
-                "{" => (nesting, expected) = (nesting + 1, nesting == 0),
-                "}" if nesting == 1 => break,
-                "}" => nesting -= 1,
-                "," => expected = nesting == 1,
-                word if expected => {
-                    words.push(word);
-                    expected = false;
-                }
-                _ => {}
-            }
-        }
-        words
-    }
-
-    fn doors(&self) -> Vec<String> {
-        let module = self.module();
-        let mut found = Vec::new();
-        for (i, token) in self.tokens.iter().enumerate() {
-            let door = DOORS.iter().find(|(name, _)| *name == token.text);
-            let Some((name, doors)) = door else { continue };
-            let continues = i >= 2
-                && self.text(i - 1) == "::"
-                && (self.tokens[i - 2].is_word() && self.text(i - 2) != "use");
-            let is_imported = i >= 1 && ["use", "crate"].contains(&self.text(i - 1));
-            let is_named = (self.text(i + 1) == "::" && !continues) || is_imported;
-            let is_free = token.is_test && TEST_CRATES.contains(name);
-            if is_named && !is_free && !doors.contains(&module.as_str()) {
-                found.push(self.at(i, format!("`{module}` names `{name}`, whose door is {doors:?}")));
-            }
-        }
-        found
-    }
-
-    fn numbers(&self) -> Vec<String> {
-        let is_math = self.module() == "math";
-        let mut found = Vec::new();
-        for (i, token) in self.tokens.iter().enumerate() {
-            let is_method = i >= 1 && self.text(i - 1) == "." && self.text(i + 1) == "(";
-            let of_float =
-                i >= 2 && self.text(i - 1) == "::" && ["f64", "f32", ">"].contains(&self.text(i - 2));
-            if (is_method || of_float)
-                && !is_math
-                && !token.is_test
-                && NOT_PORTABLE.contains(&token.text)
+    /// Every path, by line: `use` statements taken apart.
+    fn paths(&self) -> Vec<(usize, String)> {
+        let (mut paths, mut statement) = (Vec::new(), None);
+        for (line, number) in self.text.lines().map(code).zip(1..) {
+            let begins = line.trim_start().trim_start_matches("pub ").trim_start_matches("pub(crate) ");
+            let begins = begins.trim_start_matches("pub(super) ");
+            if statement.is_none() && (begins.starts_with("use ") || begins.starts_with("extern crate "))
             {
-                let rule =
-                    format!("`{}` differs between machines; `math` has portable ones", token.text);
-                found.push(self.at(i, rule));
+                statement = Some((number, String::new()));
             }
-            let rule = match token.text {
-                "mul_add" => "`mul_add` fuses what other code rounds twice",
-                "Vec3A" | "BVec3A" => "`Vec3A` rounds differently with and without SIMD",
-                "unsafe" => "`unsafe` is not needed here",
-                _ => continue,
+            let Some((first, text)) = &mut statement else {
+                let is_path = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+                let runs = line.split(|c| !is_path(c)).filter(|run| run.contains("::"));
+                paths.extend(runs.map(|run| (number, run.trim_start_matches(':').to_string())));
+                continue;
             };
-            found.push(self.at(i, rule.to_string()));
+            *text += &line;
+            if let Some((used, _)) = text.split_once(';') {
+                let used = used
+                    .rsplit_once("use ")
+                    .map_or_else(|| used.replace("extern crate ", ""), |u| u.1.into());
+                paths.extend(expanded(&used).into_iter().map(|path| (*first, path)));
+                statement = None;
+            }
+        }
+        paths
+    }
+
+    /// Where a path leads, from the crate's root; `None` for what is of another crate or a name of this file.
+    fn target(&self, path: &str) -> Option<Vec<String>> {
+        let mut words: Vec<&str> = path.split("::").collect();
+        let mut from = match words.remove(0) {
+            "crate" | "scatterproof" => Vec::new(),
+            "self" => self.module.clone(),
+            "super" => self.module[..self.module.len().saturating_sub(1)].to_vec(),
+            _ => return None,
+        };
+        while words.first() == Some(&"super") {
+            from.pop();
+            words.remove(0);
+        }
+        from.extend(words.into_iter().map(str::to_string));
+        Some(from)
+    }
+
+    /// Everything that this file breaks, as `path:line: rule`.
+    fn violations(&self) -> Vec<String> {
+        let (path, top) = (&self.path, self.top());
+        let Some((_, allowed)) = LAYERS.iter().find(|(name, _)| *name == top) else {
+            return vec![format!("{path}:1: `{top}` has no row in the table of layers")];
+        };
+        let mut found = Vec::new();
+        for (line, used) in self.paths() {
+            let root = used.split([':', ' ']).next().unwrap_or_default();
+            let door = DOORS.iter().find(|(name, _)| *name == root);
+            if let Some((name, doors)) = door.filter(|(_, doors)| !doors.contains(&top)) {
+                found.push(format!("{path}:{line}: `{top}` names `{name}`, whose door is {doors:?}"));
+            }
+            let target = self.target(&used).and_then(|target| target.into_iter().next());
+            let Some(target) = target else { continue };
+            // Unit tests stand one module deeper than their file.
+            let is_module = LAYERS.iter().any(|(name, _)| *name == target) || root == "crate";
+            if is_module && target != top && target != "error" && !allowed.contains(&target.as_str()) {
+                found.push(format!("{path}:{line}: `{top}` may not use `{target}`"));
+            }
+        }
+        found.dedup();
+        if !self.text.starts_with("//! ") {
+            found.push(format!("{path}:1: the first line does not say, after `//! `, what the file is"));
+        }
+        let longest = LONG.iter().find(|(long, _)| long == path).map_or(LONGEST, |(_, lines)| *lines);
+        let lines = self.text.lines().count();
+        if lines > longest {
+            found.push(format!("{path}:{lines}: longer than {longest} lines"));
         }
         found
+    }
+
+    /// Types that it defines outside tests.
+    fn types(&self) -> Vec<String> {
+        let name_of = |line: &str| {
+            let line = line.trim_start_matches("pub ").trim_start_matches("pub(crate) ");
+            let line = line.trim_start_matches("pub(super) ").trim_start_matches("pub(in crate) ");
+            let (kind, rest) = line.split_once(' ')?;
+            let is_type = ["struct", "enum", "trait", "type", "union"].contains(&kind);
+            is_type.then(|| {
+                rest.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default().to_string()
+            })
+        };
+        self.shipped().lines().filter_map(name_of).collect()
     }
 }
 
-/// Every source by its path from the package's folder.
-fn sources() -> Vec<(String, String)> {
+/// A line without its comment, and without what stands in quotes.
+fn code(line: &str) -> String {
+    let bare: Vec<&str> = line.split('"').step_by(2).collect();
+    bare.join("\"\"").split("//").next().unwrap_or_default().to_string()
+}
+
+/// The paths of a `use`: `a::{b, c::{d, e}}` are `a::b`, `a::c::d` and `a::c::e`.
+fn expanded(used: &str) -> Vec<String> {
+    let used = used.trim().trim_start_matches("::");
+    let Some((head, group)) = used.split_once('{') else {
+        let path = used.split(" as ").next().unwrap_or_default();
+        // The crate under another name hides what is used of it.
+        return vec![if path == "crate" { "crate::crate".into() } else { path.to_string() }];
+    };
+    let (mut parts, mut depth) = (vec![String::new()], 0);
+    for c in group.chars() {
+        match c {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            _ => {}
+        }
+        if c == ',' && depth == 0 {
+            parts.push(String::new());
+        } else if depth >= 0 {
+            parts.last_mut().expect("a part").push(c);
+        }
+    }
+    let parts = parts.iter().filter(|part| !part.trim().is_empty());
+    parts.flat_map(|part| expanded(part)).map(|path| format!("{head}{path}")).collect()
+}
+
+/// Every source.
+fn sources() -> Vec<Source> {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut folders = vec![package.join("src")];
-    let mut files = Vec::new();
+    let mut sources = Vec::new();
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(&folder).expect("a folder of sources") {
             let path = entry.expect("an entry").path();
             if path.is_dir() {
                 folders.push(path);
             } else if path.extension().is_some_and(|e| e == "rs") {
-                let name = path.strip_prefix(package).expect("inside").to_string_lossy().into_owned();
-                files.push((name, fs::read_to_string(&path).expect("a source")));
+                let name = path.strip_prefix(package).expect("inside").to_string_lossy();
+                sources.push(Source::new(&name, &fs::read_to_string(&path).expect("a source")));
             }
         }
     }
-    files.sort();
-    files
+    sources.sort_by(|a, b| a.path.cmp(&b.path));
+    sources
 }
 
 #[test]
 fn the_sources_keep_the_rules() {
     let sources = sources();
     assert!(sources.len() > 80, "only {} sources were found", sources.len());
-    let tests: BTreeSet<PathBuf> =
-        sources.iter().flat_map(|(path, text)| test_modules(Path::new(path), text)).collect();
-    let is_test = |path: &str| {
-        let path = Path::new(path);
-        tests.iter().any(|test| path == test || path.starts_with(test.with_extension("")))
-    };
-    let found: Vec<String> =
-        sources.iter().flat_map(|(path, text)| violations(path, text, is_test(path))).collect();
+    let found: Vec<String> = sources.iter().flat_map(Source::violations).collect();
     assert!(found.is_empty(), "{} violations:\n{}", found.len(), found.join("\n"));
 }
 
 #[test]
 fn every_module_and_every_dependency_has_a_row() {
-    let modules: BTreeSet<String> =
-        sources().iter().map(|(path, text)| File { path, tokens: &tokens(text) }.module()).collect();
-    let rows: BTreeSet<String> = LAYERS.iter().map(|(name, _)| name.to_string()).collect();
-    assert_eq!(modules, rows);
+    let sources = sources();
+    let modules: BTreeSet<&str> = sources.iter().map(Source::top).collect();
+    assert_eq!(modules, LAYERS.iter().map(|(name, _)| *name).collect());
 
     let manifest = include_str!("../Cargo.toml");
     let section = manifest.split("[dependencies]").nth(1).expect("dependencies");
@@ -349,9 +330,136 @@ fn every_module_and_every_dependency_has_a_row() {
     assert_eq!(names.collect::<BTreeSet<String>>(), doors);
 }
 
+/// Files and folders of one folder that use each other, as `a/b -> a/c -> a/b`. A folder's `mod.rs` may use what stands in
+/// it and be used by it.
+fn circles(sources: &[Source]) -> Vec<String> {
+    let modules: BTreeSet<&[String]> = sources
+        .iter()
+        .flat_map(|source| (1..=source.module.len()).map(|length| &source.module[..length]))
+        .collect();
+    let mut uses: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for source in sources.iter().filter(|source| !source.is_test) {
+        let shipped = Source { text: source.shipped(), ..Source::new(&source.path, "") };
+        for target in shipped.paths().iter().filter_map(|(_, path)| shipped.target(path)) {
+            let own = &source.module;
+            let same = own.iter().zip(&target).take_while(|(a, b)| a == b).count();
+            if same < own.len() && same < target.len() && modules.contains(&target[..=same]) {
+                uses.entry(own[..=same].join("/")).or_default().insert(target[..=same].join("/"));
+            }
+        }
+    }
+    let none = BTreeSet::new();
+    let mut found = Vec::new();
+    for start in uses.keys() {
+        // Breadth first: the shortest way back. Each circle is told by its first name.
+        let mut ways = vec![vec![start]];
+        let mut seen = BTreeSet::new();
+        let mut at = 0;
+        while let Some(way) = ways.get(at).cloned() {
+            let last = way[way.len() - 1];
+            for next in uses.get(last).unwrap_or(&none) {
+                if next == start {
+                    found.push(format!(
+                        "{} -> {start}",
+                        way.iter().map(|s| s.as_str()).collect::<Vec<_>>().join(" -> ")
+                    ));
+                    ways.clear();
+                    break;
+                }
+                if next > start && seen.insert(next) {
+                    ways.push([&way[..], &[next]].concat());
+                }
+            }
+            at += 1;
+        }
+    }
+    found
+}
+
+#[test]
+fn no_files_of_a_folder_use_each_other() {
+    let found = circles(&sources());
+    assert!(found.is_empty(), "{} circles:\n{}", found.len(), found.join("\n"));
+}
+
+/// Names that stand for several types, with their places.
+fn shared(sources: &[Source]) -> Vec<String> {
+    let mut places: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    for source in sources {
+        for name in source.types() {
+            places.entry(name).or_default().push(&source.path);
+        }
+    }
+    places.retain(|name, places| places.len() > 1 && !SHARED_NAMES.contains(&name.as_str()));
+    places.iter().map(|(name, places)| format!("{name}: {}", places.join(", "))).collect()
+}
+
+#[test]
+fn a_type_name_stands_for_one_type() {
+    let found = shared(&sources());
+    assert!(found.is_empty(), "{} names:\n{}", found.len(), found.join("\n"));
+}
+
+/// Types, fields, functions and modules that bear a word of the table where it would mean something else.
+fn misused(source: &Source) -> Vec<String> {
+    let mut found = Vec::new();
+    for (line, number) in source.shipped().lines().zip(1..) {
+        let name =
+            line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| !word.is_empty());
+        let names: Vec<&str> = name.collect();
+        let is_field = line.contains(": ") && !line.contains('(') && !line.contains("let ");
+        for (at, name) in names.iter().enumerate() {
+            let is_defined = at > 0 && ["struct", "enum", "type", "fn", "mod"].contains(&names[at - 1]);
+            let is_first = at == 0 || names[at - 1] == "pub";
+            let is_named = is_defined || (is_field && is_first);
+            if !is_named {
+                continue;
+            }
+            let spaced: String = name
+                .chars()
+                .map(|c| if c.is_uppercase() { format!("_{c}") } else { c.to_string() })
+                .collect();
+            let spaced = spaced.to_lowercase();
+            for (word, places) in WORDS {
+                let is_here = places.iter().any(|place| source.path.starts_with(place));
+                if is_here && spaced.split('_').any(|part| part == word) {
+                    found.push(format!(
+                        "{}:{number}: `{name}`: the word `{word}` means something else",
+                        source.path
+                    ));
+                }
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn words_mean_what_the_table_says() {
+    let found: Vec<String> = sources().iter().flat_map(misused).collect();
+    assert!(found.is_empty(), "{} names:\n{}", found.len(), found.join("\n"));
+
+    let table = include_str!("../src/lib.rs");
+    for word in [
+        "cell",
+        "observable",
+        "pass",
+        "block",
+        "batch",
+        "technique",
+        "estimator",
+        "record",
+        "claim",
+        "verdict",
+    ] {
+        let rows = table.matches(&format!("//! | {word} | ")).count();
+        assert_eq!(rows, 1, "`{word}` has one row in the table of words");
+    }
+}
+
 /// What a planted text breaks, after a good first line.
 fn planted(path: &str, text: &str) -> String {
-    violations(path, &format!("//! A file.\n{text}"), false).join("\n")
+    Source::new(path, &format!("//! A file.\n{text}")).violations().join("\n")
 }
 
 #[test]
@@ -359,28 +467,26 @@ fn planted_edges_are_found() {
     for (path, text, used) in [
         ("src/math/frame.rs", "use crate::sampling::warp;", "sampling"),
         ("src/estimators/path.rs", "use crate::{geometry::Ray, run::job::{a, Job}};", "run"),
+        (
+            "src/estimators/path.rs",
+            "pub(crate) use crate::{\n    geometry::Ray,\n    run::job,\n};",
+            "run",
+        ),
         ("src/estimators/path.rs", "fn f() { crate::reference::value() }", "reference"),
-        ("src/reference/slab.rs", "use crate::estimators::Estimator;", "estimators"),
         ("src/scene/mod.rs", "use crate::results;", "results"),
         ("src/stats/mod.rs", "use super::optics::phase;", "optics"),
         ("src/stats/tree.rs", "use super::super::optics::phase;", "optics"),
-        ("src/stats/tree.rs", "mod m { use super::super::super::{math, optics}; }", "optics"),
         ("src/verify/judge.rs", "use crate::experiment::Experiment;", "experiment"),
-        ("src/experiment/load.rs", "use crate::verify;", "verify"),
         ("src/run/mod.rs", "use crate::report;", "report"),
-        ("src/run/mod.rs", "use crate::cli;", "cli"),
         ("src/error.rs", "use crate::math;", "math"),
         ("src/main.rs", "fn main() { scatterproof::run::run() }", "run"),
         ("src/stats/mod.rs", "use crate as everything;", "crate"),
         ("src/stats/mod.rs", "use crate::*;", "*"),
         ("src/stats/mod.rs", "use crate::{self as everything};", "self"),
-        ("src/stats/mod.rs", "#[cfg(test)] mod tests { use crate::optics; }", "optics"),
+        ("src/stats/mod.rs", "#[cfg(test)] mod tests {\n use crate::optics; }", "optics"),
     ] {
         let found = planted(path, text);
-        assert!(
-            found.contains(&format!("{path}:2:")) && found.contains(&format!("`{used}`")),
-            "{text}: {found}"
-        );
+        assert!(found.contains(&format!("`{used}`")), "{text}: {found}");
         assert_eq!(found.lines().count(), 1, "{text}: {found}");
     }
     assert!(planted("src/extra/mod.rs", "").contains("`extra` has no row"));
@@ -412,7 +518,7 @@ fn planted_crates_are_found() {
         ("src/stats/mod.rs", "extern crate png;", "png"),
         ("src/cli/run.rs", "use toml::Value;", "toml"),
         ("src/experiment/mod.rs", "#[derive(clap::Args)] struct A;", "clap"),
-        ("src/geometry/mod.rs", "#[cfg(test)] mod tests { use rand_pcg::Pcg64; }", "rand_pcg"),
+        ("src/geometry/mod.rs", "mod m { fn f() -> rand_pcg::Pcg64 {} }", "rand_pcg"),
     ] {
         let found = planted(path, text);
         assert!(found.contains(&format!("names `{name}`")), "{text}: {found}");
@@ -420,51 +526,67 @@ fn planted_crates_are_found() {
     for (path, text) in [
         ("src/math/mod.rs", "pub use glam::DVec3;"),
         ("src/report/mod.rs", "let png = figure.png; use super::png::write; \"csv::Reader\""),
-        ("src/cli/schema.rs", "#[cfg(test)] mod tests { fn f() { serde_json::from_str() } }"),
+        ("src/cli/schema.rs", "mod m { fn f() { serde_json::from_str() } }"),
     ] {
         assert_eq!(planted(path, text), "", "{text}");
     }
 }
 
 #[test]
-fn planted_arithmetic_is_found() {
-    for text in [
-        "fn f(x: f64) -> f64 { x.sin() }",
-        "fn f(x: f64) -> f64 { (2.0 * x)\n.powi(2) }",
-        "fn f(x: f64) -> f64 { 2.0f64.powf(x) }",
-        "fn f(x: f64) -> f64 { f64::ln(x) }",
-        "fn f(x: f64) -> f64 { <f64>::hypot(x, x) }",
-        "fn f(x: &[f64]) { x.iter().copied().map(f64::exp) }",
-        "fn f(a: DVec3, b: DVec3) -> f64 { a.angle_between(b) }",
-        "fn f(x: f64) -> f64 { x.mul_add(2.0, 1.0) }",
-        "use crate::math::Vec3A;",
-        "fn f() { unsafe { g() } }",
-        "#[cfg(test)] mod tests { fn f() { unsafe { g() } } }",
-        "#[cfg(test)] mod tests {} fn f(x: f64) -> f64 { x.cos() }",
-    ] {
-        assert!(!planted("src/optics/phase.rs", text).is_empty(), "not found: {text}");
-        let path = "src/stats/moments.rs";
-        assert!(planted(path, text).contains(path), "not found: {text}");
+fn planted_circles_and_names_are_found() {
+    let a = Source::new("src/stats/a.rs", "use super::{b::B, Moments};\npub struct A;\n");
+    let mod_rs = Source::new(
+        "src/stats/mod.rs",
+        "mod a; mod b; mod c;\nuse a::A;\nuse self::c::C;\npub struct Moments;\n",
+    );
+    let deeper = Source::new("src/stats/b/deep.rs", "fn f() { crate::stats::c::f() }\n");
+    let c = |text: &str| Source::new("src/stats/c.rs", text);
+    let told = |c: Source| {
+        circles(&[
+            Source::new(&a.path, &a.text),
+            Source::new("src/stats/b/mod.rs", ""),
+            Source::new(&deeper.path, &deeper.text),
+            c,
+            Source::new(&mod_rs.path, &mod_rs.text),
+        ])
+    };
+    assert_eq!(told(c("use super::a;\n")), ["stats/a -> stats/b -> stats/c -> stats/a"]);
+    assert_eq!(
+        told(c("use super::Moments;\n#[cfg(test)]\nmod tests {\n    use super::super::a;\n}\n")),
+        [""; 0]
+    );
+
+    let found = shared(&[
+        a,
+        c("enum Args {}\nenum Own {}\n"),
+        Source::new("src/run/x.rs", "pub(crate) struct A<T>(T);\nstruct Args;\n"),
+    ]);
+    assert_eq!(found, ["A: src/stats/a.rs, src/run/x.rs"]);
+
+    for text in
+        ["pub struct CellCount;", "    gates: usize,", "fn gate_of(x: f64) {}", "    pub cell: usize,"]
+    {
+        assert_eq!(misused(&c(text)).len(), 1, "{text}");
     }
     for text in [
-        "use crate::math::{sin, exp}; fn f(x: f64) -> f64 { sin(x) * x.sqrt() * crate::math::exp(x) }",
-        "#[cfg(test)] mod tests { fn f(x: f64) -> f64 { x.powi(2) + x.sin() } }",
-        "// x.sin()\n/// `x.exp()`\nfn f() -> f64 { x.sin }",
-        "fn unsafe_code() {}",
+        "pub struct Cancellation;",
+        "    let gates: usize = 1;",
+        "// fn gate() {}",
+        "use std::cell::Cell;",
     ] {
-        assert_eq!(planted("src/optics/phase.rs", text), "", "{text}");
+        assert_eq!(misused(&c(text)), [""; 0], "{text}");
     }
-    assert_eq!(planted("src/math/turns.rs", "fn f(x: f64) -> f64 { x.sin() }"), "");
 }
 
 #[test]
 fn planted_lengths_and_first_lines_are_found() {
+    let of = |path: &str, text: &str| Source::new(path, text).violations();
     let long = "//! A file.\n".to_string() + &"// x\n".repeat(LONGEST);
-    assert!(violations("src/run/mod.rs", &long, false)[0].contains("longer than 700 lines"));
-    assert!(violations("src/experiment/schema.rs", &long, false).is_empty());
+    assert!(of("src/run/mod.rs", &long)[0].contains("longer than 700 lines"));
+    assert!(of("src/experiment/schema.rs", &long).is_empty());
     let longer = long + &"// x\n".repeat(100);
-    assert!(violations("src/experiment/schema.rs", &longer, false)[0].contains("longer than 800 lines"));
+    assert!(of("src/experiment/schema.rs", &longer)[0].contains("longer than 800 lines"));
     for text in ["", "// A file.\n", "\n//! A file.\n", "use crate::error;\n", "//!\n"] {
-        assert!(violations("src/run/mod.rs", text, false)[0].contains("first line"), "{text:?}");
+        assert!(of("src/run/mod.rs", text)[0].contains("first line"), "{text:?}");
     }
 }

@@ -1,5 +1,8 @@
 //! Integration tests, one binary: the program as a user runs it, and the sources as a reader sees them.
 
+// Tests compare portable functions with those of std.
+#![allow(clippy::disallowed_methods)]
+
 mod browser;
 mod calibration;
 mod cli;
@@ -10,11 +13,9 @@ mod interruption;
 mod judging;
 mod layering;
 mod looks;
-mod own_estimator;
 mod pictures;
 mod published;
 mod reproducibility;
 mod samplers;
 mod tev;
-mod tokens;
 mod work;

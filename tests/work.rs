@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -79,11 +79,7 @@ impl Work {
     }
 
     fn command(&self, arguments: &str) -> Command {
-        self.command_of(Path::new(env!("CARGO_BIN_EXE_scatterproof")), arguments)
-    }
-
-    fn command_of(&self, program: &Path, arguments: &str) -> Command {
-        let mut command = Command::new(program);
+        let mut command = Command::new(env!("CARGO_BIN_EXE_scatterproof"));
         command.args(arguments.split_whitespace()).current_dir(self.folder.path()).stdin(Stdio::null());
         command
     }
@@ -91,11 +87,6 @@ impl Work {
     /// Runs the program with arguments that are separated by blanks.
     pub fn run(&self, arguments: &str) -> Ran {
         self.ran(arguments, self.command(arguments).output().expect("the program starts"))
-    }
-
-    /// Runs another program over the library.
-    pub fn run_program(&self, program: &Path, arguments: &str) -> Ran {
-        self.ran(arguments, self.command_of(program, arguments).output().expect("the program starts"))
     }
 
     /// Runs the program where no file may grow beyond a number of KiB.

@@ -45,8 +45,6 @@ pub mod table;
 pub mod tables;
 /// Tables for the terminal.
 pub mod terminal;
-/// How the tests themselves were tested.
-mod trust;
 /// Viewers that compare pictures.
 pub mod viewer;
 
@@ -109,6 +107,7 @@ pub fn write_judged(
     if !data.model_errors.is_empty() {
         folder.write_view("model_errors.csv", model_errors::to_csv(&data.model_errors).as_bytes())?;
     }
+    folder.write_manifest(&data.stored.record)?;
     Ok(data)
 }
 

@@ -13,6 +13,8 @@ pub mod exr_file;
 pub mod image;
 /// Canonical JSON and content hashes.
 pub mod json;
+/// What of a result is kept where its arrays are not.
+pub mod manifest;
 /// The table of everything that was measured.
 pub mod measurements;
 /// NumPy's array files.
