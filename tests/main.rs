@@ -1,7 +1,6 @@
 //! Integration tests, one binary: the program as a user runs it, and the sources as a reader sees them.
 
 mod browser;
-mod calibration;
 mod cli;
 mod damage;
 mod docs;

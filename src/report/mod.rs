@@ -60,7 +60,7 @@ pub struct Material {
     /// Everything that was measured.
     pub rows: Vec<Measurement>,
     /// Efficiencies of pairs of estimators.
-    pub comparisons: Vec<comparisons::Row>,
+    pub comparisons: Vec<comparisons::EfficiencyRow>,
     /// Models against light transport itself.
     pub model_errors: Vec<ModelError>,
     /// The pictures, in the order of cells and estimators.
@@ -93,7 +93,7 @@ pub struct Figure {
 pub fn write(folder: &RecordFolder) -> Result<Material> {
     let stored = folder.read()?;
     let retest = folder.retest_of(&stored)?;
-    let looks = if retest.is_some() { Looks::Two } else { Looks::One };
+    let looks = if retest.is_some() { Looks::Two } else { Looks::ALONE };
     let verdicts = judge(&[Case { main: &stored, retest: retest.as_ref() }], looks).verdicts;
     write_judged(folder, stored, verdicts)
 }

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::results::pictures::Wanted;
 use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::{RecordFolder, Stored};
-use crate::verify::comparisons::Row;
+use crate::verify::comparisons::EfficiencyRow;
 
 /// Error against time and rays.
 mod convergence;
@@ -60,7 +60,7 @@ pub struct Section {
 }
 
 /// Every section that this record has plots for, in the order of the page.
-pub fn sections(stored: &Stored, rows: &[Row], wanted: &[Wanted]) -> Vec<Section> {
+pub fn sections(stored: &Stored, rows: &[EfficiencyRow], wanted: &[Wanted]) -> Vec<Section> {
     let sections = [
         ratios::section(stored, rows),
         running::section(stored, wanted),
