@@ -8,7 +8,7 @@ use crate::results::csv_text::rows;
 /// Made by `cargo test --release --test power -- matrix`.
 const BLINDNESS: &str = include_str!("../../results/published/blindness.csv");
 
-/// Made by the long version of `tests/calibration.rs`.
+/// Made by the long version of `src/stats/calibration.rs`.
 const CALIBRATION: &str = include_str!("../../results/published/calibration.csv");
 
 /// The section of the page.

@@ -383,3 +383,31 @@ fn number(cell: &CellSpec, column: &str) -> Result<f64> {
         ))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn claims_say_what_they_expect() {
+        let claims: Vec<ClaimEntry> = serde_json::from_value(json!([
+            {"agree": {"estimators": ["a", "b"], "class": "each", "detect": 0.1}},
+            {"name": "apart", "differs": {"estimators": ["a", "b"]}},
+            {"expect": "invalid", "equals": {"value": 1.0, "source": "by hand"}},
+            {"reproduces": {"passes": 4, "numbers": "ff"}},
+        ]))
+        .expect("claims");
+        let claim =
+            |label: &str, kind, expects, each| Claim { label: label.into(), kind, expects, each };
+        let numbers = Some("ff".to_string());
+        let expected = [
+            claim("agree #1", ClaimKind::Agree, ExpectedOutcome::Pass, true),
+            claim("apart", ClaimKind::Differs, ExpectedOutcome::Differs, false),
+            claim("equals #3", ClaimKind::Equals, ExpectedOutcome::Invalid, false),
+            claim("reproduces #4", ClaimKind::Reproduces { numbers }, ExpectedOutcome::Pass, false),
+        ];
+        assert_eq!(statements(&claims), expected);
+    }
+}

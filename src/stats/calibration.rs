@@ -334,31 +334,36 @@ fn a_z_test_does_not_survive_heavy_tails() {
 }
 
 /// A distribution of values, and of the other arm's values with the same variance.
-struct Shape {
+struct Distribution {
     name: &'static str,
     kurtosis: &'static str,
     a: fn(&mut Draws) -> f64,
     b: fn(&mut Draws) -> f64,
 }
 
-const SHAPES: [Shape; 6] = [
-    Shape { name: "normal", kurtosis: "3", a: Draws::normal, b: Draws::normal },
-    Shape { name: "exponential", kurtosis: "9", a: Draws::exponential, b: Draws::exponential },
-    Shape { name: "lognormal 1", kurtosis: "114", a: |d| d.normal().exp(), b: |d| d.normal().exp() },
-    Shape {
+const SHAPES: [Distribution; 6] = [
+    Distribution { name: "normal", kurtosis: "3", a: Draws::normal, b: Draws::normal },
+    Distribution { name: "exponential", kurtosis: "9", a: Draws::exponential, b: Draws::exponential },
+    Distribution {
+        name: "lognormal 1",
+        kurtosis: "114",
+        a: |d| d.normal().exp(),
+        b: |d| d.normal().exp(),
+    },
+    Distribution {
         name: "lognormal 1.5",
         kurtosis: "1.0e4",
         a: |d| (1.5 * d.normal()).exp(),
         b: |d| (1.5 * d.normal()).exp(),
     },
-    Shape {
+    Distribution {
         name: "Pareto 3",
         kurtosis: "infinite",
         a: |d| d.uniform().powf(-1.0 / 3.0),
         b: |d| d.uniform().powf(-1.0 / 3.0),
     },
     // The variance of a lognormal 1 is e (e - 1) = 4.670774.
-    Shape {
+    Distribution {
         name: "lognormal 1 against normal",
         kurtosis: "114 / 3",
         a: |d| d.normal().exp(),
@@ -378,7 +383,7 @@ struct Coverage {
     by_f: u64,
 }
 
-fn coverage(shape: &Shape, runs: u64) -> Coverage {
+fn coverage(shape: &Distribution, runs: u64) -> Coverage {
     let mut draws = Draws::of(&format!("coverage of {}", shape.name));
     let (mut c, mut widths) =
         (Coverage { runs, at_95: 0, at_999: 0, width: 0.0, resolved: 0, by_f: 0 }, vec![]);

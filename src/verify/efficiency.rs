@@ -180,7 +180,7 @@ fn quadruples(a: &CostedBatches, b: &CostedBatches) -> (Vec<JackknifeBlock>, Vec
 
 /// A candidate against a baseline.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Duel<'a> {
+pub(super) struct EfficiencyClaim<'a> {
     pub candidate: &'a Quantity,
     pub baseline: &'a Quantity,
     /// What E must exceed.
@@ -189,10 +189,15 @@ pub(super) struct Duel<'a> {
 }
 
 /// What a claim of efficiency shows; a control that expects failure has `fails`.
-pub(super) fn finding(stored: &Stored, mut verdict: Verdict, duel: &Duel, fails: bool) -> Finding {
-    verdict.test = Some(TestKind::Efficiency(duel.cost));
-    verdict.set_expected(duel.bound, 0.0);
-    let evidence = match weigh(stored, duel, fails) {
+pub(super) fn finding(
+    stored: &Stored,
+    mut verdict: Verdict,
+    claim: &EfficiencyClaim,
+    fails: bool,
+) -> Finding {
+    verdict.test = Some(TestKind::Efficiency(claim.cost));
+    verdict.set_expected(claim.bound, 0.0);
+    let evidence = match weigh(stored, claim, fails) {
         Ok(shown) => {
             let ratio = shown.ratio.ratio();
             verdict.set_value(ratio, ratio * shown.ratio.log.std_error);
@@ -204,8 +209,8 @@ pub(super) fn finding(stored: &Stored, mut verdict: Verdict, duel: &Duel, fails:
     Finding { one_look: true, ..Finding::new(verdict, evidence) }
 }
 
-fn weigh(stored: &Stored, duel: &Duel, fails: bool) -> Result<EfficiencyTest, String> {
-    let Duel { candidate, baseline, bound, cost } = *duel;
+fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<EfficiencyTest, String> {
+    let EfficiencyClaim { candidate, baseline, bound, cost } = *claim;
     let means = evidence_of_means(stored, &mean_of(stored, candidate), &mean_of(stored, baseline));
     let Held { evidence, value, expected, .. } = means;
     let difference = match &evidence {

@@ -58,9 +58,9 @@ pub fn judge_alone(stored: &Stored) -> Vec<Verdict> {
     judge(&[Case { main: stored, retest: None }], Looks::ALONE).verdicts
 }
 
-/// Where a trial stands.
+/// What a trial is of.
 #[derive(Clone, Copy)]
-struct Place {
+struct TrialOf {
     case: usize,
     claim: usize,
     subject: Subject,
@@ -71,7 +71,7 @@ pub fn judge(cases: &[Case], looks: Looks) -> Judgement {
     let (mut places, mut findings) = (Vec::new(), Vec::new());
     for (case, Case { main, .. }) in cases.iter().enumerate() {
         for Trial { subject, claim, finding } in trials(main) {
-            places.push(Place { case, claim, subject });
+            places.push(TrialOf { case, claim, subject });
             findings.push(finding);
         }
     }
@@ -82,7 +82,7 @@ pub fn judge(cases: &[Case], looks: Looks) -> Judgement {
     for (verdict, place) in verdicts.iter_mut().zip(&places) {
         expect(verdict, cases[place.case].main, place.claim);
     }
-    let subjects = |Place { case, subject, .. }: Place| {
+    let subjects = |TrialOf { case, subject, .. }: TrialOf| {
         let subjects = measured_by(cases[case].main, subject).into_iter();
         subjects.map(move |subject| LookAgain { case, subject })
     };

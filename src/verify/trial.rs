@@ -1,6 +1,6 @@
 //! What the comparisons of a record show, each by itself.
 
-use super::efficiency::{self, Duel};
+use super::efficiency::{self, EfficiencyClaim};
 use super::family::Finding;
 use super::means::{Asked, Held, Reference, hold};
 use super::verdict::Verdict;
@@ -64,7 +64,7 @@ pub(super) fn trial(stored: &Stored, index: usize, comparison: &Comparison) -> T
             of_mean(stored, claim, quantity, other, reference)
         }
         Against::Efficiency { baseline, exceeds, cost } => {
-            let duel = Duel { candidate: quantity, baseline, bound: *exceeds, cost: *cost };
+            let duel = EfficiencyClaim { candidate: quantity, baseline, bound: *exceeds, cost: *cost };
             let fails = claim.expects == ExpectedOutcome::Fails;
             efficiency::finding(stored, named(&stored.record, claim, quantity, baseline), &duel, fails)
         }

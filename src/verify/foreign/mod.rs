@@ -138,7 +138,7 @@ pub fn judge(question: &Question, planes: &Planes) -> Result<Answer> {
     let mut answer = Answer { verdicts: vec![], maps: vec![], notes: planes.notes.clone() };
     for (index, about) in question.stored.record.bands.iter().enumerate() {
         let band = BandImages::of(planes, &picture, index, run.passes);
-        let asked = Asked { question, band: &band, index };
+        let asked = BandQuestion { question, band: &band, index };
         let objection = band.not_finite();
         for region in &regions {
             findings.push(asked.region(region, objection.as_deref(), has_pixels));
@@ -183,13 +183,13 @@ fn finite_or_nan(x: f64) -> f64 {
 }
 
 /// One band of a question.
-struct Asked<'a> {
+struct BandQuestion<'a> {
     question: &'a Question<'a>,
     band: &'a BandImages<'a>,
     index: usize,
 }
 
-impl Asked<'_> {
+impl BandQuestion<'_> {
     fn quantity(&self, observable: &Observable) -> Quantity {
         Quantity {
             cell: self.question.cell,
