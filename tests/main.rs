@@ -4,7 +4,6 @@
 #![allow(clippy::disallowed_methods)]
 
 mod browser;
-mod calibration;
 mod cli;
 mod damage;
 mod docs;

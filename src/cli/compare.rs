@@ -8,12 +8,12 @@ use crate::report::number::significant;
 use crate::report::table::Table;
 use crate::report::tables::verdict_table;
 use crate::results::store::RecordFolder;
-use crate::verify::comparisons::Row;
-use crate::verify::difference::{Compared, Terms, Work, compare};
+use crate::verify::comparisons::EfficiencyRow;
+use crate::verify::difference::{Compared, Terms, WorkChange, compare};
 use crate::verify::judge::FAMILY_LEVEL;
 use crate::verify::junit;
 use crate::verify::timing_ratios::{self, TimingRatio, timing_ratios};
-use crate::verify::verdict::Verdict;
+use crate::verify::verdict::{TestKind, Verdict};
 
 /// Compare two records of one experiment: what changed, and whether a mean differs.
 ///
@@ -93,7 +93,7 @@ fn tell(compared: &Compared, args: &Args, out: &mut impl Write) -> std::io::Resu
         writeln!(out, "{}", verdict_table(&rows).to_text())?;
     }
     let all = compared.verdicts.len();
-    let identical = compared.verdicts.iter().filter(|v| v.test == "identical").count();
+    let identical = compared.verdicts.iter().filter(|v| v.test == Some(TestKind::Identical)).count();
     let green = compared.verdicts.iter().filter(|v| v.is_green()).count();
     if identical == all {
         writeln!(out, "identical: all {all} quantities, bit for bit")?;
@@ -151,8 +151,9 @@ fn tell_timing(ratios: &[TimingRatio], out: &mut impl Write) -> std::io::Result<
         ["cell", "band", "class", "of", "candidate", "against", "before", "after", "adjusted p"];
     let mut table = Table::new(&header);
     for TimingRatio { before, after, adjusted_p, .. } in others {
-        let ratio = |row: &Row| {
-            format!("{} {}", number(row.efficiency_ratio), interval(row.ci_low, row.ci_high))
+        let ratio = |row: &EfficiencyRow| {
+            let [ratio, low, high] = row.quoted().unwrap_or([f64::NAN; 3]);
+            format!("{} {}", number(ratio), interval(low, high))
         };
         let names = [
             &before.cell,
@@ -171,12 +172,12 @@ fn tell_timing(ratios: &[TimingRatio], out: &mut impl Write) -> std::io::Result<
 
 /// The largest detectable of the runs' first observables.
 fn coarsest(compared: &Compared) -> Option<f64> {
-    let tested = compared.verdicts.iter().filter(|v| v.expected != 0.0 && v.detectable.is_finite());
-    tested.filter(|v| compared.is_first(v)).map(|v| v.detectable).max_by(f64::total_cmp)
+    let first = compared.verdicts.iter().filter(|v| v.expected != Some(0.0) && compared.is_first(v));
+    first.filter_map(|v| v.detectable).filter(|d| d.is_finite()).max_by(f64::total_cmp)
 }
 
 /// Per run: counts per pass, variance of a pass of the first observable, and variance times rays.
-fn work_table(work: &[Work]) -> Table {
+fn work_table(work: &[WorkChange]) -> Table {
     let mut names: Vec<&str> = work.iter().flat_map(|w| w.counts.keys().map(String::as_str)).collect();
     names.sort_unstable();
     names.dedup();

@@ -12,7 +12,7 @@ use crate::results::store::{RecordFolder, Stored};
 use crate::results::{atomic, record::EstimatorRun};
 use crate::verify::foreign::efficiency::{Ratio, ratios};
 use crate::verify::foreign::images::{Planes, planes};
-use crate::verify::foreign::{Answer, LEVEL, Map, Question, judge, run_of};
+use crate::verify::foreign::{Answer, LEVEL, PixelMap, Question, judge, run_of};
 use crate::verify::junit;
 use crate::verify::verdict::{self, Outcome, Verdict};
 
@@ -229,7 +229,7 @@ fn write_views(folder: &Path, answer: &Answer, planes: &Planes) -> Result<()> {
         return Ok(());
     }
     let single = |values: &[f64]| values.iter().map(|x| *x as f32).collect::<Vec<f32>>();
-    let part = |map: &Map| -> Part {
+    let part = |map: &PixelMap| -> Part {
         let channels = [
             ("z", &map.z),
             ("relative_difference", &map.relative),
@@ -278,8 +278,8 @@ fn tell(
         verdicts.len(),
         args.level
     )?;
-    let means = verdicts.iter().filter(|v| v.observable == "mean" && v.detectable.is_finite());
-    if let Some(worst) = means.map(|v| v.detectable).max_by(f64::total_cmp) {
+    let means = verdicts.iter().filter(|v| v.observable == "mean").filter_map(|v| v.detectable);
+    if let Some(worst) = means.filter(|d| d.is_finite()).max_by(f64::total_cmp) {
         writeln!(
             out,
             "bias of an image mean that would have been found (99 % power): {}; `detectable` is relative \

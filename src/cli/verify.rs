@@ -16,7 +16,7 @@ use crate::verify::judge::{Case, Judgement, Looks, Measured, judge};
 use crate::verify::junit;
 use crate::verify::levels::{FAMILY_LEVEL, FIRST_LOOK, RETEST_FACTOR};
 use crate::verify::nights::Nights;
-use crate::verify::verdict::{self, Verdict};
+use crate::verify::verdict::{self, TestKind, Verdict};
 
 /// Judge the claims of experiments; run what has no record yet.
 ///
@@ -59,7 +59,7 @@ pub struct Args {
 }
 
 /// Something to judge, and what it takes to look at it again.
-struct Subject {
+struct Judged {
     folder: RecordFolder,
     main: Stored,
     retest: Option<Stored>,
@@ -116,7 +116,7 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     Ok(if alarmed { 1 } else { verdict::exit_code(&judgement.verdicts) })
 }
 
-fn judge_all(subjects: &[Subject]) -> Judgement {
+fn judge_all(subjects: &[Judged]) -> Judgement {
     let cases: Vec<Case> =
         subjects.iter().map(|s| Case { main: &s.main, retest: s.retest.as_ref() }).collect();
     judge(&cases, Looks::Two)
@@ -138,7 +138,7 @@ impl Court<'_> {
         file: Option<&Path>,
         token: &str,
         verdicts: &[Verdict],
-        subjects: &[Subject],
+        subjects: &[Judged],
     ) -> Result<bool> {
         let path = file.map_or_else(|| self.working.out.join("evidence.json"), Path::to_path_buf);
         let mut nights = read_nights(&path)?;
@@ -161,14 +161,14 @@ impl Court<'_> {
     }
 
     /// What the paths name, measured where there is no record yet.
-    fn subjects(&self, paths: &[PathBuf]) -> Result<Vec<Subject>> {
+    fn subjects(&self, paths: &[PathBuf]) -> Result<Vec<Judged>> {
         let mut subjects = Vec::new();
         for path in paths {
             if path.join("record").join("record.json").exists() {
                 let folder = RecordFolder::new(path);
                 let main = folder.read()?;
                 let retest = folder.retest_of(&main)?;
-                subjects.push(Subject { folder, main, retest, experiment: None });
+                subjects.push(Judged { folder, main, retest, experiment: None });
                 continue;
             }
             for file in experiment_files(path)? {
@@ -178,7 +178,7 @@ impl Court<'_> {
         Ok(subjects)
     }
 
-    fn measured(&self, experiment: Loaded) -> Result<Subject> {
+    fn measured(&self, experiment: Loaded) -> Result<Judged> {
         let folder = RecordFolder::new(self.working.folder(experiment.name()));
         let main = if crate::run::has_record_of(&experiment, &self.working.out) {
             folder.read()?
@@ -187,11 +187,11 @@ impl Court<'_> {
             crate::run::run_any(&experiment, self.registry, &self.working, &self.interrupt)?.1
         };
         let retest = folder.retest_of(&main)?;
-        Ok(Subject { folder, main, retest, experiment: Some(experiment) })
+        Ok(Judged { folder, main, retest, experiment: Some(experiment) })
     }
 
     /// Measures again what wants a second look; whether anything was.
-    fn look_again(&self, subjects: &mut [Subject], judgement: &Judgement) -> Result<bool> {
+    fn look_again(&self, subjects: &mut [Judged], judgement: &Judgement) -> Result<bool> {
         let mut looked = false;
         for (index, subject) in subjects.iter_mut().enumerate() {
             let own = judgement.wanted.iter().filter(|w| w.case == index);
@@ -281,7 +281,10 @@ fn tell(verdicts: &[Verdict], verbose: bool) {
     let green = verdicts.iter().filter(|v| v.is_green()).count();
     let shown: Vec<Verdict> = verdicts
         .iter()
-        .filter(|v| verbose || !v.is_green() || v.test == "sum of z^2" || !v.second_p.is_nan())
+        .filter(|v| {
+            let is_summary = v.test == Some(TestKind::SumOfSquares);
+            verbose || !v.is_green() || is_summary || v.second_p.is_some()
+        })
         .cloned()
         .collect();
     if !shown.is_empty() {
@@ -298,15 +301,17 @@ fn tell(verdicts: &[Verdict], verbose: bool) {
 /// The largest defects that could have gone unseen, by what they are relative to.
 fn tell_power(verdicts: &[Verdict]) {
     let largest = |chosen: &dyn Fn(&&Verdict) -> bool| {
-        let of = verdicts.iter().filter(chosen).map(|v| v.detectable).filter(|d| d.is_finite());
-        of.max_by(f64::total_cmp)
+        let of = verdicts.iter().filter(chosen).filter_map(|v| v.detectable);
+        of.filter(|d| d.is_finite()).max_by(f64::total_cmp)
     };
-    let is_cells = |v: &&Verdict| v.test.starts_with("chi2");
-    let is_mean =
-        |v: &&Verdict| ["t", "welch t", "paired t"].contains(&v.test.as_str()) && v.expected != 0.0;
+    let is_bins = |v: &&Verdict| matches!(v.test, Some(TestKind::Chi2Coarse | TestKind::Chi2Fine));
+    let is_mean = |v: &&Verdict| {
+        let is_t = matches!(v.test, Some(TestKind::T | TestKind::WelchT | TestKind::PairedT));
+        is_t && v.expected != Some(0.0)
+    };
     let what = [
         (largest(&is_mean), "of the value of a mean"),
-        (largest(&is_cells), "of a sampler's density, everywhere"),
+        (largest(&is_bins), "of a sampler's density, everywhere"),
     ];
     for (worst, of) in what.into_iter().filter_map(|(worst, of)| worst.map(|worst| (worst, of))) {
         println!("largest defect that could have gone unseen (99 % power): {:.2} % {of}", 100.0 * worst);

@@ -6,7 +6,7 @@ use super::split::SplitFigure;
 use crate::results::measurements::Measurement;
 use crate::results::provenance::Provenance;
 use crate::results::store::Stored;
-use crate::verify::comparisons::Row;
+use crate::verify::comparisons::EfficiencyRow;
 use crate::verify::model_errors::ModelError;
 use crate::verify::verdict::Verdict;
 

@@ -55,7 +55,7 @@ pub mod viewer;
 pub fn write(folder: &RecordFolder) -> Result<ReportData> {
     let stored = folder.read()?;
     let retest = folder.retest_of(&stored)?;
-    let looks = if retest.is_some() { Looks::Two } else { Looks::One };
+    let looks = if retest.is_some() { Looks::Two } else { Looks::ALONE };
     let verdicts = judge(&[Case { main: &stored, retest: retest.as_ref() }], looks).verdicts;
     write_judged(folder, stored, verdicts)
 }

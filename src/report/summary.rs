@@ -6,19 +6,23 @@ use super::table::Table;
 use crate::results::measurements::Measurement;
 use crate::results::record::{Cell, CostMeasure, PIXELS};
 use crate::results::store::Stored;
-use crate::verify::comparisons::Row;
+use crate::verify::comparisons::EfficiencyRow;
 use crate::verify::model_errors::ModelError;
 
-/// The rows by one measure of cost that stand for a pair of estimators: all classes together, and
-/// pixels rather than their mean. Second arms of one estimator are left out.
-pub fn chosen<'a>(stored: &Stored, rows: &'a [Row], cost: CostMeasure) -> Vec<&'a Row> {
-    let is_control = |row: &Row| {
+/// The rows by one measure of cost that stand for a pair of estimators: all classes together, and pixels rather than
+/// their mean. Second arms of one estimator are left out.
+pub fn chosen<'a>(
+    stored: &Stored,
+    rows: &'a [EfficiencyRow],
+    cost: CostMeasure,
+) -> Vec<&'a EfficiencyRow> {
+    let is_control = |row: &EfficiencyRow| {
         let cell = stored.record.cells.iter().find(|cell| cell.label == row.cell);
         let run = cell.and_then(|cell| cell.runs.iter().find(|run| run.estimator == row.candidate));
         run.is_some_and(|run| run.control_of.is_some())
     };
     let has_pixels = rows.iter().any(|row| row.metric == PIXELS);
-    let is_chosen = |row: &&Row| {
+    let is_chosen = |row: &&EfficiencyRow| {
         row.cost == cost
             && row.class == "all"
             && (!has_pixels || row.metric == PIXELS)
@@ -28,7 +32,7 @@ pub fn chosen<'a>(stored: &Stored, rows: &'a [Row], cost: CostMeasure) -> Vec<&'
 }
 
 /// The quantity whose variance is compared.
-pub fn metric_words(row: &Row) -> String {
+pub fn metric_words(row: &EfficiencyRow) -> String {
     if row.metric == PIXELS {
         "a pixel (averaged over the image)".into()
     } else {
@@ -37,10 +41,10 @@ pub fn metric_words(row: &Row) -> String {
 }
 
 /// Efficiencies by one measure of cost; nothing where there is no ratio.
-pub fn efficiency(stored: &Stored, rows: &[Row], cost: CostMeasure) -> Option<TableBlock> {
+pub fn efficiency(stored: &Stored, rows: &[EfficiencyRow], cost: CostMeasure) -> Option<TableBlock> {
     let rows = chosen(stored, rows, cost);
-    let quoted = rows.iter().find(|row| row.efficiency_ratio.is_finite())?;
-    let name = |row: &Row| format!("{} / {}", row.candidate, row.baseline);
+    let quoted = rows.iter().find(|row| row.quoted().is_some())?;
+    let name = |row: &EfficiencyRow| format!("{} / {}", row.candidate, row.baseline);
     let entries = rows.iter().map(|row| PivotEntry {
         cell: row.cell.clone(),
         names: vec![row.band.clone()],
@@ -49,7 +53,7 @@ pub fn efficiency(stored: &Stored, rows: &[Row], cost: CostMeasure) -> Option<Ta
     });
     let table = pivot(stored, &["band"], entries.collect());
     let what = metric_words(quoted);
-    let is_timed_together = || rows.iter().all(|row| row.side_by_side || row.efficiency_ratio.is_nan());
+    let is_timed_together = || rows.iter().all(|row| row.side_by_side || row.quoted().is_none());
     let (cost, how) = match cost {
         CostMeasure::Counters => ("counted work", "the same on every machine"),
         CostMeasure::Cpu if is_timed_together() => ("CPU time", "of this machine, side by side"),
@@ -59,25 +63,24 @@ pub fn efficiency(stored: &Stored, rows: &[Row], cost: CostMeasure) -> Option<Ta
         "Efficiency: A / B is the variance of {what} times {cost} ({how}) of B over that of A; above 1 A is the better. In \
          brackets the 95 % interval."
     );
-    if rows.iter().any(|row| row.efficiency_ratio.is_finite() && !row.resolved) {
+    if rows.iter().any(|row| row.quoted().is_some() && !row.resolved) {
         caption += " An asterisk: not resolved, more passes may move the ratio out of its interval.";
     }
-    if rows.iter().any(|row| row.efficiency_ratio.is_nan()) {
+    if rows.iter().any(|row| row.quoted().is_none()) {
         caption += " Where there is none, comparisons.csv has the whole reason.";
     }
     let file = if quoted.cost == CostMeasure::Cpu { "efficiency" } else { "efficiency-counters" };
     Some(TableBlock::new(file, caption, table))
 }
 
-fn ratio(row: &Row) -> String {
-    if row.efficiency_ratio.is_nan() {
+fn ratio(row: &EfficiencyRow) -> String {
+    let Some(numbers) = row.quoted() else {
         let reason = row.note.strip_prefix("no mean test: ").unwrap_or(&row.note);
         return format!("none: {}", reason.split([':', ',']).next().unwrap_or_default());
-    }
-    let number = |x: f64| significant(x, 3);
+    };
+    let [ratio, low, high] = numbers.map(|x| significant(x, 3));
     let star = if row.resolved { "" } else { "*" };
-    let [low, high] = [row.ci_low, row.ci_high].map(number);
-    format!("{}{star} [{low}, {high}]", number(row.efficiency_ratio))
+    format!("{ratio}{star} [{low}, {high}]")
 }
 
 /// Means of the sensor's first observable, all classes together.

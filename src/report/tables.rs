@@ -4,7 +4,7 @@ use super::number::{per_cent, significant, with_error};
 use super::table::Table;
 use crate::results::measurements::Measurement;
 use crate::results::record::CostMeasure;
-use crate::verify::comparisons::{Row, measure_name};
+use crate::verify::comparisons::{EfficiencyRow, measure_name};
 use crate::verify::model_errors::ModelError;
 use crate::verify::verdict::Verdict;
 
@@ -27,17 +27,18 @@ pub fn verdict_table(verdicts: &[Verdict]) -> Table {
         "note",
     ]);
     for v in verdicts {
-        let number = |value: f64, error: f64| {
-            match value.is_nan() {
-                true => String::new(),
-                // Exact, or without an error of its own.
-                false if error == 0.0 || error.is_nan() => significant(value, 6),
-                false => with_error(value, error),
-            }
+        let number = |value: Option<f64>, error: Option<f64>| match (value, error) {
+            (None, _) => String::new(),
+            (Some(value), Some(error)) if error != 0.0 => with_error(value, error),
+            // Exact, or without an error of its own.
+            (Some(value), _) => significant(value, 6),
         };
+        let digits = |x: Option<f64>, digits| x.map_or_else(String::new, |x| significant(x, digits));
         // Relative to the expected value; absolute where that is 0.
-        let detectable =
-            if v.expected == 0.0 { significant(v.detectable, 2) } else { per_cent(v.detectable) };
+        let detectable = match v.expected {
+            Some(0.0) => digits(v.detectable, 2),
+            _ => v.detectable.map_or_else(String::new, per_cent),
+        };
         table.push(vec![
             v.outcome.to_string(),
             v.claim.clone(),
@@ -48,9 +49,9 @@ pub fn verdict_table(verdicts: &[Verdict]) -> Table {
             v.class.clone(),
             number(v.value, v.std_error),
             number(v.expected, v.expected_error),
-            v.test.clone(),
-            significant(v.statistic, 3),
-            significant(v.adjusted_p, 2),
+            v.test_name(),
+            digits(v.statistic, 3),
+            digits(v.adjusted_p, 2),
             detectable,
             v.note.clone(),
         ]);
@@ -110,7 +111,7 @@ pub fn model_error_table(rows: &[ModelError]) -> Table {
 }
 
 /// Efficiencies: a row for each pair, class and measure of cost.
-pub fn comparison_table(rows: &[Row]) -> Table {
+pub fn comparison_table(rows: &[EfficiencyRow]) -> Table {
     let mut table = Table::new(&[
         "cell",
         "candidate",
@@ -126,25 +127,18 @@ pub fn comparison_table(rows: &[Row]) -> Table {
     ]);
     for row in rows {
         let number = |x: f64| significant(x, 3);
-        let efficiency = match row.efficiency_ratio.is_nan() {
-            true => String::new(),
-            false => {
-                format!(
-                    "{} [{}, {}]",
-                    number(row.efficiency_ratio),
-                    number(row.ci_low),
-                    number(row.ci_high)
-                )
-            }
-        };
+        let efficiency = row.quoted().map_or_else(String::new, |numbers| {
+            let [ratio, low, high] = numbers.map(number);
+            format!("{ratio} [{low}, {high}]")
+        });
         let cost = match (row.cost, row.side_by_side) {
             (CostMeasure::Cpu, false) => "cpu, one after the other",
             (cost, _) => measure_name(cost),
         };
-        let kurtosis = match row.kurtosis_candidate.is_nan() {
-            true => String::new(),
-            false => format!("{}, {}", number(row.kurtosis_candidate), number(row.kurtosis_baseline)),
-        };
+        let kurtosis = row.kurtosis_candidate.zip(row.kurtosis_baseline);
+        let kurtosis = kurtosis.map_or_else(String::new, |(candidate, baseline)| {
+            format!("{}, {}", number(candidate), number(baseline))
+        });
         table.push(vec![
             row.cell.clone(),
             row.candidate.clone(),
@@ -154,7 +148,7 @@ pub fn comparison_table(rows: &[Row]) -> Table {
             row.class.clone(),
             cost.into(),
             efficiency,
-            number(row.variance_ratio),
+            row.variance_ratio.map_or_else(String::new, number),
             kurtosis,
             row.note.clone(),
         ]);

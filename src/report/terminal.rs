@@ -7,6 +7,7 @@ use super::summary;
 use super::table::Table;
 use crate::results::measurements::Measurement;
 use crate::results::record::CostMeasure;
+use crate::verify::verdict::{TestKind, Verdict};
 
 /// One row per cell and estimator: the sensor's first observable in every band, passes, CPU time, speed.
 pub fn run_table(data: &ReportData) -> Table {
@@ -42,9 +43,12 @@ pub fn sampler_table(data: &ReportData) -> Table {
     let header = ["sampler", "draws", "bins", "tests", "green", "detectable", "CPU s", "draws/s/core"];
     let mut table = Table::new(&header);
     for run in &record.samplers {
-        let own = || data.verdicts.iter().filter(|v| v.estimators == run.sampler && v.class.is_empty());
+        let is_own = |v: &&Verdict| {
+            v.estimators == run.sampler && v.test.as_ref().is_some_and(TestKind::is_of_sampler)
+        };
+        let own = || data.verdicts.iter().filter(is_own);
         let green = own().filter(|v| v.is_green()).count();
-        let coarse = own().find(|v| v.test == "chi2 coarse");
+        let coarse = own().find(|v| v.test == Some(TestKind::Chi2Coarse));
         let bins = [Some(&run.coarse), run.fine.as_ref()].into_iter().flatten();
         let bins = bins.filter_map(|path| data.stored.bins(path));
         let bins: Vec<String> = bins.map(|bins| (bins.mass.len() - 1).to_string()).collect();
@@ -56,7 +60,7 @@ pub fn sampler_table(data: &ReportData) -> Table {
             bins.join(" + "),
             own().count().to_string(),
             green.to_string(),
-            coarse.map_or(String::new(), |v| per_cent(v.detectable)),
+            coarse.and_then(|v| v.detectable).map_or_else(String::new, per_cent),
             cost.map_or(String::new(), |c| significant(c.cpu_seconds, 3)),
             rate.map_or(String::new(), |rate| significant(rate, 3)),
         ]);

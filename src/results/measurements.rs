@@ -2,32 +2,15 @@
 
 use serde::Serialize;
 
-use super::csv_text::{self, number, optional};
+use super::csv_text;
 use super::record::{Cell, EstimatorRun};
 use super::store::Stored;
 use super::timing::Timing;
 use crate::stats::moments::Moments;
 use crate::stats::tree::total;
 
-/// Columns of `measurements.csv`.
-pub const COLUMNS: [&str; 13] = [
-    "experiment",
-    "cell",
-    "band",
-    "estimator",
-    "observable",
-    "class",
-    "passes",
-    "mean",
-    "std_error",
-    "variance_per_pass",
-    "nonfinite",
-    "cpu_seconds_per_pass",
-    "rays_per_pass",
-];
-
-/// One row. Costs are of all bands and observables of the run together.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// One row of `measurements.csv`. Costs are of all bands and observables of the run together.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Measurement {
     /// Experiment name.
     pub experiment: String,
@@ -66,7 +49,7 @@ pub fn measurements(stored: &Stored, timing: Option<&Timing>) -> Vec<Measurement
 
 /// The rows as CSV text.
 pub fn to_csv(rows: &[Measurement]) -> String {
-    csv_text::to_text(&COLUMNS, rows.iter().map(Measurement::fields))
+    csv_text::table(rows)
 }
 
 fn of_run(
@@ -99,26 +82,6 @@ fn of_run(
         }
     }
     rows
-}
-
-impl Measurement {
-    fn fields(&self) -> Vec<String> {
-        vec![
-            self.experiment.clone(),
-            self.cell.clone(),
-            self.band.clone(),
-            self.estimator.clone(),
-            self.observable.clone(),
-            self.class.clone(),
-            self.passes.to_string(),
-            number(self.mean),
-            number(self.std_error),
-            number(self.variance_per_pass),
-            self.nonfinite.to_string(),
-            optional(self.cpu_seconds_per_pass),
-            optional(self.rays_per_pass),
-        ]
-    }
 }
 
 #[cfg(test)]

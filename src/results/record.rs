@@ -30,11 +30,16 @@ pub struct Record {
     pub claims_hash: String,
     /// The claims as the file states them.
     pub claims: serde_json::Value,
+    /// What verification needs of each of `claims`, in their order.
+    pub statements: Vec<Claim>,
     /// Indices of claims that were changed or added when passes had already been played: they are not
     /// evidence.
     pub post_hoc: Vec<usize>,
     /// The claims expanded over cells, bands and tables, with the values they are held against.
     pub comparisons: Vec<Comparison>,
+    /// The claims on samplers expanded: one entry for each sampler that a claim speaks of.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sampler_comparisons: Vec<SamplerComparison>,
     /// What `reproduces` claims had played again.
     pub replays: Vec<Replay>,
     /// The bands, in the order of every array's band axis.
@@ -251,6 +256,84 @@ pub struct Quantity {
     pub band: usize,
 }
 
+/// What a claim says of itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Claim {
+    /// Its name, or its kind and place in the file.
+    pub label: String,
+    /// What it states.
+    pub kind: ClaimKind,
+    /// The outcome that makes it green.
+    pub expects: ExpectedOutcome,
+    /// It speaks of each class or observable that there is: some may be dark.
+    pub each: bool,
+}
+
+/// Kinds of claims.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ClaimKind {
+    /// A quantity equals a known value.
+    Equals,
+    /// Two measurements of one integral agree.
+    Agree,
+    /// Two measurements differ.
+    Differs,
+    /// The record comes out again, bit for bit.
+    Reproduces {
+        /// The checksum that the record's numbers must have.
+        numbers: Option<String>,
+    },
+    /// A sampler draws from the density that it states.
+    Sampler,
+    /// An estimator is more efficient than another.
+    Faster,
+    /// An estimator is not much less efficient than another.
+    NotSlower,
+}
+
+impl ClaimKind {
+    /// As an experiment file calls it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            ClaimKind::Equals => "equals",
+            ClaimKind::Agree => "agree",
+            ClaimKind::Differs => "differs",
+            ClaimKind::Reproduces { .. } => "reproduces",
+            ClaimKind::Sampler => "sampler",
+            ClaimKind::Faster => "faster",
+            ClaimKind::NotSlower => "not_slower",
+        }
+    }
+}
+
+/// The outcome that makes a claim green; any but a pass makes it a control.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ExpectedOutcome {
+    /// The claim holds.
+    Pass,
+    /// The test finds a difference.
+    Differs,
+    /// The claim is found not to hold.
+    Fails,
+    /// The test is refused as statistically invalid.
+    Invalid,
+}
+
+/// A sampler that a claim speaks of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SamplerComparison {
+    /// Index of the claim in the file.
+    pub claim: usize,
+    /// The sampler's name.
+    pub sampler: String,
+    /// The largest relative error of the density that may go unseen; a coarser test is underpowered.
+    pub detect: Option<f64>,
+}
+
 /// One elementary statement of a claim.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -298,10 +381,11 @@ pub enum Against {
 }
 
 /// What an estimator's work is measured by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CostMeasure {
     /// A weighted sum of the record's counters: exactly reproducible.
+    #[default]
     Counters,
     /// CPU time, of `timing.json`.
     Cpu,

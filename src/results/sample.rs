@@ -36,8 +36,10 @@ pub fn stored(noise: f64) -> Stored {
         resolved: json!({"display": {"exposure_stops": 0.0}, "name": "sample"}),
         claims_hash: "a0".into(),
         claims: json!([]),
+        statements: vec![],
         post_hoc: vec![],
         comparisons: vec![],
+        sampler_comparisons: vec![],
         replays: vec![],
         bands: vec![band("R", [1.0, 0.0, 0.0]), band("G", [0.0, 1.0, 0.0])],
         cells: vec![cell],
@@ -131,10 +133,15 @@ pub fn uniform(i: u64) -> f64 {
     (u - 0.5) * 12f64.sqrt()
 }
 
+/// A claim of this name that expects to pass.
+pub fn claim(name: &str, kind: ClaimKind) -> Claim {
+    Claim { label: name.into(), kind, expects: ExpectedOutcome::Pass, each: false }
+}
+
 /// A record whose estimator `mis`, band 0, is held against exact values, each a claim with a name.
 pub fn judged(claims: &[(&str, f64)]) -> Stored {
     let mut stored = stored(0.1);
-    stored.record.claims = claims.iter().map(|(name, _)| json!({"name": name, "equals": {}})).collect();
+    stored.record.statements = claims.iter().map(|(name, _)| claim(name, ClaimKind::Equals)).collect();
     let against = |value| Against::Value { value, error: 0.0, source: "by hand".into() };
     let comparison = |(claim, (_, value)): (usize, &(&str, f64))| Comparison {
         claim,

@@ -123,7 +123,14 @@ impl Stored {
                 return Some(format!("the spread of {} has shape {shape:?}", run.estimator));
             }
         }
-        super::sampler::defect(&self.record, &self.arrays)
+        let record = &self.record;
+        let claims = record.comparisons.iter().map(|comparison| comparison.claim);
+        let of_samplers = record.sampler_comparisons.iter().map(|comparison| comparison.claim);
+        let stated = record.statements.len();
+        if let Some(claim) = claims.chain(of_samplers).find(|claim| *claim >= stated) {
+            return Some(format!("comparisons are of claim {claim}, and there are {stated} claims"));
+        }
+        super::sampler::defect(record, &self.arrays)
     }
 }
 

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
+use super::comparisons::statements;
 use super::job::{Finished, Job};
 use super::jobs::{Plan, named};
 use super::keys::Stage;
@@ -80,8 +81,10 @@ pub fn assemble(
         resolved: experiment.resolved(),
         claims_hash: hash_json(&claims),
         claims,
+        statements: statements(&experiment.file.claim),
         post_hoc: post_hoc.into_iter().collect(),
         comparisons: plan.comparisons.clone(),
+        sampler_comparisons: Vec::new(),
         replays,
         bands: plan.bands.clone(),
         cells,

@@ -4,9 +4,14 @@
 use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
-use crate::experiment::schema::{Agree, ClaimEntry, CostMeasure, Differs, Duel, Equals};
+use crate::experiment::sampler_file::SamplerClaimEntry;
+use crate::experiment::schema::{Agree, ClaimEntry, CostMeasure, Differs, Duel, Equals, Expect};
 use crate::experiment::{CellSpec, Experiment};
-use crate::results::record::{self, Against, Band, Comparison, Observable, Quantity};
+use crate::results::record::{
+    self, Against, Band, Claim, ClaimKind, Comparison, ExpectedOutcome, Observable, Quantity,
+    SamplerComparison,
+};
+use crate::results::sampler::SamplerRun;
 
 /// Names every observable, or every class.
 const EACH: &str = "each";
@@ -25,6 +30,72 @@ pub fn expand(
     let scope = Scope { experiment, bands, observables };
     let lists = claims.map(|(index, claim)| scope.claim(index, claim)).collect::<Result<Vec<_>>>()?;
     Ok(lists.into_iter().flatten().collect())
+}
+
+/// The claims on samplers, for each of the samplers that were drawn from.
+pub fn expand_samplers(claims: &[SamplerClaimEntry], drawn: &[SamplerRun]) -> Vec<SamplerComparison> {
+    let of_claim = |(claim, entry): (usize, &SamplerClaimEntry)| {
+        let words = &entry.sampler;
+        let is_meant =
+            |run: &&SamplerRun| words.samplers.as_ref().is_none_or(|names| names.contains(&run.sampler));
+        let sampler = |run: &SamplerRun| SamplerComparison {
+            claim,
+            sampler: run.sampler.clone(),
+            detect: words.detect,
+        };
+        drawn.iter().filter(is_meant).map(sampler).collect::<Vec<_>>()
+    };
+    claims.iter().enumerate().flat_map(of_claim).collect()
+}
+
+/// What claims say of themselves.
+pub fn statements(claims: &[ClaimEntry]) -> Vec<Claim> {
+    let of_claim = |(index, entry): (usize, &ClaimEntry)| {
+        let each = |word: &Option<String>| word.as_deref() == Some(EACH);
+        let (kind, each) = match entry {
+            ClaimEntry { agree: Some(words), .. } => {
+                (ClaimKind::Agree, each(&words.class) || each(&words.observable))
+            }
+            ClaimEntry { differs: Some(words), .. } => {
+                (ClaimKind::Differs, each(&words.class) || each(&words.observable))
+            }
+            ClaimEntry { reproduces: Some(words), .. } => {
+                (ClaimKind::Reproduces { numbers: words.numbers.clone() }, false)
+            }
+            ClaimEntry { faster: Some(_), .. } => (ClaimKind::Faster, false),
+            ClaimEntry { not_slower: Some(_), .. } => (ClaimKind::NotSlower, false),
+            // Validation has found exactly one kind.
+            ClaimEntry { .. } => (ClaimKind::Equals, false),
+        };
+        statement(index, kind, entry.name.as_ref(), entry.expect, each)
+    };
+    claims.iter().enumerate().map(of_claim).collect()
+}
+
+/// What claims on samplers say of themselves.
+pub fn sampler_statements(claims: &[SamplerClaimEntry]) -> Vec<Claim> {
+    let of_claim = |(index, entry): (usize, &SamplerClaimEntry)| {
+        statement(index, ClaimKind::Sampler, entry.name.as_ref(), entry.expect, false)
+    };
+    claims.iter().enumerate().map(of_claim).collect()
+}
+
+fn statement(
+    index: usize,
+    kind: ClaimKind,
+    name: Option<&String>,
+    expect: Option<Expect>,
+    each: bool,
+) -> Claim {
+    let expects = match expect {
+        Some(Expect::Differs) => ExpectedOutcome::Differs,
+        Some(Expect::Fails) => ExpectedOutcome::Fails,
+        Some(Expect::Invalid) => ExpectedOutcome::Invalid,
+        None if kind == ClaimKind::Differs => ExpectedOutcome::Differs,
+        None => ExpectedOutcome::Pass,
+    };
+    let label = name.cloned().unwrap_or_else(|| format!("{} #{}", kind.name(), index + 1));
+    Claim { label, kind, expects, each }
 }
 
 /// What `agree` and `differs` have in common.
@@ -304,5 +375,33 @@ fn number(cell: &CellSpec, column: &str) -> Result<f64> {
             "column `{column}` holds `{text}` in cell `{}`, where a claim needs a number",
             cell.label
         ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn claims_say_what_they_expect() {
+        let claims: Vec<ClaimEntry> = serde_json::from_value(json!([
+            {"agree": {"estimators": ["a", "b"], "class": "each", "detect": 0.1}},
+            {"name": "apart", "differs": {"estimators": ["a", "b"]}},
+            {"expect": "invalid", "equals": {"value": 1.0, "source": "by hand"}},
+            {"reproduces": {"passes": 4, "numbers": "ff"}},
+        ]))
+        .expect("claims");
+        let claim =
+            |label: &str, kind, expects, each| Claim { label: label.into(), kind, expects, each };
+        let numbers = Some("ff".to_string());
+        let expected = [
+            claim("agree #1", ClaimKind::Agree, ExpectedOutcome::Pass, true),
+            claim("apart", ClaimKind::Differs, ExpectedOutcome::Differs, false),
+            claim("equals #3", ClaimKind::Equals, ExpectedOutcome::Invalid, false),
+            claim("reproduces #4", ClaimKind::Reproduces { numbers }, ExpectedOutcome::Pass, false),
+        ];
+        assert_eq!(statements(&claims), expected);
     }
 }

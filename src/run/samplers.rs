@@ -17,6 +17,7 @@ use super::chi_square::bins::{self, Extra, Partition};
 use super::chi_square::count::{Counting, Counts};
 use super::chi_square::quadrature::{Mass, Quadrature, ROUNDING};
 use super::clock::thread_cpu_time;
+use super::comparisons;
 use super::interrupt::Interrupt;
 use super::keys::{KEY_VERSION, Stage};
 use super::progress::Progress;
@@ -225,8 +226,10 @@ fn play(
         resolved: experiment.resolved(),
         claims_hash: hash_json(&stated),
         claims: stated,
+        statements: comparisons::sampler_statements(&file.claim),
         post_hoc: post_hoc.into_iter().collect(),
         comparisons: Vec::new(),
+        sampler_comparisons: comparisons::expand_samplers(&file.claim, &samplers),
         replays: Vec::new(),
         bands: Vec::new(),
         cells: Vec::new(),

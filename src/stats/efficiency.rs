@@ -77,7 +77,7 @@ impl Values {
 
 /// Passes that ran together.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Block {
+pub struct JackknifeBlock {
     /// Moments of the passes' values.
     pub moments: Moments,
     /// What they cost together, in any unit that both arms share: CPU seconds, rays.
@@ -92,7 +92,7 @@ pub enum NoRatio {
     /// A moment or a cost is not finite, or a cost is not positive.
     NotFinite,
     /// An arm's passes (perhaps without one block) are all equal: its variance has no logarithm.
-    NoVariance,
+    ZeroVariance,
 }
 
 impl fmt::Display for NoRatio {
@@ -100,34 +100,33 @@ impl fmt::Display for NoRatio {
         f.write_str(match self {
             NoRatio::TooFewBlocks => "an arm has too few blocks, or an empty one",
             NoRatio::NotFinite => "a moment or a cost is not finite, or a cost is not positive",
-            NoRatio::NoVariance => "an arm has no variance, at least without one of its blocks",
+            NoRatio::ZeroVariance => "an arm has no variance, at least without one of its blocks",
         })
     }
 }
 
-/// A log ratio, A over B.
+/// A ratio, A over B, by its logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogRatio {
     /// The logarithm, with its jackknife error and the error's degrees of freedom.
     pub log: Estimate,
-    /// Half the width of the two-sided Student interval of `log` at the confidence that was asked for.
-    pub half_width: f64,
 }
 
 impl LogRatio {
-    /// From the logarithm with its error, for two-sided intervals of this confidence.
-    pub fn new(log: Estimate, confidence: f64) -> LogRatio {
-        LogRatio { log, half_width: critical_value(1.0 - confidence, log.dof) * log.std_error }
-    }
-
     /// The ratio itself.
     pub fn ratio(&self) -> f64 {
         exp(self.log.value)
     }
 
+    /// Half the width of the two-sided Student interval of `log`.
+    pub fn half_width(&self, confidence: f64) -> f64 {
+        critical_value(1.0 - confidence, self.log.dof) * self.log.std_error
+    }
+
     /// The interval of the ratio.
-    pub fn interval(&self) -> (f64, f64) {
-        (exp(self.log.value - self.half_width), exp(self.log.value + self.half_width))
+    pub fn interval(&self, confidence: f64) -> (f64, f64) {
+        let half_width = self.half_width(confidence);
+        (exp(self.log.value - half_width), exp(self.log.value + half_width))
     }
 
     /// The two-sided test that the true ratio is `ratio`.
@@ -138,7 +137,7 @@ impl LogRatio {
 
 /// What one arm is like.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Arm {
+pub struct ArmSummary {
     /// Moments of all its passes.
     pub moments: Moments,
     /// Cost of a pass.
@@ -163,19 +162,26 @@ pub struct Efficiency {
     /// c_A / c_B.
     pub cost: LogRatio,
     /// Arm A.
-    pub a: Arm,
+    pub a: ArmSummary,
     /// Arm B.
-    pub b: Arm,
+    pub b: ArmSummary,
     /// Were the blocks deleted in pairs?
     pub is_joint: bool,
     /// How far `work`'s log moved from the first half of the blocks to all of them: when the passes doubled.
     pub moved: f64,
-    /// May the ratio be quoted: it moved by no more than `half_width`, and in neither arm may one pass hold
-    /// more than [`LARGEST_SHARE`] of M2 (by the upper bound of `largest_pass`). The first condition alone
-    /// fails by chance in 1 - confidence of all honest comparisons: R of half the data has twice the
-    /// variance, its covariance with R of all is the latter's variance, and so their difference has the
-    /// standard error of R itself.
-    pub resolved: bool,
+}
+
+impl Efficiency {
+    /// May the ratio be quoted at `confidence`: it moved by no more than half its interval, and in neither
+    /// arm may one pass hold more than [`LARGEST_SHARE`] of M2 (by the upper bound of `largest_pass`). The
+    /// first condition alone fails by chance in 1 - confidence of all honest comparisons: R of half the data
+    /// has twice the variance, its covariance with R of all is the latter's variance, and so their
+    /// difference has the standard error of R itself.
+    pub fn is_resolved(&self, confidence: f64) -> bool {
+        let is_shared = [self.a, self.b].iter().all(|arm| arm.largest_pass.1 <= LARGEST_SHARE);
+        // A NaN (a first half of zero variance) resolves nothing.
+        is_shared && self.moved <= self.work.half_width(confidence)
+    }
 }
 
 /// Bounds of the largest share s of sum (x_i - m)^2 that one pass of any block holds, m the mean of all.
@@ -186,8 +192,8 @@ pub struct Efficiency {
 ///   max_k Q4 / (Q2 M2) <= s <= max_k sqrt(Q4) / M2.
 /// Over one block the bounds are kurtosis / n and sqrt(kurtosis / n). With the sum of a block's variances for Q2
 /// and that of their squares for Q4, the same holds of the largest variance.
-pub fn one_pass_share(blocks: &[Block], values: Values, mean: f64) -> (f64, f64) {
-    let terms = |b: &Block| values.terms(&b.moments, mean);
+pub fn one_pass_share(blocks: &[JackknifeBlock], values: Values, mean: f64) -> (f64, f64) {
+    let terms = |b: &JackknifeBlock| values.terms(&b.moments, mean);
     let m2: f64 = blocks.iter().map(|b| terms(b).0).sum();
     let bounds = blocks.iter().map(|b| {
         let (q2, q4) = terms(b);
@@ -206,42 +212,27 @@ fn about(moments: &Moments, mean: f64) -> (f64, f64) {
     (moments.m2 + n * d2, q4.max(0.0))
 }
 
-/// Compares arms of scores at `confidence`: 0.95 to show, 0.999 to decide.
+/// Compares two arms.
 ///
 /// # Errors
 ///
 /// [`NoRatio`].
-pub fn compare(a: &[Block], b: &[Block], confidence: f64) -> Result<Efficiency, NoRatio> {
-    compare_values(a, b, Values::Scores, confidence)
-}
-
-/// The same of arms whose values are `values`.
-///
-/// # Errors
-///
-/// [`NoRatio`].
-pub fn compare_values(
-    a: &[Block],
-    b: &[Block],
+pub fn compare(
+    a: &[JackknifeBlock],
+    b: &[JackknifeBlock],
     values: Values,
-    confidence: f64,
 ) -> Result<Efficiency, NoRatio> {
     let (left, right) = (Jackknife::of(a, values)?, Jackknife::of(b, values)?);
-    let work = left.over(&right, |j| &j.work, confidence);
-    let half = |blocks: &[Block]| Totals::of(&blocks[..blocks.len() / 2]).work(values);
-    let moved = (half(a) - half(b) - work.log.value).abs();
-    let (a, b) = (left.arm(a), right.arm(b));
-    let is_shared = a.largest_pass.1 <= LARGEST_SHARE && b.largest_pass.1 <= LARGEST_SHARE;
+    let work = left.over(&right, |j| &j.work);
+    let half = |blocks: &[JackknifeBlock]| Totals::of(&blocks[..blocks.len() / 2]).work(values);
     Ok(Efficiency {
         work,
-        variance: left.over(&right, |j| &j.variance, confidence),
-        cost: left.over(&right, |j| &j.cost, confidence),
-        a,
-        b,
+        variance: left.over(&right, |j| &j.variance),
+        cost: left.over(&right, |j| &j.cost),
+        a: left.arm(a),
+        b: right.arm(b),
         is_joint: left.is_paired_with(&right),
-        moved,
-        // A NaN (a first half without variance) resolves nothing.
-        resolved: is_shared && moved <= work.half_width,
+        moved: (half(a) - half(b) - work.log.value).abs(),
     })
 }
 
@@ -253,7 +244,7 @@ struct Totals {
 }
 
 impl Totals {
-    fn of(blocks: &[Block]) -> Totals {
+    fn of(blocks: &[JackknifeBlock]) -> Totals {
         blocks
             .iter()
             .fold(Totals::default(), |sum, b| sum.and(&Totals { moments: b.moments, cost: b.cost }))
@@ -293,11 +284,11 @@ struct Jackknife {
 }
 
 impl Jackknife {
-    fn of(blocks: &[Block], values: Values) -> Result<Jackknife, NoRatio> {
+    fn of(blocks: &[JackknifeBlock], values: Values) -> Result<Jackknife, NoRatio> {
         if blocks.len() < FEWEST_BLOCKS || blocks.iter().any(|b| b.moments.n == 0) {
             return Err(NoRatio::TooFewBlocks);
         }
-        let is_good = |b: &Block| {
+        let is_good = |b: &JackknifeBlock| {
             b.moments.to_array().iter().all(|x| x.is_finite()) && b.cost.is_finite() && b.cost > 0.0
         };
         if !blocks.iter().all(is_good) {
@@ -310,7 +301,7 @@ impl Jackknife {
             Values::Variances => t.moments.mean > 0.0,
         };
         if !without.iter().chain([&total]).all(varies) {
-            return Err(NoRatio::NoVariance);
+            return Err(NoRatio::ZeroVariance);
         }
         let n = total.moments.n as f64;
         let deviations = |f: &dyn Fn(&Totals) -> f64| {
@@ -327,11 +318,11 @@ impl Jackknife {
         Ok(Jackknife { values, total, variance, cost, work: deviations(&|t| t.work(values)) })
     }
 
-    fn arm(&self, blocks: &[Block]) -> Arm {
+    fn arm(&self, blocks: &[JackknifeBlock]) -> ArmSummary {
         let (moments, values) = (self.total.moments, self.values);
         let all = values.terms(&moments, moments.mean).0;
-        let share = |b: &Block| values.terms(&b.moments, moments.mean).0 / all;
-        Arm {
+        let share = |b: &JackknifeBlock| values.terms(&b.moments, moments.mean).0 / all;
+        ArmSummary {
             moments,
             cost: self.total.cost / moments.n as f64,
             kurtosis: match values {
@@ -347,7 +338,7 @@ impl Jackknife {
         self.work.each.len() == other.work.each.len()
     }
 
-    fn over(&self, other: &Jackknife, of: fn(&Jackknife) -> &Deviations, confidence: f64) -> LogRatio {
+    fn over(&self, other: &Jackknife, of: fn(&Jackknife) -> &Deviations) -> LogRatio {
         let (a, b) = (of(self), of(other));
         let squares = |d: &Deviations| d.each.iter().map(|e| e * e).sum::<f64>().sqrt();
         let alone = |d: &Deviations| Estimate {
@@ -361,13 +352,13 @@ impl Jackknife {
         } else {
             alone(a).minus(&alone(b))
         };
-        LogRatio::new(log, confidence)
+        LogRatio { log }
     }
 }
 
 /// The delete-one jackknife's standard error of a positive estimate's logarithm: from the estimates
 /// that leave one block out each, se^2 = (n - 1) / n sum (log - mean log)^2. Infinite for fewer than two.
-/// For estimates that are no sums over [`Block`]s.
+/// For estimates that are no sums over [`JackknifeBlock`]s.
 pub fn jackknife_log_error(without_one: &[f64]) -> f64 {
     if without_one.len() < 2 {
         return f64::INFINITY;
@@ -380,7 +371,7 @@ pub fn jackknife_log_error(without_one: &[f64]) -> f64 {
 
 /// All blocks but one, for each: merged prefixes with merged suffixes, because taking a block out again by
 /// subtraction would cancel.
-fn without_each(blocks: &[Block]) -> Vec<Totals> {
+fn without_each(blocks: &[JackknifeBlock]) -> Vec<Totals> {
     let mut after = vec![Totals::default()];
     for block in blocks.iter().rev() {
         let later = after[after.len() - 1];
@@ -420,21 +411,21 @@ mod tests {
     #[test]
     fn intervals() {
         let log = Estimate { value: 3f64.ln(), std_error: 0.05, dof: 7.0 };
-        let ratio = LogRatio::new(log, 0.95);
-        let (low, high) = ratio.interval();
+        let ratio = LogRatio { log };
+        let (low, high) = ratio.interval(0.95);
         close(ratio.ratio(), 3.0, 1e-12);
         close(high / 3.0, (0.05f64 * 2.364624251592785).exp(), 1e-9);
         close(low * high, 9.0, 1e-9);
     }
 
-    fn block(values: &[f64], cost: f64) -> Block {
+    fn block(values: &[f64], cost: f64) -> JackknifeBlock {
         let mut moments = Moments::default();
         values.iter().for_each(|x| moments.push(*x));
-        Block { moments, cost }
+        JackknifeBlock { moments, cost }
     }
 
     /// Values without a pattern: the fractional parts of multiples of an irrational number, cubed.
-    fn blocks(count: usize, size: usize, seed: f64) -> Vec<Block> {
+    fn blocks(count: usize, size: usize, seed: f64) -> Vec<JackknifeBlock> {
         let value = |i: usize| ((i as f64 + seed) * 0.618_033_988_749_895).fract();
         let block = |k: usize| {
             let values: Vec<f64> = (0..size).map(|i| value(k * size + i).powi(3)).collect();
@@ -443,7 +434,7 @@ mod tests {
         (0..count).map(block).collect()
     }
 
-    fn log_work(blocks: &[Block]) -> f64 {
+    fn log_work(blocks: &[JackknifeBlock]) -> f64 {
         let total = Totals::of(blocks);
         (total.moments.m2 / (total.moments.n - 1) as f64).ln()
             + (total.cost / total.moments.n as f64).ln()
@@ -453,19 +444,20 @@ mod tests {
     #[test]
     fn the_jackknife_is_tukeys() {
         let (a, b, short) = (blocks(12, 16, 0.3), blocks(12, 16, 70.7), blocks(9, 16, 5.5));
-        let drop = |blocks: &[Block], k: usize| log_work(&[&blocks[..k], &blocks[k + 1..]].concat());
+        let drop =
+            |blocks: &[JackknifeBlock], k: usize| log_work(&[&blocks[..k], &blocks[k + 1..]].concat());
         let tukey = |values: Vec<f64>| {
             let n = values.len() as f64;
             let mean = values.iter().sum::<f64>() / n;
             (n - 1.0) / n * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
         };
-        let joint = compare(&a, &b, 0.95).expect("a ratio");
+        let joint = compare(&a, &b, Values::Scores).expect("a ratio");
         assert!(joint.is_joint && joint.work.log.dof == 11.0);
         close(joint.work.log.value, log_work(&a) - log_work(&b), 1e-12);
         let variance = tukey((0..12).map(|k| drop(&a, k) - drop(&b, k)).collect());
         close(joint.work.log.std_error, variance.sqrt(), 1e-10);
-        close(joint.work.half_width, 2.200985160082949 * variance.sqrt(), 1e-9);
-        let apart = compare(&a, &short, 0.95).expect("a ratio");
+        close(joint.work.half_width(0.95), 2.200985160082949 * variance.sqrt(), 1e-9);
+        let apart = compare(&a, &short, Values::Scores).expect("a ratio");
         let of_a = tukey((0..12).map(|k| drop(&a, k)).collect());
         let of_short = tukey((0..9).map(|k| drop(&short, k)).collect());
         assert!(!apart.is_joint);
@@ -479,20 +471,20 @@ mod tests {
     #[test]
     fn an_arm_against_itself_is_even() {
         let a = blocks(64, 64, 0.3);
-        let found = compare(&a, &a, 0.95).expect("a ratio");
+        let found = compare(&a, &a, Values::Scores).expect("a ratio");
         assert_eq!((found.work.log.value, found.work.log.std_error), (0.0, 0.0));
         assert_eq!((found.work.ratio(), found.moved), (1.0, 0.0));
-        assert!(found.resolved);
+        assert!(found.is_resolved(0.95));
         // Twice the cost and three times the values: ratio 2 * 9, without an error.
-        let b: Vec<Block> = a
+        let b: Vec<JackknifeBlock> = a
             .iter()
             .map(|b| {
                 let [n, mean, m2, m3, m4] = b.moments.to_array();
                 let moments = Moments::from_array([n, 3.0 * mean, 9.0 * m2, 27.0 * m3, 81.0 * m4]);
-                Block { moments, cost: 2.0 * b.cost }
+                JackknifeBlock { moments, cost: 2.0 * b.cost }
             })
             .collect();
-        let found = compare(&b, &a, 0.95).expect("a ratio");
+        let found = compare(&b, &a, Values::Scores).expect("a ratio");
         close(found.work.ratio(), 18.0, 1e-12);
         close(found.variance.ratio(), 9.0, 1e-12);
         close(found.cost.ratio(), 2.0, 1e-12);
@@ -510,12 +502,15 @@ mod tests {
         for (k, b) in a.iter_mut().enumerate() {
             b.cost = 64.0 * (1.0 + 1e-3 * (k as f64 * 0.618).fract());
         }
-        a.push(Block { moments: Moments { n: 2, ..a[0].moments }, cost: 2.0 * 1.01 });
+        a.push(JackknifeBlock { moments: Moments { n: 2, ..a[0].moments }, cost: 2.0 * 1.01 });
         let spread = super::super::hypothesis::Spread::of(
             a.iter().map(|b| (b.moments.n as f64, b.cost / b.moments.n as f64)),
         );
-        let b = blocks(16, 16, 900.1).into_iter().map(|b| Block { cost: 1.0, ..b }).collect::<Vec<_>>();
-        let found = compare(&a, &b, 0.95).expect("a ratio").cost.log;
+        let b = blocks(16, 16, 900.1)
+            .into_iter()
+            .map(|b| JackknifeBlock { cost: 1.0, ..b })
+            .collect::<Vec<_>>();
+        let found = compare(&a, &b, Values::Scores).expect("a ratio").cost.log;
         close(found.std_error, spread.estimate.std_error / spread.estimate.value, 0.03);
     }
 
@@ -523,19 +518,20 @@ mod tests {
     fn shares_of_one_pass_are_bounded() {
         let mut values: Vec<f64> = (0..640).map(|i| f64::from(i % 7)).collect();
         values[77] = 60.0;
-        let blocks: Vec<Block> = values.chunks(64).map(|v| block(v, 1.0)).collect();
+        let blocks: Vec<JackknifeBlock> = values.chunks(64).map(|v| block(v, 1.0)).collect();
         let total = Totals::of(&blocks).moments;
         let share = (60.0 - total.mean).powi(2) / total.m2;
         let (low, high) = one_pass_share(&blocks, Values::Scores, total.mean);
         assert!(low <= share && share <= high && high < 1.1 * share, "{low} {share} {high}");
-        let one = [Block { moments: total, cost: 1.0 }];
+        let one = [JackknifeBlock { moments: total, cost: 1.0 }];
         let (low, high) = one_pass_share(&one, Values::Scores, total.mean);
         close(low, total.kurtosis() / 640.0, 1e-12);
         close(high, (total.kurtosis() / 640.0).sqrt(), 1e-12);
         // The ratio of such an arm is not to be quoted, and of one without the spike it is.
-        let calm: Vec<Block> = blocks.iter().map(|b| Block { cost: 1.0, ..*b }).skip(2).collect();
-        assert!(!compare(&blocks, &calm, 0.95).expect("a ratio").resolved);
-        assert!(compare(&calm, &calm, 0.95).expect("a ratio").resolved);
+        let calm: Vec<JackknifeBlock> =
+            blocks.iter().map(|b| JackknifeBlock { cost: 1.0, ..*b }).skip(2).collect();
+        assert!(!compare(&blocks, &calm, Values::Scores).expect("a ratio").is_resolved(0.95));
+        assert!(compare(&calm, &calm, Values::Scores).expect("a ratio").is_resolved(0.95));
     }
 
     // Blocks of variances: the ratio of their means, with Tukey's error of its logarithm, and the largest of
@@ -543,13 +539,13 @@ mod tests {
     #[test]
     fn variances_are_compared_by_their_means() {
         let (a, b) = (blocks(12, 16, 0.3), blocks(12, 16, 70.7));
-        let of = |blocks: &[Block]| {
+        let of = |blocks: &[JackknifeBlock]| {
             let total = Totals::of(blocks);
             (total.moments.mean * total.cost / total.moments.n as f64).ln()
         };
-        let found = compare_values(&a, &b, Values::Variances, 0.95).expect("a ratio");
+        let found = compare(&a, &b, Values::Variances).expect("a ratio");
         close(found.work.log.value, of(&a) - of(&b), 1e-12);
-        let drop = |blocks: &[Block], k: usize| of(&[&blocks[..k], &blocks[k + 1..]].concat());
+        let drop = |blocks: &[JackknifeBlock], k: usize| of(&[&blocks[..k], &blocks[k + 1..]].concat());
         let values: Vec<f64> = (0..12).map(|k| drop(&a, k) - drop(&b, k)).collect();
         let mean = values.iter().sum::<f64>() / 12.0;
         let variance = 11.0 / 12.0 * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
@@ -557,20 +553,17 @@ mod tests {
         assert!(found.a.kurtosis.is_nan());
 
         let mut values: Vec<f64> = (0..640).map(|i| 1.0 + f64::from(i % 7)).collect();
-        let calm: Vec<Block> = values.chunks(64).map(|v| block(v, 1.0)).collect();
+        let calm: Vec<JackknifeBlock> = values.chunks(64).map(|v| block(v, 1.0)).collect();
         values[77] = 300.0;
-        let loud: Vec<Block> = values.chunks(64).map(|v| block(v, 1.0)).collect();
+        let loud: Vec<JackknifeBlock> = values.chunks(64).map(|v| block(v, 1.0)).collect();
         let share = 300.0 / values.iter().sum::<f64>();
-        let found = compare_values(&loud, &calm, Values::Variances, 0.999).expect("a ratio");
+        let found = compare(&loud, &calm, Values::Variances).expect("a ratio");
         let (low, high) = found.a.largest_pass;
         assert!(low <= share && share <= high && high < 1.05 * share, "{low} {share} {high}");
-        assert!(!found.resolved);
-        assert!(compare_values(&calm, &calm, Values::Variances, 0.999).expect("a ratio").resolved);
+        assert!(!found.is_resolved(0.999));
+        assert!(compare(&calm, &calm, Values::Variances).expect("a ratio").is_resolved(0.999));
         let none = vec![block(&[0.0, 0.0], 1.0); 16];
-        assert_eq!(
-            compare_values(&none, &calm, Values::Variances, 0.95).err(),
-            Some(NoRatio::NoVariance)
-        );
+        assert_eq!(compare(&none, &calm, Values::Variances).err(), Some(NoRatio::ZeroVariance));
     }
 
     // The second half of A is three times as wide as the first: the log ratio moves by log 5 when the passes
@@ -583,23 +576,26 @@ mod tests {
             let [n, mean, m2, m3, m4] = block.moments.to_array();
             block.moments = Moments::from_array([n, mean, 9.0 * m2, 27.0 * m3, 81.0 * m4]);
         }
-        let found = compare(&drifting, &steady, 0.95).expect("a ratio");
-        assert!(found.a.largest_pass.1 < LARGEST_SHARE && found.moved > 1.0 && !found.resolved);
+        let found = compare(&drifting, &steady, Values::Scores).expect("a ratio");
+        assert!(found.a.largest_pass.1 < LARGEST_SHARE && found.moved > 1.0 && !found.is_resolved(0.95));
     }
 
     #[test]
     fn what_has_no_ratio() {
         let good = blocks(16, 16, 0.3);
-        let refusal = |bad: Vec<Block>| {
-            assert_eq!(compare(&bad, &good, 0.95).err(), compare(&good, &bad, 0.95).err());
-            compare(&bad, &good, 0.95).expect_err("no ratio")
+        let refusal = |bad: Vec<JackknifeBlock>| {
+            assert_eq!(
+                compare(&bad, &good, Values::Scores).err(),
+                compare(&good, &bad, Values::Scores).err()
+            );
+            compare(&bad, &good, Values::Scores).expect_err("no ratio")
         };
         assert_eq!(refusal(good[..7].to_vec()), NoRatio::TooFewBlocks);
-        assert_eq!(refusal(vec![Block { cost: f64::NAN, ..good[0] }; 16]), NoRatio::NotFinite);
-        assert_eq!(refusal(vec![Block { cost: 0.0, ..good[0] }; 16]), NoRatio::NotFinite);
-        assert_eq!(refusal(vec![block(&[1.0, 1.0], 1.0); 16]), NoRatio::NoVariance);
+        assert_eq!(refusal(vec![JackknifeBlock { cost: f64::NAN, ..good[0] }; 16]), NoRatio::NotFinite);
+        assert_eq!(refusal(vec![JackknifeBlock { cost: 0.0, ..good[0] }; 16]), NoRatio::NotFinite);
+        assert_eq!(refusal(vec![block(&[1.0, 1.0], 1.0); 16]), NoRatio::ZeroVariance);
         let mut one = vec![block(&[1.0, 1.0], 1.0); 16];
         one[3] = block(&[1.0, 5.0], 1.0);
-        assert_eq!(refusal(one), NoRatio::NoVariance);
+        assert_eq!(refusal(one), NoRatio::ZeroVariance);
     }
 }

@@ -190,29 +190,6 @@ fn resolved(lambda: f64, dof: f64) -> Result<(), Refusal> {
     if lambda <= limit { Ok(()) } else { Err(Refusal::Unresolved { lambda, limit }) }
 }
 
-/// Pearson's test of k x k counts of pairs of draws (row-major, the first draw's bin is the row) against
-/// the product of the bins' known masses, each with its error: that the two are independent, and that
-/// each has its masses. The pairs must be disjoint: draws 1 and 2, 3 and 4, and so on.
-///
-/// # Errors
-///
-/// As [`pearson`]; [`Refusal::Empty`] where the table is not k x k.
-pub fn independence(masses: &[(f64, f64)], counts: &[u64]) -> Result<Goodness, Refusal> {
-    if counts.len() != masses.len() * masses.len() {
-        return Err(Refusal::Empty);
-    }
-    let pairs = masses.iter().flat_map(|a| masses.iter().map(move |b| (a, b)));
-    let bins: Vec<Bin> = pairs
-        .zip(counts)
-        .map(|((a, b), count)| Bin {
-            mass: a.0 * b.0,
-            error: a.0 * b.1 + b.0 * a.1 + a.1 * b.1,
-            count: *count,
-        })
-        .collect();
-    pearson(&bins)
-}
-
 /// The outcome of a test of one probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proportion {
@@ -289,7 +266,7 @@ fn first(end: u64, holds: impl Fn(u64) -> bool) -> u64 {
 /// [`Refusal::Empty`] below two values, [`Refusal::NoSpread`], [`Refusal::Skewed`] (above
 /// [`LARGEST_SKEW`]), [`Refusal::Unresolved`] where the error's noncentrality n error^2 / s^2 exceeds its
 /// bound.
-pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<Contrast, Refusal> {
+pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<ContrastTest, Refusal> {
     if values.n < 2 {
         return Err(Refusal::Empty);
     }
@@ -306,12 +283,12 @@ pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<Contrast,
     resolved(lambda_err, 1.0)?;
     let estimate =
         Estimate { value: values.mean - expected, std_error: values.std_error(), dof: n - 1.0 };
-    Ok(Contrast { estimate, test: estimate.test_zero(), lambda_err })
+    Ok(ContrastTest { estimate, test: estimate.test_zero(), lambda_err })
 }
 
 /// The outcome of [`contrast`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contrast {
+pub struct ContrastTest {
     /// The difference from the expected mean; its `detectable` is the contrast's.
     pub estimate: Estimate,
     /// Its test.
@@ -402,18 +379,6 @@ mod tests {
             close(found.lambda, at_1e6, 1e-8);
             close(found.relative, (at_1e6 / 1e6).sqrt(), 1e-8);
         }
-    }
-
-    #[test]
-    fn independence_is_pearson_of_the_products() {
-        let masses = [(0.25, 0.0), (0.75, 0.0)];
-        // By hand, N = 1600: expectations 100, 300, 300, 900.
-        let found = independence(&masses, &[110, 290, 290, 910]).expect("a test");
-        close(found.statistic, 1.0 + 2.0 * 100.0 / 300.0 + 100.0 / 900.0, 1e-13);
-        assert_eq!(found.dof, 3.0);
-        // Every draw twice: good margins, no independence.
-        assert!(independence(&masses, &[400, 0, 0, 1200]).expect("a test").p_value < 1e-100);
-        assert_eq!(independence(&masses, &[1, 2, 3]), Err(Refusal::Empty));
     }
 
     #[test]

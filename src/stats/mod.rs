@@ -1,12 +1,8 @@
 //! Moments, tests, multiplicity. Door for `statrs`, of which only survival functions are used.
 
-/// Tests of acceptance by optical depth, and enumeration of discrete choices.
-pub mod acceptance;
-/// Tests of values against a continuous distribution.
-pub mod continuous;
 /// Two estimators at equal cost.
 pub mod efficiency;
-/// E-values: evidence that accumulates.
+/// E-values: evidence that multiplies.
 pub mod evidence;
 /// Tests of samples against known probabilities.
 pub mod goodness;
@@ -22,3 +18,10 @@ pub mod signs;
 pub mod tails;
 /// The fixed dyadic reduction over passes.
 pub mod tree;
+
+/// Every test under hypotheses that are true by construction.
+#[cfg(test)]
+mod calibration;
+/// Whether p-values are uniform.
+#[cfg(test)]
+mod kolmogorov;

@@ -4,10 +4,10 @@
 //! levels decide. Chi-square comes from `statrs` (relative error about 1e-15 times the degrees of freedom);
 //! everything else is here, because the incomplete beta function of statrs 0.19.1 loses digits for large
 //! parameters (binomial tails beyond n = 1e7, Student's t at 1e6 degrees of freedom) and its centre is
-//! wrong from 1e5 on. The table `tests/data/tails.csv` (60 digits, `scripts/tails.py`) holds each tail to
+//! wrong from 1e5 on. The table `tests/data/tails.csv` (20 digits, `scripts/tails.py`) holds each tail to
 //! 1e-8 relative.
 
-use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2, TAU};
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -149,7 +149,7 @@ fn poisson_pmf(x: f64, m: f64) -> f64 {
 }
 
 /// C(n, k) p^k q^(n-k), where q = 1 - p is given too: each of the two may carry the digits.
-fn binomial_pmf(k: u64, n: u64, p: f64, q: f64) -> f64 {
+pub(super) fn binomial_pmf(k: u64, n: u64, p: f64, q: f64) -> f64 {
     let (x, y, m) = (k as f64, (n - k) as f64, n as f64);
     if k == 0 {
         return exp(m * if p < 0.5 { ln_1p(-p) } else { ln(q) });
@@ -208,77 +208,9 @@ pub fn binomial_lower(k: u64, n: u64, p: f64) -> f64 {
     if k >= n { 1.0 } else { binomial_at_least(n - k, n, 1.0 - p, p) }
 }
 
-/// The exact two-sided p-value of k successes: twice the smaller tail, at most 1. It rejects where the
-/// interval of [`clopper_pearson`] leaves p out.
+/// The exact two-sided p-value of k successes: twice the smaller tail, at most 1.
 pub fn binomial_two_sided(k: u64, n: u64, p: f64) -> f64 {
     (2.0 * binomial_lower(k, n, p).min(binomial_upper(k, n, p))).min(1.0)
-}
-
-/// The interval of p whose coverage is at least `1 - level` for any p (C. Clopper, E. Pearson 1934): its
-/// ends are where a tail of k of n is `level / 2`.
-pub fn clopper_pearson(k: u64, n: u64, level: f64) -> (f64, f64) {
-    if n == 0 {
-        return (0.0, 1.0);
-    }
-    let estimate = k as f64 / n as f64;
-    let low = bisect(|p| binomial_upper(k, n, p) < 0.5 * level, 0.0, estimate);
-    let high = bisect(|p| binomial_lower(k, n, p) >= 0.5 * level, estimate, 1.0);
-    (if k == 0 { 0.0 } else { low }, if k == n { 1.0 } else { high })
-}
-
-/// P(K > x) for Kolmogorov's distribution, the limit of sqrt(n) D.
-///
-/// 2 sum (-1)^(k-1) exp(-2 k^2 x^2); for small x, by the transformation of the theta function,
-/// 1 - sqrt(2 pi)/x sum exp(-(2k-1)^2 pi^2 / (8 x^2)) (W. Feller 1948).
-pub fn kolmogorov_limit(x: f64) -> f64 {
-    if x <= 0.0 {
-        return 1.0;
-    }
-    if x < 1.0 {
-        let term = |k: f64| exp(-(k * PI / x) * (k * PI / x) / 8.0);
-        return 1.0 - TAU.sqrt() / x * (term(1.0) + term(3.0) + term(5.0) + term(7.0));
-    }
-    let term = |k: f64| 2.0 * exp(-2.0 * k * k * x * x);
-    term(1.0) - term(2.0) + term(3.0) - term(4.0) + term(5.0)
-}
-
-/// P(D+ >= d) for Smirnov's one-sided statistic of n independent values, exactly.
-///
-/// Z. Birnbaum, F. Tingey, "One-sided confidence contours for probability distribution functions" (1951):
-/// d sum_j C(n, j) (d + j/n)^(j-1) (1 - d - j/n)^(n-j) over j <= n (1 - d): binomial probabilities of j
-/// with p = d + j/n, each times d / p. All terms are positive.
-pub fn smirnov(d: f64, n: u64) -> f64 {
-    if d <= 0.0 {
-        return 1.0;
-    }
-    let m = n as f64;
-    let mut sum = 0.0;
-    for j in 0..n {
-        let p = d + j as f64 / m;
-        let q = (1.0 - d) - j as f64 / m;
-        if q <= 0.0 {
-            break;
-        }
-        sum += binomial_pmf(j, n, p, q) * (d / p);
-    }
-    sum.min(1.0)
-}
-
-/// P(D >= d) for the two-sided Kolmogorov-Smirnov statistic of n independent values of a fully specified
-/// continuous distribution; n >= 20.
-///
-/// From n d^2 = 4 on, twice the one-sided probability: both sides reach d with a probability of about
-/// exp(-8 n d^2), so the relative error is about exp(-6 n d^2) <= 4e-11. Below (p > 6e-4), the limit at
-/// x + 1/(6 sqrt(n)) + (x - 1)/(4 n), x = sqrt(n) d (J. Vrbik, "Small-sample corrections to
-/// Kolmogorov-Smirnov test statistic" (2018)): within 5e-4 of the exact value at n = 20, 1.5e-4 at 100 and
-/// 2e-5 at 1000.
-pub fn kolmogorov_smirnov(d: f64, n: u64) -> f64 {
-    let root = (n as f64).sqrt();
-    let x = root * d;
-    if x >= 2.0 {
-        return (2.0 * smirnov(d, n)).min(1.0);
-    }
-    kolmogorov_limit(x + 1.0 / (6.0 * root) + (x - 1.0) / (4.0 * n as f64))
 }
 
 /// P(X > x) for a noncentral chi-square X: the expectation of the central tail at `dof` + 2 J degrees of
@@ -353,15 +285,11 @@ pub fn noncentrality(dof: f64, level: f64, power: f64) -> f64 {
     bisect_up(|lambda| noncentral_chi_square_sf(critical, dof, lambda) < power)
 }
 
-/// The z with P(Z <= z) = `power` for a standard normal Z.
-pub fn normal_quantile(power: f64) -> f64 {
-    SQRT_2 * math::erf_inv(2.0 * power - 1.0)
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
 
+    use super::super::kolmogorov::{kolmogorov_limit, smirnov};
     use super::*;
 
     fn close(a: f64, b: f64, relative: f64) {
@@ -386,12 +314,12 @@ mod tests {
     }
 
     /// Rows, worst relative error, and that among probabilities from 1e-12 on, of every distribution.
-    type Worst = BTreeMap<String, (usize, f64, f64)>;
+    type WorstErrors = BTreeMap<String, (usize, f64, f64)>;
 
     /// Reads every row of the table.
-    fn worst_errors(tail: impl Fn(&str, f64, f64, f64) -> f64) -> Worst {
+    fn worst_errors(tail: impl Fn(&str, f64, f64, f64) -> f64) -> WorstErrors {
         let table = include_str!("../../tests/data/tails.csv");
-        let mut worst = Worst::new();
+        let mut worst = WorstErrors::new();
         for line in table.lines().skip(1) {
             let (name, numbers) = line.split_once(',').expect("a distribution");
             let numbers: Vec<f64> = numbers.split(',').map(|x| x.parse().expect("a number")).collect();
@@ -492,42 +420,6 @@ mod tests {
         close(binomial_upper(k, n, 0.5), normal_upper((1_000_000.0 - 0.5) / 500_000.0), 1e-10);
     }
 
-    // scipy 1.x: beta.ppf(0.025, 7, 94), beta.ppf(0.975, 8, 93) for 7 of 100; k = 0: 1 - (level/2)^(1/n).
-    #[test]
-    fn clopper_pearson_intervals() {
-        let (low, high) = clopper_pearson(7, 100, 0.05);
-        close(low, 0.028605288907438704, 1e-10);
-        close(high, 0.13891972845585732, 1e-10);
-        let (low, high) = clopper_pearson(0, 1000, 1e-6);
-        assert_eq!(low, 0.0);
-        close(high, -((5e-7f64).ln() / 1000.0).exp_m1(), 1e-10);
-        assert_eq!(clopper_pearson(1000, 1000, 1e-6).1, 1.0);
-        assert_eq!(clopper_pearson(0, 0, 0.05), (0.0, 1.0));
-    }
-    // scipy 1.x, exact: kstwo.sf(d, n), with the stated error below n d^2 = 4.
-    #[test]
-    fn kolmogorov_smirnov_at_finite_n() {
-        for (d, n, p, error) in [
-            (0.111803, 20, 0.940331111310461, 5e-4),
-            (0.178885, 20, 0.4890880369176859, 5e-4),
-            (0.290689, 20, 0.05437596648008136, 5e-4),
-            (0.402492, 20, 0.0019415598121073074, 5e-4),
-            (0.447214, 20, 0.00036273384795459246, 4e-11 * 4e-4),
-            (0.782624, 20, 1.7138802916583963e-13, 1e-24),
-            (0.05, 100, 0.9532159710635725, 1.5e-4),
-            (0.08, 100, 0.5182193645480672, 1.5e-4),
-            (0.18, 100, 0.0026300498454605607, 1.5e-4),
-            (0.25, 100, 5.408871776434847e-06, 1e-16),
-            (0.031623, 1000, 0.26440178193924346, 2e-5),
-            (0.056921, 1000, 0.002943763655322148, 2e-5),
-            (0.079057, 1000, 6.9671355831871364e-06, 1e-16),
-            (0.11068, 1000, 3.9977883250764165e-11, 1e-20),
-        ] {
-            let found = kolmogorov_smirnov(d, n);
-            assert!((found - p).abs() < error, "{d} {n}: {found} is not {p}");
-        }
-    }
-
     #[test]
     fn inverses_invert() {
         for dof in [1.0, 15.0, 1023.0] {
@@ -539,7 +431,6 @@ mod tests {
                 close(power, 0.99, 1e-10);
             }
         }
-        close(normal_quantile(0.99), 2.3263478740408408, 1e-14);
         assert!(student_two_sided(1.0, 0.0).is_nan() && chi_square_sf(1.0, -1.0).is_nan());
     }
 }

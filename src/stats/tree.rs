@@ -163,7 +163,7 @@ mod tests {
     use super::super::moments::Moments;
     use super::*;
 
-    type Tree = Counter<Moments>;
+    type MomentsTree = Counter<Moments>;
 
     /// Values whose sums depend on the order of addition.
     fn pass(i: u64) -> Moments {
@@ -171,8 +171,8 @@ mod tests {
         Moments::of(x.sqrt() * if i.is_multiple_of(5) { 1e6 } else { 0.1 })
     }
 
-    fn range(start: u64, end: u64, keep: u32) -> Tree {
-        let mut tree = Tree::new(start, keep);
+    fn range(start: u64, end: u64, keep: u32) -> MomentsTree {
+        let mut tree = MomentsTree::new(start, keep);
         (start..end).for_each(|i| tree.push(pass(i)));
         tree
     }
@@ -195,10 +195,10 @@ mod tests {
         ) {
             let mut bounds = vec![0];
             lengths.iter().for_each(|n| bounds.push(bounds[bounds.len() - 1] + n));
-            let mut blocks: Vec<Tree> =
+            let mut blocks: Vec<MomentsTree> =
                 bounds.windows(2).map(|w| range(w[0], w[1], keep)).collect();
             blocks.sort_by_key(|b| b.start().wrapping_mul(order | 1));
-            let mut joined = Tree::new(0, keep);
+            let mut joined = MomentsTree::new(0, keep);
             while let Some(i) = blocks.iter().position(|b| b.start() == joined.next_pass()) {
                 joined.append(blocks.swap_remove(i));
             }
@@ -211,7 +211,7 @@ mod tests {
         #[test]
         fn power_of_two_blocks_give_the_same_bits(passes in 1u64..600, level in 0u32..7, shard in 0u64..9) {
             let start = (shard << level).min(passes);
-            let mut tail = Tree::new(start, 64);
+            let mut tail = MomentsTree::new(start, 64);
             let mut at = start;
             while at + (1 << level) <= passes {
                 let block = range(at, at + (1 << level), 64).finish();
@@ -229,7 +229,7 @@ mod tests {
         #[test]
         fn levels_can_be_raised(passes in 1u64..600, keep in 0u32..5, more in 0u32..5) {
             let fine = range(0, passes, keep);
-            let mut coarse = Tree::new(0, keep + more);
+            let mut coarse = MomentsTree::new(0, keep + more);
             coarse.append(fine);
             prop_assert_eq!(coarse, range(0, passes, keep + more));
         }
@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn state_is_the_nodes() {
         let tree = range(64, 200, 5);
-        let mut again = Tree::new(tree.start(), 5);
+        let mut again = MomentsTree::new(tree.start(), 5);
         tree.nodes().iter().for_each(|n| again.push_node(n.level, n.value));
         assert_eq!(again, tree);
     }

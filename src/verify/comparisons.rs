@@ -7,13 +7,15 @@
 //! for claims (`verify::efficiency`). The metric is the sensor's first observable, by class; where it has pixels,
 //! `pixels` beside it: the variance of a pixel, averaged over the image. Controls stand in the table as candidates, by CPU time alone.
 
-use super::efficiency::{CONFIDENCE, contest, mean_of, of_means};
-use super::trial::{Evidence, trial};
+use serde::Serialize;
+
+use super::efficiency::{contest, mean_of};
+use super::evidence::{CONFIDENCE, Evidence};
+use super::means::evidence_of_means;
+use super::verdict::known;
 use super::weights;
-use crate::results::csv_text::{self, number};
-use crate::results::record::{
-    Against, Bias, Cell, Comparison, CostMeasure, EstimatorRun, Observable, Quantity,
-};
+use crate::results::csv_text;
+use crate::results::record::{Bias, Cell, CostMeasure, EstimatorRun, Observable, Quantity};
 use crate::results::store::Stored;
 use crate::stats::tree::total;
 
@@ -23,9 +25,9 @@ pub const SHOWN: f64 = 0.95;
 /// The probability that any efficiency of a table is withheld although the means are equal.
 const LEVEL: f64 = 1e-3;
 
-/// One row. Numbers that are not quoted are NaN.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+/// One row of `comparisons.csv`. Numbers that are not quoted are absent.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct EfficiencyRow {
     /// Experiment name.
     pub experiment: String,
     /// Cell label.
@@ -41,19 +43,19 @@ pub struct Row {
     /// The other.
     pub candidate: String,
     /// Variance times cost of the baseline over that of the candidate.
-    pub efficiency_ratio: f64,
+    pub efficiency_ratio: Option<f64>,
     /// Lower end of its interval.
-    pub ci_low: f64,
+    pub ci_low: Option<f64>,
     /// Upper end.
-    pub ci_high: f64,
+    pub ci_high: Option<f64>,
     /// Confidence of the interval.
     pub confidence: f64,
     /// Variance of a pass, baseline over candidate.
-    pub variance_ratio: f64,
+    pub variance_ratio: Option<f64>,
     /// CPU time of a pass, baseline over candidate; over the whole run.
-    pub cpu_cost_ratio: f64,
+    pub cpu_cost_ratio: Option<f64>,
     /// Rays of a pass, baseline over candidate.
-    pub ray_cost_ratio: f64,
+    pub ray_cost_ratio: Option<f64>,
     /// Is the ratio one that more passes would not move out of its interval, and that no single pass makes?
     pub resolved: bool,
     /// What counts as cost.
@@ -61,44 +63,27 @@ pub struct Row {
     /// Were the two timed side by side? By counters it does not matter.
     pub side_by_side: bool,
     /// Kurtosis of a pass of the baseline.
-    pub kurtosis_baseline: f64,
+    pub kurtosis_baseline: Option<f64>,
     /// Kurtosis of a pass of the candidate.
-    pub kurtosis_candidate: f64,
+    pub kurtosis_candidate: Option<f64>,
     /// Why there is no ratio.
     pub note: String,
 }
 
-/// Columns of `comparisons.csv`.
-pub const COLUMNS: [&str; 20] = [
-    "experiment",
-    "cell",
-    "band",
-    "class",
-    "metric",
-    "baseline",
-    "candidate",
-    "efficiency_ratio",
-    "ci_low",
-    "ci_high",
-    "confidence",
-    "variance_ratio",
-    "cpu_cost_ratio",
-    "ray_cost_ratio",
-    "resolved",
-    "cost",
-    "side_by_side",
-    "kurtosis_baseline",
-    "kurtosis_candidate",
-    "note",
-];
+impl EfficiencyRow {
+    /// The efficiency ratio and its interval, where they are quoted.
+    pub fn quoted(&self) -> Option<[f64; 3]> {
+        Some([self.efficiency_ratio?, self.ci_low?, self.ci_high?])
+    }
+}
 
 /// The rows as CSV text.
-pub fn to_csv(rows: &[Row]) -> String {
-    csv_text::to_text(&COLUMNS, rows.iter().map(Row::fields))
+pub fn to_csv(rows: &[EfficiencyRow]) -> String {
+    csv_text::table(rows)
 }
 
 /// What a row compares.
-struct Subject<'a> {
+struct RowSubject<'a> {
     cell: &'a Cell,
     baseline: (&'a EstimatorRun, Quantity),
     candidate: (&'a EstimatorRun, Quantity),
@@ -106,14 +91,14 @@ struct Subject<'a> {
 }
 
 /// All rows of a record: by cell, candidate, class, band, measure.
-pub fn comparisons(stored: &Stored) -> Vec<Row> {
+pub fn comparisons(stored: &Stored) -> Vec<EfficiencyRow> {
     let subjects = subjects(stored);
     // Two measures share one test of the means.
     let level = 2.0 * LEVEL / subjects.len().max(1) as f64;
     subjects.iter().map(|subject| row(stored, subject, level)).collect()
 }
 
-fn subjects(stored: &Stored) -> Vec<Subject<'_>> {
+fn subjects(stored: &Stored) -> Vec<RowSubject<'_>> {
     let mut subjects = Vec::new();
     for (index, cell) in stored.record.cells.iter().enumerate() {
         for run in &cell.runs {
@@ -144,7 +129,7 @@ fn subjects(stored: &Stored) -> Vec<Subject<'_>> {
                             continue;
                         }
                         let [baseline, candidate] = arms.clone();
-                        subjects.push(Subject { cell, baseline, candidate, cost });
+                        subjects.push(RowSubject { cell, baseline, candidate, cost });
                     }
                 }
             }
@@ -158,10 +143,13 @@ fn is_silent(stored: &Stored, quantity: &Quantity) -> bool {
     all.is_none_or(|all| all.mean == 0.0 && all.m2 == 0.0)
 }
 
-fn row(stored: &Stored, subject: &Subject, level: f64) -> Row {
-    let Subject { cell, baseline, candidate, cost } = subject;
+fn row(stored: &Stored, subject: &RowSubject, level: f64) -> EfficiencyRow {
+    let RowSubject { cell, baseline, candidate, cost } = subject;
     let Observable { name, class } = &baseline.1.observable;
-    let mut row = Row {
+    let note = bias_objection(&[baseline.0, candidate.0])
+        .or_else(|| means_objection(stored, &candidate.1, &baseline.1, level))
+        .unwrap_or_default();
+    let row = EfficiencyRow {
         experiment: stored.record.experiment.clone(),
         cell: cell.label.clone(),
         band: stored.record.bands[baseline.1.band].name.clone(),
@@ -169,43 +157,41 @@ fn row(stored: &Stored, subject: &Subject, level: f64) -> Row {
         metric: name.clone(),
         baseline: baseline.0.estimator.clone(),
         candidate: candidate.0.estimator.clone(),
-        efficiency_ratio: f64::NAN,
-        ci_low: f64::NAN,
-        ci_high: f64::NAN,
         confidence: SHOWN,
-        variance_ratio: f64::NAN,
-        cpu_cost_ratio: cpu(stored, cell, baseline.0) / cpu(stored, cell, candidate.0),
-        ray_cost_ratio: rays(stored, baseline.0) / rays(stored, candidate.0),
-        resolved: false,
+        cpu_cost_ratio: ratio(cpu(stored, cell, baseline.0), cpu(stored, cell, candidate.0)),
+        ray_cost_ratio: ratio(rays(stored, baseline.0), rays(stored, candidate.0)),
         cost: *cost,
         side_by_side: *cost == CostMeasure::Counters,
-        kurtosis_baseline: f64::NAN,
-        kurtosis_candidate: f64::NAN,
-        note: bias_objection(&[baseline.0, candidate.0])
-            .or_else(|| means_objection(stored, &candidate.1, &baseline.1, level))
-            .unwrap_or_default(),
+        note,
+        ..EfficiencyRow::default()
     };
     if !row.note.is_empty() {
         return row;
     }
-    let at = |confidence| contest(stored, &candidate.1, &baseline.1, *cost, confidence);
-    match (at(SHOWN), at(CONFIDENCE)) {
-        (Ok(shown), Ok(judged)) => {
-            let efficiency = shown.efficiency;
-            row.efficiency_ratio = efficiency.work.ratio();
-            (row.ci_low, row.ci_high) = efficiency.work.interval();
-            row.variance_ratio = efficiency.variance.ratio();
-            row.resolved = judged.efficiency.resolved;
-            row.side_by_side = shown.side_by_side;
-            (row.kurtosis_baseline, row.kurtosis_candidate) =
-                (efficiency.a.kurtosis, efficiency.b.kurtosis);
-            if !row.resolved {
-                row.note = "not resolved".into();
-            }
-        }
-        (Err(why), _) | (_, Err(why)) => row.note = why,
+    let contest = match contest(stored, &candidate.1, &baseline.1, *cost) {
+        Ok(contest) => contest,
+        Err(note) => return EfficiencyRow { note, ..row },
+    };
+    let efficiency = contest.efficiency;
+    let (low, high) = efficiency.work.interval(SHOWN);
+    let resolved = efficiency.is_resolved(CONFIDENCE);
+    EfficiencyRow {
+        efficiency_ratio: known(efficiency.work.ratio()),
+        ci_low: known(low),
+        ci_high: known(high),
+        variance_ratio: known(efficiency.variance.ratio()),
+        resolved,
+        side_by_side: contest.side_by_side,
+        kurtosis_baseline: known(efficiency.a.kurtosis),
+        kurtosis_candidate: known(efficiency.b.kurtosis),
+        note: if resolved { String::new() } else { "not resolved".into() },
+        ..row
     }
-    row
+}
+
+/// The baseline's cost over the candidate's, where both were measured.
+fn ratio(baseline: Option<f64>, candidate: Option<f64>) -> Option<f64> {
+    known(baseline? / candidate?)
 }
 
 /// A biased estimator's variance is not its error.
@@ -223,29 +209,27 @@ fn means_objection(
     baseline: &Quantity,
     level: f64,
 ) -> Option<String> {
-    let against = Against::Quantity { other: baseline.clone(), paired: false };
-    let comparison =
-        Comparison { claim: usize::MAX, quantity: candidate.clone(), against, detect: None };
-    match trial(stored, 0, &of_means(stored, &comparison, baseline)).evidence {
-        Evidence::Test { test, .. } if test.p_value >= level => None,
-        Evidence::Test { test, .. } => Some(format!("the means differ, p = {:.1e}", test.p_value)),
-        Evidence::None(reason) => Some(format!("no mean test: {reason}")),
+    let held = evidence_of_means(stored, &mean_of(stored, candidate), &mean_of(stored, baseline));
+    match held.evidence {
+        Evidence::Difference { difference, .. } => {
+            let p = difference.test_zero().p_value;
+            (p < level || p.is_nan()).then(|| format!("the means differ, p = {p:.1e}"))
+        }
+        Evidence::Nothing(reason) => Some(format!("no mean test: {reason}")),
         _ => Some("no variance".into()),
     }
 }
 
-/// CPU time of a pass, seconds; NaN where it was not measured.
-fn cpu(stored: &Stored, cell: &Cell, run: &EstimatorRun) -> f64 {
-    let cost = stored.timing.as_ref().and_then(|timing| timing.of(&cell.label, &run.estimator));
-    cost.and_then(|cost| cost.cpu_seconds_per_pass()).unwrap_or(f64::NAN)
+/// CPU time of a pass, seconds, where it was measured.
+fn cpu(stored: &Stored, cell: &Cell, run: &EstimatorRun) -> Option<f64> {
+    stored.timing.as_ref()?.of(&cell.label, &run.estimator)?.cpu_seconds_per_pass()
 }
 
-/// Closest-hit and occlusion queries of a pass.
-fn rays(stored: &Stored, run: &EstimatorRun) -> f64 {
+/// Closest-hit and occlusion queries of a pass, where they were counted.
+fn rays(stored: &Stored, run: &EstimatorRun) -> Option<f64> {
     let count =
         |name: &str| weights::counter(stored, run, name).map(|batches| batches.iter().sum::<f64>());
-    let all = count("rays").map(|rays| rays + count("shadow_rays").unwrap_or(0.0));
-    all.unwrap_or(f64::NAN) / run.passes as f64
+    Some((count("rays")? + count("shadow_rays").unwrap_or(0.0)) / run.passes as f64)
 }
 
 /// What a measure is called in tables.
@@ -253,33 +237,6 @@ pub fn measure_name(measure: CostMeasure) -> &'static str {
     match measure {
         CostMeasure::Counters => "counters",
         CostMeasure::Cpu => "cpu",
-    }
-}
-
-impl Row {
-    fn fields(&self) -> Vec<String> {
-        vec![
-            self.experiment.clone(),
-            self.cell.clone(),
-            self.band.clone(),
-            self.class.clone(),
-            self.metric.clone(),
-            self.baseline.clone(),
-            self.candidate.clone(),
-            number(self.efficiency_ratio),
-            number(self.ci_low),
-            number(self.ci_high),
-            number(self.confidence),
-            number(self.variance_ratio),
-            number(self.cpu_cost_ratio),
-            number(self.ray_cost_ratio),
-            self.resolved.to_string(),
-            measure_name(self.cost).into(),
-            self.side_by_side.to_string(),
-            number(self.kurtosis_baseline),
-            number(self.kurtosis_candidate),
-            self.note.clone(),
-        ]
     }
 }
 
@@ -298,14 +255,18 @@ mod tests {
         sample::set_spread(&mut stored, "snee", sample::pairs(0.05, 7_000_000));
         let rows = comparisons(&stored);
         assert_eq!(rows.len(), 3 * 2 * 2, "two classes and the pixels, bands, measures");
-        let counted: Vec<&Row> = rows.iter().filter(|r| r.cost == CostMeasure::Counters).collect();
+        let counted: Vec<&EfficiencyRow> =
+            rows.iter().filter(|r| r.cost == CostMeasure::Counters).collect();
         for row in &counted {
             assert!(row.resolved, "{row:?}");
-            assert!(row.ci_low < 4.0 && row.ci_high > 4.0 && row.ci_low > 2.0, "{row:?}");
-            assert_eq!((row.ray_cost_ratio, row.baseline.as_str()), (1.0, "mis"));
+            assert!(
+                row.ci_low < Some(4.0) && row.ci_high > Some(4.0) && row.ci_low > Some(2.0),
+                "{row:?}"
+            );
+            assert_eq!((row.ray_cost_ratio, row.baseline.as_str()), (Some(1.0), "mis"));
         }
         let timed = rows.iter().find(|r| r.cost == CostMeasure::Cpu).expect("a row");
-        assert!(timed.note.contains("no CPU time") && timed.efficiency_ratio.is_nan(), "{timed:?}");
+        assert!(timed.note.contains("no CPU time") && timed.efficiency_ratio.is_none(), "{timed:?}");
         let csv = to_csv(&rows);
         assert!(csv.starts_with(
             "experiment,cell,band,class,metric,baseline,candidate,efficiency_ratio,ci_low,ci_high,"
@@ -318,8 +279,10 @@ mod tests {
         let mut stored = sample::stored(0.1);
         set_observables(&mut stored, "snee", |i, _, _| 1.1 + 0.05 * uniform(i + 7000));
         let rows = comparisons(&stored);
-        assert!(rows.iter().all(|r| r.note.contains("the means differ") && r.efficiency_ratio.is_nan()));
-        assert!(rows.iter().all(|r| r.variance_ratio.is_nan() && !r.resolved));
+        assert!(
+            rows.iter().all(|r| r.note.contains("the means differ") && r.efficiency_ratio.is_none())
+        );
+        assert!(rows.iter().all(|r| r.variance_ratio.is_none() && !r.resolved));
     }
 
     #[test]

@@ -17,9 +17,11 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::family::{Finding, Shown, conclude};
-use super::trial::{Arm, ROUNDING, same_passes};
-use super::verdict::{Outcome, Verdict};
+use super::evidence::Evidence;
+use super::family::{Finding, conclude};
+use super::levels::Looks;
+use super::means::{QuantityMean, ROUNDING, same_passes};
+use super::verdict::{Outcome, TestKind, Verdict};
 use crate::results::record::{Cell, EstimatorRun, Observable, Quantity, Record};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::Estimate;
@@ -43,13 +45,13 @@ pub struct Compared {
     pub changes: Vec<String>,
     /// One verdict a quantity that both hold.
     pub verdicts: Vec<Verdict>,
-    /// Work of every run that both hold.
-    pub work: Vec<Work>,
+    /// WorkChange of every run that both hold.
+    pub work: Vec<WorkChange>,
 }
 
-/// Work and its worth, second record over first.
+/// WorkChange and its worth, second record over first.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Work {
+pub struct WorkChange {
     /// Cell label.
     pub cell: String,
     /// Estimator name.
@@ -99,7 +101,7 @@ pub fn compare(a: &Stored, b: &Stored, terms: &Terms) -> Option<Compared> {
                 continue;
             };
             let pair =
-                Pair { a, b, cells: [ia, ib], runs: [run_a, run_b], streams: streams(a, b, ia, ib) };
+                RunPair { a, b, cells: [ia, ib], runs: [run_a, run_b], streams: streams(a, b, ia, ib) };
             changes.extend(pair.changed_run(&cell_a.label));
             findings.extend(pair.findings(terms));
             work.push(pair.work(&cell_a.label, terms));
@@ -108,11 +110,12 @@ pub fn compare(a: &Stored, b: &Stored, terms: &Terms) -> Option<Compared> {
     if findings.is_empty() {
         return None;
     }
-    Some(Compared { changes, verdicts: conclude(findings, terms.level), work })
+    let verdicts = conclude(findings, Looks::One { level: terms.level }, |_, _| None).verdicts;
+    Some(Compared { changes, verdicts, work })
 }
 
 /// Two runs of one name.
-struct Pair<'a> {
+struct RunPair<'a> {
     a: &'a Stored,
     b: &'a Stored,
     cells: [usize; 2],
@@ -150,7 +153,7 @@ fn streams(a: &Stored, b: &Stored, cell_a: usize, cell_b: usize) -> Streams {
     }
 }
 
-impl Pair<'_> {
+impl RunPair<'_> {
     fn cell(&self) -> &Cell {
         &self.a.record.cells[self.cells[0]]
     }
@@ -194,43 +197,53 @@ impl Pair<'_> {
             observable: observable.clone(),
             band: bands[side],
         };
-        let arms = (Arm::of(self.a, &quantity(0)), Arm::of(self.b, &quantity(1)));
-        let mut verdict = self.blank(observable, bands[0]);
-        let shown = match &arms {
-            (Some(a), Some(b)) => {
-                (verdict.expected, verdict.expected_error) = (a.mean.value, a.mean.std_error);
-                (verdict.value, verdict.std_error) = (b.mean.value, b.mean.std_error);
+        let means = [(self.a, quantity(0)), (self.b, quantity(1))];
+        let means = means.each_ref().map(|(stored, quantity)| QuantityMean::of(stored, quantity));
+        let mut verdict = Verdict {
+            experiment: self.a.record.experiment.clone(),
+            cell: self.cell().label.clone(),
+            band: self.a.record.bands[bands[0]].name.clone(),
+            class: observable.class.clone(),
+            estimators: self.runs[0].estimator.clone(),
+            claim: "compare".into(),
+            observable: observable.name.clone(),
+            ..Verdict::default()
+        };
+        let evidence = match &means {
+            [Some(a), Some(b)] => {
+                verdict.set_expected(a.mean.value, a.mean.std_error);
+                verdict.set_value(b.mean.value, b.mean.std_error);
                 self.weigh(a, b, &mut verdict)
             }
-            _ => Shown::Nothing("a record does not hold this quantity".into()),
+            _ => Evidence::Nothing("a record does not hold this quantity".into()),
         };
-        Finding { shown, relative_to: verdict.expected, detect: None, verdict }
+        let relative_to = verdict.expected.unwrap_or_default();
+        Finding { relative_to, ..Finding::new(verdict, evidence) }
     }
 
-    fn weigh(&self, a: &Arm, b: &Arm, verdict: &mut Verdict) -> Shown {
+    fn weigh(&self, a: &QuantityMean, b: &QuantityMean, verdict: &mut Verdict) -> Evidence {
         if let Some(objection) = a.objection().or_else(|| b.objection()) {
-            return Shown::Nothing(objection);
+            return Evidence::Nothing(objection);
         }
         if identical(&a.batches, &b.batches) {
-            verdict.test = "identical".into();
-            return Shown::Exact { same: true };
+            (verdict.test, verdict.statistic) = (Some(TestKind::Identical), Some(0.0));
+            return Evidence::of_sides(true, verdict);
         }
         let scale = a.mean.value.abs().max(b.mean.value.abs());
         if a.all.std_error().max(b.all.std_error()) <= ROUNDING * scale {
-            verdict.test = "identity".into();
-            let same = (b.mean.value - a.mean.value).abs() <= ROUNDING * scale;
-            return Shown::Exact { same };
+            (verdict.test, verdict.statistic) = (Some(TestKind::Identity), Some(0.0));
+            let holds = (b.mean.value - a.mean.value).abs() <= ROUNDING * scale;
+            return Evidence::of_sides(holds, verdict);
         }
         if let Some(objection) = a.tail_objection().or_else(|| b.tail_objection()) {
-            return Shown::Nothing(objection);
+            return Evidence::Nothing(objection);
         }
         let is_paired = self.streams == Streams::Same && same_passes(&a.batches, &b.batches);
-        verdict.test = match (is_paired, self.streams) {
-            (true, _) => "paired t",
-            (false, Streams::Others) => "welch t",
-            (false, Streams::Same | Streams::Unknown) => "sum of errors",
-        }
-        .into();
+        verdict.test = Some(match (is_paired, self.streams) {
+            (true, _) => TestKind::PairedT,
+            (false, Streams::Others) => TestKind::WelchT,
+            (false, Streams::Same | Streams::Unknown) => TestKind::SumOfErrors,
+        });
         if !is_paired {
             return self.unpaired(a, b);
         }
@@ -238,21 +251,21 @@ impl Pair<'_> {
         // Differences of rounding alone have an error of rounding alone: neither is news.
         let rounding = ROUNDING * scale;
         let std_error = (d.std_error * d.std_error + rounding * rounding).sqrt();
-        Shown::Difference { estimate: Estimate { std_error, ..d }, times: 1.0 }
+        Evidence::of_difference(Estimate { std_error, ..d })
     }
 
-    fn unpaired(&self, a: &Arm, b: &Arm) -> Shown {
+    fn unpaired(&self, a: &QuantityMean, b: &QuantityMean) -> Evidence {
         let (ea, eb) = (a.mean.std_error, b.mean.std_error);
         let dof = a.mean.dof.min(b.mean.dof);
         let value = b.mean.value - a.mean.value;
         if self.streams == Streams::Others {
-            let estimate = Estimate { value, std_error: (ea * ea + eb * eb).sqrt(), dof };
-            return Shown::Difference { estimate, times: 1.0 };
+            let std_error = (ea * ea + eb * eb).sqrt();
+            return Evidence::of_difference(Estimate { value, std_error, dof });
         }
-        Shown::Difference { estimate: Estimate { value, std_error: ea + eb, dof }, times: 2.0 }
+        Evidence::Difference { difference: Estimate { value, std_error: ea + eb, dof }, times: 2.0 }
     }
 
-    fn work(&self, cell: &str, terms: &Terms) -> Work {
+    fn work(&self, cell: &str, terms: &Terms) -> WorkChange {
         let [a, b] = self.runs;
         let per_pass = |run: &EstimatorRun, count: u64| count as f64 / run.passes.max(1) as f64;
         let ratio = |(name, count): (&String, &u64)| {
@@ -264,7 +277,7 @@ impl Pair<'_> {
         let allowed = terms.max_slowdown.unwrap_or(f64::INFINITY);
         let worst = counts.iter().filter(|(_, ratio)| **ratio > allowed);
         let worst = worst.max_by(|x, y| x.1.total_cmp(y.1));
-        Work {
+        WorkChange {
             cell: cell.into(),
             estimator: a.estimator.clone(),
             variance: self.variance_ratios(),
@@ -279,7 +292,7 @@ impl Pair<'_> {
             let estimator = self.runs[side].estimator.clone();
             let observable = first.clone();
             let quantity = Quantity { cell: self.cells[side], estimator, observable, band };
-            Arm::of(stored, &quantity).map_or(f64::NAN, |arm| arm.all.variance())
+            QuantityMean::of(stored, &quantity).map_or(f64::NAN, |mean| mean.all.variance())
         };
         let bands = self.a.record.bands.iter().enumerate();
         let ratio = |(band, about): (usize, &crate::results::record::Band)| {
@@ -287,33 +300,6 @@ impl Pair<'_> {
             Some(variance(self.b, 1, other) / variance(self.a, 0, band))
         };
         bands.filter_map(ratio).collect()
-    }
-
-    fn blank(&self, observable: &Observable, band: usize) -> Verdict {
-        let nothing = f64::NAN;
-        Verdict {
-            experiment: self.a.record.experiment.clone(),
-            cell: self.cell().label.clone(),
-            band: self.a.record.bands[band].name.clone(),
-            class: observable.class.clone(),
-            estimators: self.runs[0].estimator.clone(),
-            claim: "compare".into(),
-            test: String::new(),
-            statistic: nothing,
-            p_value: nothing,
-            adjusted_p: nothing,
-            detectable: nothing,
-            outcome: Outcome::Invalid("not judged".into()),
-            observable: observable.name.clone(),
-            value: nothing,
-            std_error: nothing,
-            expected: nothing,
-            expected_error: nothing,
-            dof: nothing,
-            second_p: f64::NAN,
-            control: false,
-            note: String::new(),
-        }
     }
 }
 

@@ -28,19 +28,17 @@
 //!   is underpowered otherwise. `detectable` is the smallest shortfall of E below e, relative to e, that
 //!   would have failed with 99 % probability.
 
-use super::judge::POWER;
-use super::trial::{Evidence, Trial};
-use super::verdict::Outcome;
+use super::evidence::{CONFIDENCE, EfficiencyTest, Evidence, kurtosis_words};
+use super::family::Finding;
+use super::means::{Held, evidence_of_means};
+use super::verdict::{TestKind, Verdict};
 use super::weights;
-use crate::results::record::{Against, Comparison, CostMeasure, EstimatorRun, Quantity};
+use crate::results::record::{CostMeasure, EstimatorRun, Quantity};
 use crate::results::store::Stored;
-use crate::stats::efficiency::{Block, Efficiency, LogRatio, Values, compare_values};
+use crate::stats::efficiency::{Efficiency, JackknifeBlock, LogRatio, Values, compare};
 use crate::stats::hypothesis::{Estimate, Test};
 use crate::stats::moments::Moments;
 use crate::stats::tree::Merge;
-
-/// Confidence of the intervals that decide.
-pub const CONFIDENCE: f64 = 0.999;
 
 /// The fewest quadruples that a ratio of CPU times may rest on.
 const LEAST_QUADRUPLES: usize = 16;
@@ -53,7 +51,7 @@ pub struct Contest {
     pub side_by_side: bool,
 }
 
-/// Compares two quantities of a record at `confidence`.
+/// Compares two quantities of a record.
 ///
 /// # Errors
 /// As a sentence: something is missing, or the ratio does not exist.
@@ -62,9 +60,9 @@ pub fn contest(
     candidate: &Quantity,
     baseline: &Quantity,
     measure: CostMeasure,
-    confidence: f64,
 ) -> Result<Contest, String> {
-    let (a, b) = (Side::of(stored, candidate, measure)?, Side::of(stored, baseline, measure)?);
+    let a = CostedBatches::of(stored, candidate, measure)?;
+    let b = CostedBatches::of(stored, baseline, measure)?;
     let (side_by_side, a, b) = match measure {
         CostMeasure::Counters => (true, a.blocks(), b.blocks()),
         CostMeasure::Cpu => {
@@ -80,7 +78,7 @@ pub fn contest(
         true => Values::Variances,
         false => Values::Scores,
     };
-    let efficiency = compare_values(&b, &a, values, confidence).map_err(|why| why.to_string())?;
+    let efficiency = compare(&b, &a, values).map_err(|why| why.to_string())?;
     Ok(Contest { efficiency, side_by_side })
 }
 
@@ -93,22 +91,16 @@ pub(super) fn mean_of(stored: &Stored, quantity: &Quantity) -> Quantity {
     }
 }
 
-/// The comparison of means that a claim of efficiency rests on.
-pub(super) fn of_means(stored: &Stored, comparison: &Comparison, baseline: &Quantity) -> Comparison {
-    let against = Against::Quantity { other: mean_of(stored, baseline), paired: false };
-    Comparison { against, quantity: mean_of(stored, &comparison.quantity), ..comparison.clone() }
-}
-
 /// The batches of one arm.
-struct Side {
+struct CostedBatches {
     /// Moments of scores, or of the variances that pairs of passes show.
     batches: Vec<Moments>,
     costs: Vec<f64>,
     settled: Vec<bool>,
 }
 
-impl Side {
-    fn of(stored: &Stored, quantity: &Quantity, measure: CostMeasure) -> Result<Side, String> {
+impl CostedBatches {
+    fn of(stored: &Stored, quantity: &Quantity, measure: CostMeasure) -> Result<CostedBatches, String> {
         let name = &quantity.estimator;
         let missing = || format!("the record does not hold this quantity of {name}");
         let run = stored.run(quantity).ok_or_else(missing)?;
@@ -131,11 +123,11 @@ impl Side {
         }
         if quantity.observable.is_pixels() {
             let pairs = stored.spread(run, quantity.band).ok_or_else(missing)?;
-            return Side::of_pairs(&batches, &pairs, &costs, &settled).ok_or_else(|| {
+            return CostedBatches::of_pairs(&batches, &pairs, &costs, &settled).ok_or_else(|| {
                 format!("the spread of {name} is not of the record's {} batches", batches.len())
             });
         }
-        Ok(Side { batches, costs, settled })
+        Ok(CostedBatches { batches, costs, settled })
     }
 
     /// Batches of pairs with what their passes cost. A batch of pairs is one of passes, or two where those are of
@@ -145,9 +137,9 @@ impl Side {
         pairs: &[Moments],
         costs: &[f64],
         settled: &[bool],
-    ) -> Option<Side> {
+    ) -> Option<CostedBatches> {
         let width = if batches.first()?.n == 1 { 2 } else { 1 };
-        let mut side = Side { batches: Vec::new(), costs: Vec::new(), settled: Vec::new() };
+        let mut side = CostedBatches { batches: Vec::new(), costs: Vec::new(), settled: Vec::new() };
         for (index, &pair) in pairs.iter().enumerate() {
             let of = index * width..(index + 1) * width;
             let passes: u64 = batches.get(of.clone())?.iter().map(|batch| batch.n).sum();
@@ -164,16 +156,16 @@ impl Side {
         (passes - paired <= 1).then_some(side)
     }
 
-    fn blocks(&self) -> Vec<Block> {
+    fn blocks(&self) -> Vec<JackknifeBlock> {
         let blocks = self.batches.iter().zip(&self.costs);
-        blocks.map(|(&moments, &cost)| Block { moments, cost }).collect()
+        blocks.map(|(&moments, &cost)| JackknifeBlock { moments, cost }).collect()
     }
 
     /// Batches 2q and 2q + 1, where both were timed side by side.
-    fn quadruple(&self, q: usize) -> Option<Block> {
+    fn quadruple(&self, q: usize) -> Option<JackknifeBlock> {
         let (i, j) = (2 * q, 2 * q + 1);
         let is_settled = self.settled.get(i).zip(self.settled.get(j)) == Some((&true, &true));
-        is_settled.then(|| Block {
+        is_settled.then(|| JackknifeBlock {
             moments: self.batches[i].merge(self.batches[j]),
             cost: self.costs[i] + self.costs[j],
         })
@@ -181,73 +173,56 @@ impl Side {
 }
 
 /// The quadruples of both arms in which both were timed.
-fn quadruples(a: &Side, b: &Side) -> (Vec<Block>, Vec<Block>) {
+fn quadruples(a: &CostedBatches, b: &CostedBatches) -> (Vec<JackknifeBlock>, Vec<JackknifeBlock>) {
     let count = a.batches.len().min(b.batches.len()) / 2;
     (0..count).filter_map(|q| a.quadruple(q).zip(b.quadruple(q))).unzip()
 }
 
-/// What a claim of efficiency shows.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Shown {
-    /// E with its interval.
-    ratio: LogRatio,
-    /// e.
-    bound: f64,
-    /// Kurtosis of a pass: candidate, baseline.
-    kurtosis: (f64, f64),
-    /// The difference of the means, relative to the larger.
-    difference: Estimate,
-    /// Is it the means that speak against the claim, more than E?
-    blames_means: bool,
-    /// Student's t of ln E - ln e, with the p-value of the claim as a whole.
-    pub test: Test,
+/// A candidate against a baseline.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EfficiencyClaim<'a> {
+    pub candidate: &'a Quantity,
+    pub baseline: &'a Quantity,
+    /// What E must exceed.
+    pub bound: f64,
+    pub cost: CostMeasure,
 }
 
-/// Turns the trial of the means into that of a claim of efficiency.
-pub(super) fn trial(
+/// What a claim of efficiency shows; a control that expects failure has `fails`.
+pub(super) fn finding(
     stored: &Stored,
-    means: Trial,
-    candidate: &Quantity,
-    baseline: &Quantity,
-    (bound, measure): (f64, CostMeasure),
-) -> Trial {
-    let shown = weigh(stored, &means, candidate, baseline, (bound, measure));
-    let mut verdict = means.verdict.clone();
-    verdict.test = match measure {
-        CostMeasure::Counters => "efficiency by counters",
-        CostMeasure::Cpu => "efficiency by CPU time",
-    }
-    .into();
-    (verdict.value, verdict.std_error) = (f64::NAN, f64::NAN);
-    (verdict.expected, verdict.expected_error) = (bound, 0.0);
-    let evidence = match shown {
+    mut verdict: Verdict,
+    claim: &EfficiencyClaim,
+    fails: bool,
+) -> Finding {
+    verdict.test = Some(TestKind::Efficiency(claim.cost));
+    verdict.set_expected(claim.bound, 0.0);
+    let evidence = match weigh(stored, claim, fails) {
         Ok(shown) => {
-            verdict.value = shown.ratio.ratio();
-            verdict.std_error = verdict.value * shown.ratio.log.std_error;
+            let ratio = shown.ratio.ratio();
+            verdict.set_value(ratio, ratio * shown.ratio.log.std_error);
             Evidence::Efficiency(Box::new(shown))
         }
-        Err(reason) => Evidence::None(reason),
+        Err(reason) => Evidence::Nothing(reason),
     };
-    Trial { evidence, verdict, one_look: true, reference: None, ..means }
+    // Streams anew would be timed under other conditions.
+    Finding { one_look: true, ..Finding::new(verdict, evidence) }
 }
 
-fn weigh(
-    stored: &Stored,
-    means: &Trial,
-    candidate: &Quantity,
-    baseline: &Quantity,
-    (bound, measure): (f64, CostMeasure),
-) -> Result<Shown, String> {
-    let (difference, mean_test) = match &means.evidence {
-        Evidence::Test { difference, test } => (difference, test),
-        Evidence::None(reason) => return Err(format!("no mean test: {reason}")),
-        Evidence::Identity { holds: true } => {
+fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<EfficiencyTest, String> {
+    let EfficiencyClaim { candidate, baseline, bound, cost } = *claim;
+    let means = evidence_of_means(stored, &mean_of(stored, candidate), &mean_of(stored, baseline));
+    let Held { evidence, value, expected, .. } = means;
+    let difference = match &evidence {
+        Evidence::Difference { difference, .. } => difference,
+        Evidence::Nothing(reason) => return Err(format!("no mean test: {reason}")),
+        Evidence::Exact { holds: true, .. } => {
             return Err("no variance: there is nothing to compare".into());
         }
         _ => return Err("the means differ, without sampling error".into()),
     };
-    let contest = contest(stored, candidate, baseline, measure, CONFIDENCE)?;
-    if measure == CostMeasure::Cpu {
+    let contest = contest(stored, candidate, baseline, cost)?;
+    if cost == CostMeasure::Cpu {
         if !contest.side_by_side {
             return Err("the arms were not timed side by side".into());
         }
@@ -255,24 +230,26 @@ fn weigh(
     }
     let efficiency = &contest.efficiency;
     let kurtosis = (efficiency.b.kurtosis, efficiency.a.kurtosis);
-    if !efficiency.resolved {
+    if !efficiency.is_resolved(CONFIDENCE) {
         return Err(format!(
             "not resolved: ln of the ratio moved by {:.2} when the passes doubled, interval +-{:.2}; one pass may \
              hold {:.1} % of a variance{}",
             efficiency.moved,
-            efficiency.work.half_width,
+            efficiency.work.half_width(CONFIDENCE),
             100.0 * efficiency.a.largest_pass.1.max(efficiency.b.largest_pass.1),
-            told(kurtosis, 3)
+            kurtosis_words(kurtosis, 3)
         ));
     }
     let ratio = efficiency.work;
     let two_sided = ratio.test(bound);
     let half = 0.5 * two_sided.p_value;
     let slow = if two_sided.statistic < 0.0 { half } else { 1.0 - half };
-    let p_value = (2.0 * mean_test.p_value.min(slow)).min(1.0);
-    let scale = means.verdict.value.abs().max(means.verdict.expected.abs());
+    let of_means = difference.test_zero().p_value;
+    let p_value = (2.0 * of_means.min(slow)).min(1.0);
+    let size = |mean: Option<Estimate>| mean.map_or(0.0, |mean| mean.value.abs());
+    let scale = size(value).max(size(expected));
     let relative = |x: f64| if scale > 0.0 { x / scale } else { x };
-    Ok(Shown {
+    Ok(EfficiencyTest {
         ratio,
         bound,
         kurtosis,
@@ -281,7 +258,8 @@ fn weigh(
             std_error: relative(difference.std_error),
             dof: difference.dof,
         },
-        blames_means: mean_test.p_value < slow,
+        blames_means: of_means < slow,
+        fails,
         test: Test { p_value, ..two_sided },
     })
 }
@@ -294,12 +272,12 @@ fn control_objection(stored: &Stored, baseline: &Quantity) -> Option<String> {
         return Some(format!("no control: {} was not played twice", baseline.estimator));
     };
     let control = Quantity { estimator: control.estimator.clone(), ..baseline.clone() };
-    let contest = match contest(stored, &control, baseline, CostMeasure::Cpu, CONFIDENCE) {
+    let contest = match contest(stored, &control, baseline, CostMeasure::Cpu) {
         Ok(contest) if contest.side_by_side => contest,
         Ok(_) => return Some("no control: it was not timed side by side".into()),
         Err(reason) => return Some(format!("no control: {reason}")),
     };
-    let excludes_one = |ratio: &LogRatio| ratio.log.value.abs() > ratio.half_width;
+    let excludes_one = |ratio: &LogRatio| ratio.log.value.abs() > ratio.half_width(CONFIDENCE);
     let (cost, work) = (contest.efficiency.cost, contest.efficiency.work);
     (excludes_one(&cost) || excludes_one(&work)).then(|| {
         format!(
@@ -310,70 +288,6 @@ fn control_objection(stored: &Stored, baseline: &Quantity) -> Option<String> {
             work.ratio()
         )
     })
-}
-
-/// Two kurtoses at the end of a sentence; nothing where there are none, as of pixels.
-fn told((a, b): (f64, f64), decimals: usize) -> String {
-    if a.is_nan() { String::new() } else { format!("; kurtosis {a:.decimals$} and {b:.decimals$}") }
-}
-
-impl Shown {
-    /// What it says, where the p-value adjusted over the family is `adjusted_p` and a test fails below
-    /// `level`; `own_level` is the level of this test alone. A control that expects failure wants it of E.
-    pub(super) fn outcome(
-        &self,
-        adjusted_p: f64,
-        (level, own_level): (f64, f64),
-        detect: Option<f64>,
-        fails: bool,
-    ) -> Outcome {
-        match adjusted_p {
-            p if p.is_nan() => Outcome::Invalid("the test has no p-value".into()),
-            p if p < level && fails && self.blames_means => {
-                Outcome::Invalid(format!("the means differ by {:+.2} %", 100.0 * self.difference.value))
-            }
-            p if p < level => Outcome::Fail,
-            _ if self.ratio.interval().0 <= self.bound => Outcome::Underpowered,
-            _ if detect.is_some_and(|d| self.unseen(own_level) > d) => Outcome::Underpowered,
-            _ => Outcome::Pass,
-        }
-    }
-
-    /// The relative difference of the means that could have gone unseen.
-    fn unseen(&self, own_level: f64) -> f64 {
-        self.difference.detectable(own_level, POWER)
-    }
-
-    /// The smallest shortfall of E below e, relative to e, that would have failed: 1 - exp(-d) with d that of
-    /// ln E. The p-value is twice the one-sided one, so that its level is that of a two-sided test.
-    pub(super) fn detectable(&self, own_level: f64) -> f64 {
-        let log = Estimate::known(-self.ratio.log.detectable(own_level, POWER), 0.0);
-        1.0 - LogRatio { log, half_width: 0.0 }.ratio()
-    }
-
-    /// The reason for an outcome.
-    pub(super) fn note(&self, found: &Outcome, own_level: f64) -> String {
-        let (low, high) = self.ratio.interval();
-        let numbers = format!(
-            "{:.3} times the efficiency, 99.9 % interval {low:.3} to {high:.3}{}",
-            self.ratio.ratio(),
-            told(self.kurtosis, 1)
-        );
-        match found {
-            Outcome::Invalid(reason) => reason.clone(),
-            Outcome::Fail if self.blames_means => {
-                format!("the means differ by {:+.2} %", 100.0 * self.difference.value)
-            }
-            Outcome::Underpowered if low <= self.bound => {
-                format!("not shown to exceed {:.3}: {numbers}", self.bound)
-            }
-            Outcome::Underpowered => format!(
-                "a difference of the means of {:.1} % could have gone unseen; {numbers}",
-                100.0 * self.unseen(own_level)
-            ),
-            _ => format!("{numbers}; means agree within {:.1} %", 100.0 * self.unseen(own_level)),
-        }
-    }
 }
 
 #[cfg(test)]

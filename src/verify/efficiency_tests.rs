@@ -1,12 +1,10 @@
 //! Every rule of claims of efficiency seen to pass, and to catch a planted defect.
 
-use serde_json::json;
-
 use super::super::judge::judge_alone;
-use super::super::verdict::Verdict;
+use super::super::verdict::Outcome;
 use super::*;
-use crate::results::record::{Against, Bias, Comparison, Observable};
-use crate::results::sample::{pairs, quantity, set_observables, set_spread, stored, uniform};
+use crate::results::record::{Against, Bias, Claim, ClaimKind, Comparison, ExpectedOutcome, Observable};
+use crate::results::sample::{claim, pairs, quantity, set_observables, set_spread, stored, uniform};
 use crate::results::store::observables_path;
 use crate::results::timing::{Batches, Timing};
 
@@ -23,8 +21,8 @@ fn scored(mis: f64, snee: f64) -> Stored {
 }
 
 /// A claim that `snee` is more than `bound` times as efficient as `mis`, judged.
-fn claimed(mut s: Stored, bound: f64, cost: CostMeasure, expect: Option<&str>) -> Verdict {
-    s.record.claims = json!([{"name": "c", "expect": expect, "faster": {}}]);
+fn claimed(mut s: Stored, bound: f64, cost: CostMeasure, expects: ExpectedOutcome) -> Verdict {
+    s.record.statements = vec![Claim { expects, ..claim("c", ClaimKind::Faster) }];
     let against = Against::Efficiency { baseline: quantity("mis", 0), exceeds: bound, cost };
     s.record.comparisons =
         vec![Comparison { claim: 0, quantity: quantity("snee", 0), against, detect: None }];
@@ -34,7 +32,7 @@ fn claimed(mut s: Stored, bound: f64, cost: CostMeasure, expect: Option<&str>) -
 }
 
 fn by_counters(s: Stored, bound: f64) -> Verdict {
-    claimed(s, bound, CostMeasure::Counters, None)
+    claimed(s, bound, CostMeasure::Counters, ExpectedOutcome::Pass)
 }
 
 #[track_caller]
@@ -47,29 +45,32 @@ fn assert_invalid(v: &Verdict, what: &str) {
 fn a_claim_of_speed_has_three_outcomes() {
     let pass = by_counters(scored(0.1, 0.05), 1.5);
     assert_eq!(pass.outcome, Outcome::Pass, "{pass:?}");
-    assert!((pass.value / 4.0 - 1.0).abs() < 0.2 && pass.note.contains("kurtosis 1."), "{pass:?}");
-    assert!(pass.detectable > 0.0 && pass.detectable < 1.0, "{}", pass.detectable);
+    assert!(
+        (pass.value.expect("a ratio") / 4.0 - 1.0).abs() < 0.2 && pass.note.contains("kurtosis 1."),
+        "{pass:?}"
+    );
+    assert!(pass.detectable > Some(0.0) && pass.detectable < Some(1.0), "{pass:?}");
     let open = by_counters(scored(0.1, 0.05), 4.0);
     assert_eq!(open.outcome, Outcome::Underpowered, "{open:?}");
     assert!(open.note.starts_with("not shown to exceed 4.000"), "{}", open.note);
     let fail = by_counters(scored(0.1, 0.05), 20.0);
     assert_eq!(fail.outcome, Outcome::Fail, "{fail:?}");
-    assert!(fail.statistic < -5.0 && fail.p_value < 1e-6, "{fail:?}");
+    assert!(fail.statistic < Some(-5.0) && fail.p_value < Some(1e-6), "{fail:?}");
 }
 
 #[test]
 fn controls_expect_failure_of_the_efficiency_alone() {
-    let fails = |s| claimed(s, 20.0, CostMeasure::Counters, Some("fails"));
+    let fails = |s| claimed(s, 20.0, CostMeasure::Counters, ExpectedOutcome::Fails);
     assert_eq!(fails(scored(0.1, 0.05)).outcome, Outcome::Pass);
     assert_eq!(
-        claimed(scored(0.1, 0.05), 1.5, CostMeasure::Counters, Some("fails")).outcome,
+        claimed(scored(0.1, 0.05), 1.5, CostMeasure::Counters, ExpectedOutcome::Fails).outcome,
         Outcome::Fail
     );
     let mut differing = scored(0.1, 0.05);
     set_observables(&mut differing, "snee", |i, _, _| 1.2 + 0.05 * uniform(i + 9000));
     // With a smaller bound, the means speak louder than the efficiency.
     assert_invalid(
-        &claimed(differing, 4.0, CostMeasure::Counters, Some("fails")),
+        &claimed(differing, 4.0, CostMeasure::Counters, ExpectedOutcome::Fails),
         "the means differ by +",
     );
 }
@@ -126,7 +127,7 @@ fn doubled_counters_turn_the_claim_red() {
     let path = s.record.cells[0].runs[1].costs.clone();
     s.arrays.get_mut(&path).expect("costs").data.iter_mut().for_each(|n| *n *= 2.0);
     let v = by_counters(s, 3.0);
-    assert!((v.value / 2.0 - 1.0).abs() < 0.2, "{}", v.value);
+    assert!((v.value.expect("a ratio") / 2.0 - 1.0).abs() < 0.2, "{v:?}");
     assert_ne!(v.outcome, Outcome::Pass);
     assert_eq!(by_counters(scored(0.1, 0.05), 3.0).outcome, Outcome::Pass);
 }
@@ -161,7 +162,7 @@ fn noisy(name: &str, batch: usize) -> f64 {
 }
 
 fn by_cpu(s: Stored, bound: f64) -> Verdict {
-    claimed(s, bound, CostMeasure::Cpu, None)
+    claimed(s, bound, CostMeasure::Cpu, ExpectedOutcome::Pass)
 }
 
 #[test]
@@ -176,7 +177,7 @@ fn cpu_time_counts_where_the_machine_is_quiet() {
         noisy(name, batch) * if name == "snee" { 2.0 } else { 1.0 }
     });
     let v = by_cpu(slow, 1.5);
-    assert!((v.value / 2.0 - 1.0).abs() < 0.2, "{}", v.value);
+    assert!((v.value.expect("a ratio") / 2.0 - 1.0).abs() < 0.2, "{v:?}");
 }
 
 /// The timer also counts the time of the arm before: the control, which follows another arm, differs.
@@ -212,7 +213,7 @@ fn cpu_time_needs_its_conditions() {
 /// A claim about the pixels that `snee` is more than `bound` times as efficient, judged.
 fn of_pixels(mut s: Stored, bound: f64) -> Verdict {
     let pixels = |name| Quantity { observable: Observable::pixels(), ..quantity(name, 0) };
-    s.record.claims = json!([{"name": "c", "faster": {}}]);
+    s.record.statements = vec![claim("c", ClaimKind::Faster)];
     let (baseline, cost) = (pixels("mis"), CostMeasure::Counters);
     let against = Against::Efficiency { baseline, exceeds: bound, cost };
     s.record.comparisons =
@@ -228,7 +229,7 @@ fn pixels_have_an_efficiency_of_their_own() {
     set_spread(&mut s, "snee", pairs(0.1, 5_000_000));
     let pass = of_pixels(s.clone(), 3.0);
     assert_eq!((&pass.outcome, pass.observable.as_str()), (&Outcome::Pass, "pixels"), "{pass:?}");
-    assert!((pass.value / 9.0).ln().abs() < 0.15, "{pass:?}");
+    assert!((pass.value.expect("a ratio") / 9.0).ln().abs() < 0.15, "{pass:?}");
     let fail = of_pixels(s.clone(), 60.0);
     assert_eq!(fail.outcome, Outcome::Fail, "{fail:?}");
     assert_eq!(by_counters(s.clone(), 3.0).outcome, Outcome::Fail, "the images' means are even");
@@ -249,7 +250,7 @@ fn pairs_have_the_cost_of_their_passes() {
     let passes = |n: &[u64]| n.iter().map(|&n| Moments { n, ..Moments::default() }).collect::<Vec<_>>();
     let side = |batches: &[u64], pairs: &[u64], costs: &[f64]| {
         let settled: Vec<bool> = (0..costs.len()).map(|i| i != 1).collect();
-        Side::of_pairs(&passes(batches), &passes(pairs), costs, &settled)
+        CostedBatches::of_pairs(&passes(batches), &passes(pairs), costs, &settled)
     };
     let four = side(&[4, 4, 3], &[2, 2, 1], &[8.0, 12.0, 9.0]).expect("pairs");
     assert_eq!((four.costs, four.settled), (vec![4.0, 6.0, 3.0], vec![true, false, true]));

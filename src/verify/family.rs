@@ -1,134 +1,179 @@
-//! Tests of one call, judged under one family-wise error rate: what `judge` and `compare` share.
+//! Tests of one call, judged as one family: Holm's adjustment over all of them, second looks where there are
+//! two, the smallest detectable defect, and the outcome. `verify`, `judge` and `compare` share it.
 
-use super::judge::POWER;
-use super::verdict::{Outcome, Verdict};
-use crate::stats::hypothesis::{Estimate, Test};
+use std::collections::BTreeMap;
+
+use super::evidence::Evidence;
+use super::levels::{FIRST_LOOK, Looks, SECOND_LOOK};
+use super::verdict::{Outcome, Verdict, known};
 use crate::stats::multiplicity::holm;
-use crate::stats::signs;
-
-/// What one test shows.
-#[derive(Clone, Debug)]
-pub(super) enum Shown {
-    /// Nothing, for this reason.
-    Nothing(String),
-    /// No sampling error: the two sides are the same, or they are not.
-    Exact { same: bool },
-    /// A difference with its error; its p-value is this many times that of Student's t.
-    Difference { estimate: Estimate, times: f64 },
-    /// A statistic with the p-value of `signs::one_sided_bound`, from `terms` terms, and the true effect
-    /// that moves it by 1; `detectable` is the root of such an effect.
-    Bounded { t: f64, terms: f64, unit: f64 },
-}
 
 /// One test of a family.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Finding {
-    pub shown: Shown,
-    /// What `detectable` is relative to; 0 for absolute.
+    /// What it shows by itself.
+    pub evidence: Evidence,
+    /// What `detectable` of a difference is relative to; 0 for absolute.
     pub relative_to: f64,
-    /// The largest detectable effect, in those units, that leaves a pass a pass.
+    /// The largest defect that may go unseen, in the units of the verdict's `detectable`.
     pub detect: Option<f64>,
-    /// Filled in but for the test's numbers, outcome and note.
+    /// It has no second look: that would share this one's errors, or come too late.
+    pub one_look: bool,
+    /// Filled in except for the test's numbers, outcome and note.
     pub verdict: Verdict,
 }
 
 impl Finding {
-    fn p_value(&self) -> Option<f64> {
-        match &self.shown {
-            Shown::Difference { estimate, times } => Some(test(estimate, *times).p_value),
-            Shown::Bounded { t, .. } => Some(signs::one_sided_bound(*t)),
-            Shown::Nothing(_) | Shown::Exact { .. } => None,
-        }
-        .filter(|p| !p.is_nan())
+    /// With an absolute `detectable`, nothing that must be detected, and a second look.
+    pub fn new(verdict: Verdict, evidence: Evidence) -> Finding {
+        Finding { evidence, relative_to: 0.0, detect: None, one_look: false, verdict }
+    }
+
+    /// Did the first look fail, and is it one that a second look decides?
+    fn wants_second_look(&self, adjusted_p: Option<f64>, looks: Looks) -> bool {
+        matches!(self.evidence, Evidence::Difference { .. } | Evidence::Counts { .. })
+            && !self.one_look
+            && looks == Looks::Two
+            && adjusted_p.is_some_and(|p| (looks.at_once()..FIRST_LOOK).contains(&p))
     }
 }
 
-/// The test that a difference is chance.
-fn test(difference: &Estimate, times: f64) -> Test {
-    let Estimate { value, std_error, dof } = *difference;
-    let statistic = value / std_error;
-    let p_value = if statistic.is_finite() {
-        // Not `min`, which would make a p-value of what is not a number.
-        let p_value = times * difference.test_zero().p_value;
-        if p_value > 1.0 { 1.0 } else { p_value }
-    } else if std_error == 0.0 && !value.is_nan() {
-        if value == 0.0 { 1.0 } else { 0.0 }
-    } else {
-        f64::NAN
-    };
-    Test { statistic, dof, p_value }
+/// What a family says.
+pub(super) struct Concluded {
+    /// One verdict a finding.
+    pub verdicts: Vec<Verdict>,
+    /// The findings that want a second look which was not taken yet; their verdicts are `fail` until then.
+    pub wanted: Vec<usize>,
 }
 
-/// The verdicts of a family at `level`: Holm's adjustment over all of it.
-pub(super) fn conclude(findings: Vec<Finding>, level: f64) -> Vec<Verdict> {
-    let p_values: Vec<f64> = findings.iter().filter_map(Finding::p_value).collect();
-    // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
-    let own_level = level / p_values.len().max(1) as f64;
+/// What a second look came to.
+enum SecondLook {
+    /// It was not taken yet.
+    Missing,
+    /// It means nothing, for this reason.
+    Invalid(String),
+    /// Its adjusted p-value.
+    Taken(f64),
+}
+
+/// The verdicts of a family; `again` is what the second look at a finding shows, where it was taken.
+pub(super) fn conclude(
+    findings: Vec<Finding>,
+    looks: Looks,
+    again: impl Fn(usize, &Finding) -> Option<Evidence>,
+) -> Concluded {
+    let p_values: Vec<f64> = findings.iter().filter_map(|f| f.evidence.p_value()).collect();
     let mut adjusted = holm(&p_values).into_iter();
-    let mut verdicts = Vec::new();
-    for finding in findings {
-        let adjusted_p = finding.p_value().and_then(|_| adjusted.next());
-        verdicts.push(state(finding, adjusted_p, level, own_level));
-    }
-    verdicts
+    let adjusted: Vec<Option<f64>> =
+        findings.iter().map(|f| f.evidence.p_value().and_then(|_| adjusted.next())).collect();
+    let due = |&i: &usize| findings[i].wants_second_look(adjusted[i], looks);
+    let seconds: BTreeMap<usize, Option<Evidence>> =
+        (0..findings.len()).filter(due).map(|i| (i, again(i, &findings[i]))).collect();
+    let wanted = seconds.iter().filter(|(_, second)| second.is_none()).map(|(i, _)| *i).collect();
+    let mut second_looks = second_looks(seconds);
+    let tests = p_values.len().max(1) as f64;
+    let verdicts = findings.into_iter().zip(adjusted).enumerate();
+    let verdicts = verdicts
+        .map(|(i, (finding, adjusted_p))| {
+            state(finding, adjusted_p, second_looks.remove(&i), looks, tests)
+        })
+        .collect();
+    Concluded { verdicts, wanted }
 }
 
-fn state(finding: Finding, adjusted_p: Option<f64>, level: f64, own_level: f64) -> Verdict {
-    let Finding { shown, relative_to, detect, mut verdict } = finding;
-    let scale = if relative_to == 0.0 { 1.0 } else { relative_to.abs() };
-    match &shown {
-        Shown::Nothing(_) => {}
-        Shown::Exact { .. } => verdict.statistic = 0.0,
-        Shown::Difference { estimate, times } => {
-            let test = test(estimate, *times);
-            (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
-            verdict.detectable = estimate.detectable(own_level / times, POWER) / scale;
-        }
-        Shown::Bounded { t, terms, unit } => {
-            (verdict.statistic, verdict.p_value) = (*t, signs::one_sided_bound(*t));
-            verdict.detectable = (unit * signs::detectable(own_level, POWER, *terms)).sqrt() / scale;
-        }
+/// Second looks with p-values adjusted over all of them. One that is still missing counts: the level of the
+/// others must not depend on it.
+fn second_looks(seconds: BTreeMap<usize, Option<Evidence>>) -> BTreeMap<usize, SecondLook> {
+    let p_value = |second: &Option<Evidence>| second.as_ref()?.p_value();
+    let p_values: Vec<f64> = seconds.values().map(|second| p_value(second).unwrap_or(1.0)).collect();
+    let look = |((index, second), adjusted_p)| {
+        let look = match second {
+            None => SecondLook::Missing,
+            Some(Evidence::Nothing(reason)) => SecondLook::Invalid(reason),
+            Some(Evidence::Exact { holds, .. }) => SecondLook::Taken(if holds { 1.0 } else { 0.0 }),
+            Some(evidence) if evidence.p_value().is_none() => {
+                SecondLook::Invalid("the test has no p-value".into())
+            }
+            Some(_) => SecondLook::Taken(adjusted_p),
+        };
+        (index, look)
+    };
+    seconds.into_iter().zip(holm(&p_values)).map(look).collect()
+}
+
+fn state(
+    finding: Finding,
+    adjusted_p: Option<f64>,
+    second: Option<SecondLook>,
+    looks: Looks,
+    tests: f64,
+) -> Verdict {
+    let Finding { evidence, relative_to, detect, one_look, mut verdict } = finding;
+    // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
+    let own_level = looks.first(one_look) / tests;
+    if let Some(test) = evidence.test() {
+        verdict.statistic = known(test.statistic);
+        (verdict.p_value, verdict.dof) = (known(test.p_value), known(test.dof));
+        (verdict.adjusted_p, verdict.detectable) =
+            (adjusted_p, evidence.detectable(own_level, relative_to));
     }
-    verdict.adjusted_p = adjusted_p.unwrap_or(f64::NAN);
-    let (outcome, reason) = match shown {
-        Shown::Nothing(reason) => (Outcome::Invalid(reason.clone()), reason),
-        Shown::Exact { same: true } => (Outcome::Pass, "the same".into()),
-        Shown::Exact { same: false } => (Outcome::Fail, format!("no sampling error, {}", off(&verdict))),
-        // Not `adjusted_p < level`: a NaN must not pass.
-        Shown::Difference { .. } | Shown::Bounded { .. } => match verdict.adjusted_p {
-            p if p.is_nan() => {
-                let reason = "the test has no p-value".to_string();
-                (Outcome::Invalid(reason.clone()), reason)
+    if let Some(SecondLook::Taken(p)) = second {
+        verdict.second_p = Some(p);
+    }
+    let found = match (&evidence, &second) {
+        (Evidence::Nothing(reason), _) => Outcome::Invalid(reason.clone()),
+        (Evidence::Exact { holds: true, .. }, _) => Outcome::Pass,
+        (Evidence::Exact { holds: false, .. }, _) => Outcome::Fail,
+        (Evidence::Efficiency(shown), _) => {
+            shown.outcome(adjusted_p, looks.at_once(), own_level, detect)
+        }
+        (_, Some(SecondLook::Missing)) => Outcome::Fail,
+        (_, Some(SecondLook::Invalid(reason))) => Outcome::Invalid(format!("second look: {reason}")),
+        (_, Some(SecondLook::Taken(p))) if *p < SECOND_LOOK => Outcome::Fail,
+        _ => match adjusted_p {
+            None => Outcome::Invalid("the test has no p-value".into()),
+            Some(p) if p < looks.at_once() => Outcome::Fail,
+            // Where nothing is known to be detectable, nothing is.
+            _ if detect.is_some_and(|d| verdict.detectable.is_none_or(|found| found > d)) => {
+                Outcome::Underpowered
             }
-            p if p < level => (Outcome::Fail, off(&verdict)),
-            // What is not a number sees nothing.
-            _ if detect.is_some_and(|d| verdict.detectable > d || verdict.detectable.is_nan()) => {
-                let wanted = 100.0 * detect.unwrap_or(f64::NAN);
-                let seen = 100.0 * verdict.detectable;
-                let reason = format!("could have missed {seen:.2} %, {wanted:.2} % are to be seen");
-                (Outcome::Underpowered, reason)
-            }
-            _ => (Outcome::Pass, String::new()),
+            _ => Outcome::Pass,
         },
     };
-    if verdict.note.is_empty() {
-        verdict.note = reason;
-    } else if !reason.is_empty() {
-        verdict.note = format!("{reason}; {}", verdict.note);
+    let mut reason = match &evidence {
+        Evidence::Efficiency(shown) => shown.note(&found, own_level),
+        _ => reason(&found, &evidence, detect, &verdict),
+    };
+    match second {
+        Some(SecondLook::Missing) => reason += "; wants a second look on fresh streams",
+        Some(SecondLook::Taken(_)) if found == Outcome::Pass => {
+            reason = "failed at the first look and cleared by a second on fresh streams".into();
+        }
+        Some(SecondLook::Taken(_)) => reason += ", at both looks",
+        Some(SecondLook::Invalid(_)) | None => {}
     }
-    verdict.outcome = outcome;
+    verdict.note = match (reason.is_empty(), verdict.note.is_empty()) {
+        (_, true) => reason,
+        (true, false) => verdict.note,
+        (false, false) => format!("{reason}; {}", verdict.note),
+    };
+    verdict.outcome = found;
     verdict
 }
 
-/// How far a value lies from what is expected; nothing where there are no values.
-fn off(verdict: &Verdict) -> String {
-    let difference = verdict.value - verdict.expected;
-    let relative = 100.0 * difference / verdict.expected.abs();
-    if difference.is_nan() {
-        String::new()
-    } else if relative.is_finite() {
-        format!("off by {relative:+.2} %")
-    } else {
-        format!("off by {difference:+.2e}")
+/// The reason for an outcome.
+fn reason(found: &Outcome, evidence: &Evidence, detect: Option<f64>, verdict: &Verdict) -> String {
+    match (found, evidence) {
+        (Outcome::Invalid(reason), _) => reason.clone(),
+        (Outcome::Pass | Outcome::Fail, Evidence::Exact { said, .. })
+        | (Outcome::Fail, Evidence::Counts { said, .. }) => said.clone(),
+        (Outcome::Fail, Evidence::Sum(_)) => "the table as a whole deviates".into(),
+        (Outcome::Fail, _) => verdict.deviation(),
+        (Outcome::Underpowered, _) => format!(
+            "could have missed {:.2e}, {:.2e} is to be seen",
+            verdict.detectable.unwrap_or(f64::INFINITY),
+            detect.unwrap_or_default()
+        ),
+        (Outcome::Pass, _) => String::new(),
     }
 }

@@ -1,16 +1,16 @@
 //! From comparisons to verdicts: every comparison by itself (`trial`), then all of them as one family
-//! with at most two looks (`levels`), then what controls expect.
+//! (`family`) with at most two looks (`levels`), then what controls expect.
 
 use std::collections::BTreeMap;
 
+use super::evidence::Evidence;
+use super::family::{Concluded, Finding, conclude};
 pub use super::levels::{FAMILY_LEVEL, Looks, POWER};
-use super::levels::{FIRST_LOOK, SECOND_LOOK};
-use super::trial::{Claim, Evidence, Expect, Item, Trial, trial};
-use super::verdict::{Outcome, Verdict};
-use crate::results::record::{Against, Quantity};
+use super::trial::{Subject, Trial, trial};
+use super::verdict::{Outcome, TestKind, Verdict};
+use crate::results::record::{Against, ClaimKind, ExpectedOutcome, Quantity};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::{Test, chi_square_sf, critical_value};
-use crate::stats::multiplicity::holm;
 
 /// A table of more comparisons than this is also tested as a whole.
 const TABLE: usize = 10;
@@ -32,12 +32,12 @@ pub struct Judgement {
     /// Number of the case that each verdict is of.
     pub case_of: Vec<usize>,
     /// What wants a second look that no record holds yet; its verdicts are `fail` until then.
-    pub wanted: Vec<Wanted>,
+    pub wanted: Vec<LookAgain>,
 }
 
 /// What wants a second look.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Wanted {
+pub struct LookAgain {
     /// The case.
     pub case: usize,
     /// What is to be measured again.
@@ -55,36 +55,69 @@ pub enum Measured {
 
 /// Judges one record by itself, with one look.
 pub fn judge_alone(stored: &Stored) -> Vec<Verdict> {
-    judge(&[Case { main: stored, retest: None }], Looks::One).verdicts
+    judge(&[Case { main: stored, retest: None }], Looks::ALONE).verdicts
+}
+
+/// What a trial is of.
+#[derive(Clone, Copy)]
+struct TrialOf {
+    case: usize,
+    claim: usize,
+    subject: Subject,
 }
 
 /// Judges every comparison of every record as one family of tests.
 pub fn judge(cases: &[Case], looks: Looks) -> Judgement {
-    let mut trials = Vec::new();
+    let (mut places, mut findings) = (Vec::new(), Vec::new());
     for (case, Case { main, .. }) in cases.iter().enumerate() {
-        let comparisons = main.record.comparisons.iter().enumerate();
-        let own: Vec<Trial> = comparisons.map(|(index, c)| trial(main, index, c)).collect();
-        // Cells that an experiment pairs share their streams: their deviations are not independent.
-        let paired = !main.record.resolved["pair"].is_null();
-        let tables = if paired { vec![] } else { table_trials(&own) };
-        let reproduced = super::reproduction::trials(main);
-        let samplers = super::sampler::trials(main);
-        let all = own.into_iter().chain(tables).chain(reproduced).chain(samplers);
-        trials.extend(all.map(|trial| (case, trial)));
+        for Trial { subject, claim, finding } in trials(main) {
+            places.push(TrialOf { case, claim, subject });
+            findings.push(finding);
+        }
     }
-    conclude(cases, trials, looks)
+    let again = |i: usize, finding: &Finding| {
+        second(&cases[places[i].case], places[i].subject, finding.verdict.test.as_ref())
+    };
+    let Concluded { mut verdicts, wanted } = conclude(findings, looks, again);
+    for (verdict, place) in verdicts.iter_mut().zip(&places) {
+        expect(verdict, cases[place.case].main, place.claim);
+    }
+    let subjects = |TrialOf { case, subject, .. }: TrialOf| {
+        let subjects = measured_by(cases[case].main, subject).into_iter();
+        subjects.map(move |subject| LookAgain { case, subject })
+    };
+    Judgement {
+        verdicts,
+        case_of: places.iter().map(|place| place.case).collect(),
+        wanted: wanted.into_iter().flat_map(|i| subjects(places[i])).collect(),
+    }
+}
+
+/// All that the claims of a record state.
+fn trials(main: &Stored) -> Vec<Trial> {
+    let comparisons = main.record.comparisons.iter().enumerate();
+    let own: Vec<Trial> = comparisons.map(|(index, c)| trial(main, index, c)).collect();
+    // Cells that an experiment pairs share their streams: their deviations are not independent.
+    let paired = !main.record.resolved["pair"].is_null();
+    let tables = if paired { vec![] } else { table_trials(main, &own) };
+    let reproduced = super::reproduction::trials(main);
+    let samplers = main.record.sampler_comparisons.iter().enumerate();
+    let samplers = samplers.flat_map(|(index, c)| super::sampler::trials(main, index, c));
+    own.into_iter().chain(tables).chain(reproduced).chain(samplers).collect()
 }
 
 /// For each column of a table (one estimator, band, observable and class of an `equals` claim), the
 /// sum over its cells of z^2 against chi-square: small deviations that agree in no sign, too small for
 /// each cell's own test, add up here. Cells have streams of their own, so the terms are independent;
 /// bands may share theirs, so they are not summed. z is the normal value with the cell's p-value.
-fn table_trials(trials: &[Trial]) -> Vec<Trial> {
+fn table_trials(main: &Stored, trials: &[Trial]) -> Vec<Trial> {
     let mut tables: BTreeMap<_, Vec<&Trial>> = BTreeMap::new();
-    for t in trials.iter().filter(|t| t.claim.kind == "equals" && t.claim.expect == Expect::Pass) {
-        if matches!(t.evidence, Evidence::Test { .. }) {
-            let v = &t.verdict;
-            let key = (t.claim_index, &v.estimators, &v.band, &v.observable, &v.class);
+    for (t, comparison) in trials.iter().zip(&main.record.comparisons) {
+        let claim = &main.record.statements[t.claim];
+        let is_row = claim.kind == ClaimKind::Equals && claim.expects == ExpectedOutcome::Pass;
+        if is_row && matches!(t.finding.evidence, Evidence::Difference { .. }) {
+            let Quantity { estimator, observable, band, .. } = &comparison.quantity;
+            let key = (t.claim, estimator, &main.record.bands[*band].name, observable);
             tables.entry(key).or_default().push(t);
         }
     }
@@ -92,128 +125,60 @@ fn table_trials(trials: &[Trial]) -> Vec<Trial> {
 }
 
 fn sum_of_squares(rows: &[&Trial]) -> Trial {
-    let statistic = rows.iter().map(|t| normal_equivalent(&t.evidence)).map(|z| z * z).sum();
+    let z = |t: &&Trial| normal_equivalent(&t.finding.evidence);
+    let statistic = rows.iter().map(z).map(|z| z * z).sum();
     let dof = rows.len() as f64;
     let test = Test { statistic, dof, p_value: chi_square_sf(statistic, dof) };
-    let nothing = f64::NAN;
     let verdict = Verdict {
         cell: format!("all {} cells", rows.len()),
-        test: "sum of z^2".into(),
-        value: nothing,
-        std_error: nothing,
-        expected: nothing,
-        expected_error: nothing,
-        ..rows[0].verdict.clone()
+        test: Some(TestKind::SumOfSquares),
+        value: None,
+        std_error: None,
+        expected: None,
+        expected_error: None,
+        ..rows[0].finding.verdict.clone()
     };
-    let evidence = Evidence::Sum { test };
-    Trial {
-        item: Item::Table,
-        evidence,
-        detect: None,
-        one_look: true,
-        reference: None,
-        verdict,
-        ..rows[0].clone()
-    }
+    let finding = Finding { one_look: true, ..Finding::new(verdict, Evidence::Sum(test)) };
+    Trial { subject: Subject::Whole, claim: rows[0].claim, finding }
 }
 
 /// The |z| whose normal p-value is the test's; the statistic itself where that p-value underflows.
 fn normal_equivalent(evidence: &Evidence) -> f64 {
-    match evidence {
-        Evidence::Test { test, .. } if test.p_value > 0.0 => critical_value(test.p_value, f64::INFINITY),
-        Evidence::Test { test, .. } => test.statistic,
-        _ => 0.0,
+    match evidence.test() {
+        Some(test) if test.p_value > 0.0 => critical_value(test.p_value, f64::INFINITY),
+        Some(test) => test.statistic,
+        None => 0.0,
     }
 }
 
-/// Adjusts p-values over the family, looks again where that is due, and states outcomes.
-fn conclude(cases: &[Case], trials: Vec<(usize, Trial)>, looks: Looks) -> Judgement {
-    let p_values: Vec<f64> = trials.iter().filter_map(|(_, t)| t.evidence.p_value()).collect();
-    let mut adjusted = holm(&p_values).into_iter();
-    let adjusted: Vec<f64> = trials
-        .iter()
-        .map(|(_, t)| t.evidence.p_value().and_then(|_| adjusted.next()).unwrap_or(f64::NAN))
-        .collect();
-    let again: Vec<usize> = (0..trials.len())
-        .filter(|&i| looks == Looks::Two && wants_second_look(&trials[i].1, adjusted[i], looks))
-        .collect();
-    let seconds: Vec<Option<Trial>> =
-        again.iter().map(|&i| second(&cases[trials[i].0], &trials[i].1)).collect();
-    // A look that is still missing counts as one: the level of the others must not depend on it.
-    let second_p: Vec<f64> =
-        seconds.iter().map(|t| t.as_ref().and_then(|t| t.evidence.p_value()).unwrap_or(1.0)).collect();
-    let second_adjusted = holm(&second_p);
-    let mut second_looks: BTreeMap<usize, SecondLook> = BTreeMap::new();
-    let mut wanted = Vec::new();
-    for ((&i, second), adjusted_p) in again.iter().zip(seconds).zip(second_adjusted) {
-        let (case, first) = &trials[i];
-        let look = match second.map(|t| t.evidence) {
-            None => {
-                let subjects = measured_by(&cases[*case], first);
-                wanted.extend(subjects.into_iter().map(|subject| Wanted { case: *case, subject }));
-                SecondLook::Missing
-            }
-            Some(Evidence::None(reason)) => SecondLook::Invalid(reason),
-            Some(Evidence::Efficiency(_)) => SecondLook::Invalid("efficiencies have one look".into()),
-            Some(Evidence::Identity { holds } | Evidence::Exact { holds, .. }) => {
-                SecondLook::Taken(if holds { 1.0 } else { 0.0 })
-            }
-            Some(Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. })
-                if test.p_value.is_nan() =>
-            {
-                SecondLook::Invalid("the test has no p-value".into())
-            }
-            Some(Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }) => {
-                SecondLook::Taken(adjusted_p)
-            }
-        };
-        second_looks.insert(i, look);
-    }
-    let tests = p_values.len().max(1) as f64;
-    let case_of = trials.iter().map(|(case, _)| *case).collect();
-    let verdicts = trials
-        .into_iter()
-        .enumerate()
-        .map(|(i, (_, t))| state(t, adjusted[i], second_looks.get(&i), looks, tests))
-        .collect();
-    Judgement { verdicts, case_of, wanted }
-}
-
-/// Did the first look fail, and is it one that a second look decides? A control that must differ has to
-/// be seen at once.
-fn wants_second_look(trial: &Trial, adjusted_p: f64, looks: Looks) -> bool {
-    matches!(trial.evidence, Evidence::Test { .. } | Evidence::Fit { .. })
-        && !trial.one_look
-        && trial.claim.expect == Expect::Pass
-        && (looks.at_once()..FIRST_LOOK).contains(&adjusted_p)
-}
-
-/// The same trial on the record of the second look, where that holds all it needs.
-fn second(case: &Case, first: &Trial) -> Option<Trial> {
+/// What the same trial shows on the record of the second look, where that holds all it needs.
+fn second(case: &Case, subject: Subject, test: Option<&TestKind>) -> Option<Evidence> {
     let retest = case.retest?;
     let is_held = |subject: &Measured| match subject {
         Measured::Quantity(quantity) => retest.batches(quantity).is_some(),
         Measured::Sampler(name) => retest.record.samplers.iter().any(|run| run.sampler == *name),
     };
-    let subjects = measured_by(case, first);
-    if subjects.is_empty() || !subjects.iter().all(is_held) {
+    let measured = measured_by(case.main, subject);
+    if measured.is_empty() || !measured.iter().all(is_held) {
         return None;
     }
-    match first.item {
-        Item::Comparison(index) => Some(trial(retest, index, &case.main.record.comparisons[index])),
-        Item::Sampler => super::sampler::trials(retest).into_iter().find(|again| {
-            let of = |t: &Trial| (t.claim_index, t.verdict.estimators.clone(), t.verdict.test.clone());
-            of(again) == of(first)
-        }),
-        Item::Table => None,
-    }
+    let record = &case.main.record;
+    let finding = match subject {
+        Subject::Comparison(index) => trial(retest, index, &record.comparisons[index]).finding,
+        Subject::Sampler(index) => {
+            let trials = super::sampler::trials(retest, index, &record.sampler_comparisons[index]);
+            trials.into_iter().find(|t| t.finding.verdict.test.as_ref() == test)?.finding
+        }
+        Subject::Whole => return None,
+    };
+    Some(finding.evidence)
 }
 
 /// What a second look at a trial has to measure.
-fn measured_by(case: &Case, trial: &Trial) -> Vec<Measured> {
-    match trial.item {
-        Item::Comparison(index) => {
-            let comparison = &case.main.record.comparisons[index];
+fn measured_by(main: &Stored, subject: Subject) -> Vec<Measured> {
+    match subject {
+        Subject::Comparison(index) => {
+            let comparison = &main.record.comparisons[index];
             let other = match &comparison.against {
                 Against::Quantity { other, .. } => Some(other.clone()),
                 Against::Value { .. } | Against::Efficiency { .. } => None,
@@ -221,134 +186,31 @@ fn measured_by(case: &Case, trial: &Trial) -> Vec<Measured> {
             let quantities = std::iter::once(comparison.quantity.clone()).chain(other);
             quantities.map(Measured::Quantity).collect()
         }
-        Item::Sampler => vec![Measured::Sampler(trial.verdict.estimators.clone())],
-        Item::Table => Vec::new(),
+        Subject::Sampler(index) => {
+            vec![Measured::Sampler(main.record.sampler_comparisons[index].sampler.clone())]
+        }
+        Subject::Whole => Vec::new(),
     }
 }
 
-/// What a second look came to.
-enum SecondLook {
-    /// It was not taken yet.
-    Missing,
-    /// It means nothing, for this reason.
-    Invalid(String),
-    /// Its adjusted p-value.
-    Taken(f64),
-}
-
-fn state(
-    trial: Trial,
-    adjusted_p: f64,
-    second: Option<&SecondLook>,
-    looks: Looks,
-    tests: f64,
-) -> Verdict {
-    let Trial { claim, evidence, detect, one_look, reference, mut verdict, .. } = trial;
-    if let Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. } = &evidence
-    {
-        (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
-        verdict.adjusted_p = adjusted_p;
-    }
-    // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
-    let own_level = looks.first(one_look || claim.expect != Expect::Pass) / tests;
-    if let Evidence::Efficiency(shown) = &evidence {
-        let test = &shown.test;
-        (verdict.statistic, verdict.p_value, verdict.dof) = (test.statistic, test.p_value, test.dof);
-        (verdict.adjusted_p, verdict.detectable) = (adjusted_p, shown.detectable(own_level));
-    }
-    if let Evidence::Fit { fit, .. } = &evidence {
-        verdict.detectable = fit.detectable(own_level, POWER);
-    }
-    if let Evidence::Test { difference, .. } = &evidence {
-        let reference = reference.unwrap_or(verdict.expected.abs());
-        let reference = if reference == 0.0 { 1.0 } else { reference };
-        verdict.detectable = difference.detectable(own_level, POWER) / reference;
-    }
-    if let Some(SecondLook::Taken(p)) = second {
-        verdict.second_p = *p;
-    }
-    let found = match (&evidence, second) {
-        (Evidence::None(reason), _) => Outcome::Invalid(reason.clone()),
-        (Evidence::Efficiency(shown), _) => {
-            let levels = (looks.at_once(), own_level);
-            shown.outcome(verdict.adjusted_p, levels, detect, claim.expect == Expect::Fails)
-        }
-        (Evidence::Identity { holds: true } | Evidence::Exact { holds: true, .. }, _) => Outcome::Pass,
-        (Evidence::Identity { holds: false } | Evidence::Exact { holds: false, .. }, _) => Outcome::Fail,
-        (_, Some(SecondLook::Missing)) => Outcome::Fail,
-        (_, Some(SecondLook::Invalid(reason))) => Outcome::Invalid(format!("second look: {reason}")),
-        (_, Some(SecondLook::Taken(p))) if *p < SECOND_LOOK => Outcome::Fail,
-        // Not `adjusted_p < level`: a NaN must not pass.
-        (Evidence::Test { .. } | Evidence::Sum { .. } | Evidence::Fit { .. }, _) => {
-            match verdict.adjusted_p {
-                p if p.is_nan() => Outcome::Invalid("the test has no p-value".into()),
-                p if p < looks.at_once() => Outcome::Fail,
-                _ if detect.is_some_and(|d| verdict.detectable > d) => Outcome::Underpowered,
-                _ => Outcome::Pass,
-            }
-        }
-    };
-    verdict.note = match &evidence {
-        Evidence::Efficiency(shown) => shown.note(&found, own_level),
-        _ => note(&found, &evidence, detect, &verdict),
-    };
-    match second {
-        Some(SecondLook::Missing) => verdict.note += "; wants a second look on fresh streams",
-        Some(SecondLook::Taken(_)) if found == Outcome::Pass => {
-            verdict.note = "failed at the first look and cleared by a second on fresh streams".into();
-        }
-        Some(SecondLook::Taken(_)) => verdict.note += ", at both looks",
-        _ => {}
-    }
-    verdict.outcome = expected_outcome(&claim, found, &mut verdict.note);
-    if claim.post_hoc {
+/// A control is green where it finds what it expects, and a claim made after the run is no evidence.
+fn expect(verdict: &mut Verdict, main: &Stored, claim: usize) {
+    let found = std::mem::take(&mut verdict.outcome);
+    let expects = main.record.statements[claim].expects;
+    verdict.outcome = expected_outcome(expects, found, &mut verdict.note);
+    if main.record.post_hoc.contains(&claim) {
         let reason = "post hoc: claimed when passes had been played; another seed makes it evidence";
         verdict.note = reason.into();
         verdict.outcome = Outcome::Invalid(reason.into());
     }
-    verdict
 }
 
-/// The reason for an outcome.
-fn note(found: &Outcome, evidence: &Evidence, detect: Option<f64>, verdict: &Verdict) -> String {
-    match (found, evidence) {
-        (Outcome::Invalid(reason), _) => reason.clone(),
-        (Outcome::Pass, Evidence::Identity { .. }) => {
-            "no sampling error, equal to rounding (1e-12)".into()
-        }
-        (Outcome::Fail, Evidence::Identity { .. }) => {
-            format!("no sampling error, and a relative deviation of {:.1e}", verdict.statistic)
-        }
-        (Outcome::Pass | Outcome::Fail, Evidence::Exact { said, .. }) => said.clone(),
-        (Outcome::Fail, Evidence::Fit { said, .. }) => said.clone(),
-        (Outcome::Fail, Evidence::Sum { .. }) => "the table as a whole deviates".into(),
-        (Outcome::Fail, _) => {
-            let difference = verdict.value - verdict.expected;
-            let relative = 100.0 * difference / verdict.expected.abs();
-            if relative.is_finite() {
-                format!("off by {relative:+.2} %")
-            } else {
-                format!("off by {difference:+.2e}")
-            }
-        }
-        (Outcome::Underpowered, _) => {
-            format!(
-                "could have missed {:.2e}, the claim wants {:.2e}",
-                verdict.detectable,
-                detect.unwrap_or(f64::NAN)
-            )
-        }
-        (Outcome::Pass, _) => String::new(),
-    }
-}
-
-/// A control is green where it finds what it expects.
-fn expected_outcome(claim: &Claim, found: Outcome, note: &mut String) -> Outcome {
-    let (wanted, green) = match claim.expect {
-        Expect::Pass => return found,
-        Expect::Differs => ("a difference", found == Outcome::Fail),
-        Expect::Fails => ("a failure", found == Outcome::Fail),
-        Expect::Invalid => ("an invalid test", matches!(found, Outcome::Invalid(_))),
+fn expected_outcome(expects: ExpectedOutcome, found: Outcome, note: &mut String) -> Outcome {
+    let (wanted, green) = match expects {
+        ExpectedOutcome::Pass => return found,
+        ExpectedOutcome::Differs => ("a difference", found == Outcome::Fail),
+        ExpectedOutcome::Fails => ("a failure", found == Outcome::Fail),
+        ExpectedOutcome::Invalid => ("an invalid test", matches!(found, Outcome::Invalid(_))),
     };
     let said = if note.is_empty() { "no difference found".to_string() } else { std::mem::take(note) };
     *note = format!("control, expects {wanted}: {said}");
@@ -356,18 +218,6 @@ fn expected_outcome(claim: &Claim, found: Outcome, note: &mut String) -> Outcome
         _ if green => Outcome::Pass,
         Outcome::Invalid(reason) => Outcome::Invalid(reason),
         _ => Outcome::Fail,
-    }
-}
-
-impl Evidence {
-    fn p_value(&self) -> Option<f64> {
-        match self {
-            Evidence::Test { test, .. } | Evidence::Sum { test } | Evidence::Fit { test, .. } => {
-                Some(test.p_value).filter(|p| !p.is_nan())
-            }
-            Evidence::Efficiency(shown) => Some(shown.test.p_value).filter(|p| !p.is_nan()),
-            Evidence::None(_) | Evidence::Identity { .. } | Evidence::Exact { .. } => None,
-        }
     }
 }
 

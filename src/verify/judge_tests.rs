@@ -4,18 +4,18 @@ use serde_json::json;
 
 use super::super::verdict::{exit_code, to_csv};
 use super::*;
-use crate::results::record::{Against, Bias, Comparison, Quantity};
-use crate::results::sample::{PASSES, judged, quantity, set_observables, stored, uniform};
+use crate::results::record::{Against, Bias, Claim, ClaimKind, Comparison, ExpectedOutcome, Quantity};
+use crate::results::sample::{PASSES, claim, judged, quantity, set_observables, stored, uniform};
 
 /// A record with one claim, of this kind and expectation, and one comparison.
 fn with_claim(
     mut s: Stored,
-    kind: &str,
-    expect: Option<&str>,
+    kind: ClaimKind,
+    expects: ExpectedOutcome,
     against: Against,
     detect: Option<f64>,
 ) -> Stored {
-    s.record.claims = json!([{"name": "c", "expect": expect, kind: {}}]);
+    s.record.statements = vec![Claim { expects, ..claim("c", kind) }];
     s.record.comparisons = vec![Comparison { claim: 0, quantity: quantity("mis", 0), against, detect }];
     s
 }
@@ -35,7 +35,7 @@ fn one(s: &Stored) -> Verdict {
 }
 
 fn equals(s: Stored, v: f64, error: f64, detect: Option<f64>) -> Verdict {
-    one(&with_claim(s, "equals", None, value(v, error), detect))
+    one(&with_claim(s, ClaimKind::Equals, ExpectedOutcome::Pass, value(v, error), detect))
 }
 
 fn assert_invalid(v: &Verdict, what: &str) {
@@ -46,29 +46,30 @@ fn assert_invalid(v: &Verdict, what: &str) {
 #[test]
 fn a_mean_equals_its_value_and_not_another() {
     let good = equals(stored(0.1), 1.0, 0.0, None);
-    assert_eq!((&good.outcome, good.test.as_str(), good.dof), (&Outcome::Pass, "t", 63.0));
+    assert_eq!((&good.outcome, &good.test, good.dof), (&Outcome::Pass, &Some(TestKind::T), Some(63.0)));
     // Standard error 0.1 / 16; one test at level 1e-6 sees 8.0 of them.
-    assert!((good.detectable - 8.0 * 0.1 / 16.0).abs() < 0.01, "{}", good.detectable);
+    assert!((good.detectable.expect("a size") - 8.0 * 0.1 / 16.0).abs() < 0.01, "{good:?}");
     let bad = equals(stored(0.1), 1.06, 0.0, None);
     assert_eq!(bad.outcome, Outcome::Fail);
-    assert!(bad.adjusted_p < FAMILY_LEVEL && bad.statistic < -8.0, "{bad:?}");
+    assert!(bad.adjusted_p < Some(FAMILY_LEVEL) && bad.statistic < Some(-8.0), "{bad:?}");
     assert!(bad.note.starts_with("off by -5."), "{}", bad.note);
 }
 
 #[test]
 fn a_claim_made_after_the_run_is_not_green() {
-    let mut s = with_claim(stored(0.1), "equals", None, value(1.0, 0.0), None);
+    let mut s = with_claim(stored(0.1), ClaimKind::Equals, ExpectedOutcome::Pass, value(1.0, 0.0), None);
     s.record.post_hoc = vec![0];
     assert_invalid(&one(&s), "post hoc");
     // Nor is a control that expects invalidity.
-    let mut s = with_claim(stored(0.1), "equals", Some("invalid"), value(1.0, 0.0), None);
+    let mut s =
+        with_claim(stored(0.1), ClaimKind::Equals, ExpectedOutcome::Invalid, value(1.0, 0.0), None);
     s.record.post_hoc = vec![0];
     assert_invalid(&one(&s), "post hoc");
 }
 
 #[test]
 fn two_silences_agree_on_nothing() {
-    let mut s = with_claim(stored(0.1), "agree", None, other(false), None);
+    let mut s = with_claim(stored(0.1), ClaimKind::Agree, ExpectedOutcome::Pass, other(false), None);
     set_observables(&mut s, "mis", |_, _, _| 0.0);
     set_observables(&mut s, "snee", |_, _, _| 0.0);
     assert_invalid(&one(&s), "neither side scored anything");
@@ -78,7 +79,7 @@ fn two_silences_agree_on_nothing() {
 fn a_stated_error_widens_the_test() {
     let wide = equals(stored(0.1), 1.06, 0.05, None);
     assert_eq!(wide.outcome, Outcome::Pass);
-    assert!(wide.dof > 1e4, "nearly all the error is known: {}", wide.dof);
+    assert!(wide.dof > Some(1e4), "nearly all the error is known: {wide:?}");
 }
 
 #[test]
@@ -95,7 +96,7 @@ fn an_expected_zero_has_an_absolute_detectable() {
     set_observables(&mut s, "mis", |i, _, _| 0.1 * uniform(i));
     let v = equals(s, 0.0, 0.0, Some(0.1));
     assert_eq!(v.outcome, Outcome::Pass);
-    assert!((v.detectable - 0.05).abs() < 0.01, "{}", v.detectable);
+    assert!((v.detectable.expect("a size") - 0.05).abs() < 0.01, "{v:?}");
 }
 
 #[test]
@@ -106,12 +107,12 @@ fn no_variance_passes_only_at_the_value() {
         s
     };
     let good = equals(exact(0.3), 0.3, 0.0, None);
-    assert_eq!((good.outcome, good.test.as_str()), (Outcome::Pass, "identity"));
+    assert_eq!((good.outcome, good.test), (Outcome::Pass, Some(TestKind::Identity)));
     assert_eq!(equals(exact(0.3), 0.3 * (1.0 + 1e-13), 0.0, None).outcome, Outcome::Pass);
     assert_eq!(equals(exact(0.3), 0.3 * (1.0 + 1e-11), 0.0, None).outcome, Outcome::Fail);
     assert_eq!(equals(exact(0.0), 0.0, 0.0, None).outcome, Outcome::Pass);
     // A published value's own error may explain a deviation, but not that nothing was scored.
-    assert_eq!(equals(exact(0.3), 0.3001, 1e-4, None).test, "stated error");
+    assert_eq!(equals(exact(0.3), 0.3001, 1e-4, None).test, Some(TestKind::StatedError));
     assert_eq!(equals(exact(0.3), 0.3001, 1e-4, None).outcome, Outcome::Pass);
     assert_eq!(equals(exact(0.3), 0.31, 1e-4, None).outcome, Outcome::Fail);
     assert_eq!(equals(exact(0.0), 1e-4, 1e-4, None).outcome, Outcome::Fail);
@@ -121,14 +122,16 @@ fn no_variance_passes_only_at_the_value() {
 fn rounding_noise_is_no_variance() {
     let mut s = stored(0.1);
     set_observables(&mut s, "mis", |i, _, _| 1.0 + 1e-15 * uniform(i));
-    assert_eq!(equals(s, 1.0, 0.0, None).test, "identity");
+    assert_eq!(equals(s, 1.0, 0.0, None).test, Some(TestKind::Identity));
 }
 
 #[test]
 fn estimators_agree_and_differ() {
-    let agree = |s: Stored, paired| one(&with_claim(s, "agree", None, other(paired), Some(0.1)));
+    let agree = |s: Stored, paired| {
+        one(&with_claim(s, ClaimKind::Agree, ExpectedOutcome::Pass, other(paired), Some(0.1)))
+    };
     let good = agree(stored(0.1), false);
-    assert_eq!((good.outcome, good.test.as_str()), (Outcome::Pass, "welch t"));
+    assert_eq!((good.outcome, good.test), (Outcome::Pass, Some(TestKind::WelchT)));
     assert_eq!(good.estimators, "mis vs snee");
     // A defect of 2 % that only pairing can see: both play the same noise.
     let mut s = stored(0.1);
@@ -142,8 +145,8 @@ fn estimators_agree_and_differ() {
 fn identical_paired_runs_are_an_identity() {
     let mut s = stored(0.1);
     ["mis", "snee"].iter().for_each(|e| set_observables(&mut s, e, |i, _, _| 1.0 + uniform(i)));
-    let v = one(&with_claim(s, "agree", None, other(true), Some(0.1)));
-    assert_eq!((v.outcome, v.test.as_str()), (Outcome::Pass, "identity"));
+    let v = one(&with_claim(s, ClaimKind::Agree, ExpectedOutcome::Pass, other(true), Some(0.1)));
+    assert_eq!((v.outcome, v.test), (Outcome::Pass, Some(TestKind::Identity)));
 }
 
 #[test]
@@ -177,7 +180,8 @@ fn what_a_test_cannot_rest_on_is_invalid() {
     few.record.cells[0].runs[0].passes = 252;
     assert_invalid(&equals(few, 1.0, 0.0, None), "too few passes");
 
-    let mut absent = with_claim(stored(0.1), "equals", None, value(1.0, 0.0), None);
+    let mut absent =
+        with_claim(stored(0.1), ClaimKind::Equals, ExpectedOutcome::Pass, value(1.0, 0.0), None);
     absent.record.comparisons[0].quantity.estimator = "nobody".into();
     assert_invalid(&one(&absent), "does not hold");
 }
@@ -203,21 +207,23 @@ fn heavy_tails_are_invalid() {
 fn a_biased_estimator_agrees_with_nothing() {
     let mut s = stored(0.1);
     s.record.cells[0].runs[1].bias = Bias::Biased("diffusion".into());
-    let agree =
-        |s: &Stored, expect| one(&with_claim(s.clone(), "agree", expect, other(false), Some(0.1)));
-    assert_invalid(&agree(&s, None), "diffusion");
-    assert_eq!(agree(&s, Some("invalid")).outcome, Outcome::Pass);
+    let agree = |s: &Stored, expects| {
+        one(&with_claim(s.clone(), ClaimKind::Agree, expects, other(false), Some(0.1)))
+    };
+    assert_invalid(&agree(&s, ExpectedOutcome::Pass), "diffusion");
+    assert_eq!(agree(&s, ExpectedOutcome::Invalid).outcome, Outcome::Pass);
     set_observables(&mut s, "snee", |i, _, _| 2.0 + 0.1 * uniform(i));
-    assert_eq!(agree(&s, Some("differs")).outcome, Outcome::Pass);
+    assert_eq!(agree(&s, ExpectedOutcome::Differs).outcome, Outcome::Pass);
 }
 
 #[test]
 fn controls_are_green_when_they_find_what_they_expect() {
-    let control = |expect, v| one(&with_claim(stored(0.1), "equals", Some(expect), value(v, 0.0), None));
-    assert_eq!(control("differs", 1.2).outcome, Outcome::Pass);
-    assert_eq!(control("differs", 1.0).outcome, Outcome::Fail);
-    assert!(control("differs", 1.0).note.contains("no difference found"));
-    assert_eq!(control("invalid", 1.0).outcome, Outcome::Fail);
+    let control =
+        |expects, v| one(&with_claim(stored(0.1), ClaimKind::Equals, expects, value(v, 0.0), None));
+    assert_eq!(control(ExpectedOutcome::Differs, 1.2).outcome, Outcome::Pass);
+    assert_eq!(control(ExpectedOutcome::Differs, 1.0).outcome, Outcome::Fail);
+    assert!(control(ExpectedOutcome::Differs, 1.0).note.contains("no difference found"));
+    assert_eq!(control(ExpectedOutcome::Invalid, 1.0).outcome, Outcome::Fail);
 }
 
 #[test]
@@ -226,14 +232,15 @@ fn many_tests_share_one_level() {
     let many: Vec<(&str, f64)> = std::iter::repeat_n(("a", 1.04), 1000).collect();
     let many = judge_alone(&judged(&many));
     assert_eq!(alone[0].adjusted_p, alone[0].p_value);
-    assert!((many[0].adjusted_p / many[0].p_value - 1000.0).abs() < 1e-6);
+    let ratio = many[0].adjusted_p.zip(many[0].p_value).map(|(adjusted, p)| adjusted / p);
+    assert!((ratio.expect("p-values") - 1000.0).abs() < 1e-6);
     assert!(many[0].detectable > alone[0].detectable);
     assert_eq!((exit_code(&alone), exit_code(&many)), (1, 0));
 }
 
 /// A table: 30 cells, each with its own noise and `off` standard errors away from its value.
 fn table(off: f64) -> Stored {
-    let mut s = with_claim(stored(0.1), "equals", None, value(1.0, 0.0), None);
+    let mut s = with_claim(stored(0.1), ClaimKind::Equals, ExpectedOutcome::Pass, value(1.0, 0.0), None);
     let (cell, path) = (s.record.cells[0].clone(), s.record.cells[0].runs[0].moments.clone());
     s.record.comparisons.clear();
     for c in 0..30 {
@@ -262,7 +269,7 @@ fn a_table_is_also_judged_as_a_whole() {
     let good = judge_alone(&table(0.0));
     assert_eq!(good.len(), 31);
     assert!(good.iter().all(Verdict::is_green));
-    assert_eq!((good[30].test.as_str(), good[30].dof), ("sum of z^2", 30.0));
+    assert_eq!((&good[30].test, good[30].dof), (&Some(TestKind::SumOfSquares), Some(30.0)));
     assert_eq!(good[30].cell, "all 30 cells");
     // Three standard errors in every cell, of alternating sign: no cell alone can tell.
     let bad = judge_alone(&table(3.0));
@@ -290,11 +297,12 @@ fn exit_codes() {
 /// A record whose mean is `off` standard errors from the claimed value, and one of a second look.
 fn two_looks(off: f64, second_off: f64) -> (Stored, Stored) {
     let at = |off: f64, salt: u64| {
-        let mut s = with_claim(stored(0.1), "equals", None, value(1.0, 0.0), None);
+        let mut s =
+            with_claim(stored(0.1), ClaimKind::Equals, ExpectedOutcome::Pass, value(1.0, 0.0), None);
         set_observables(&mut s, "mis", |i, _, _| 0.1 * uniform(i + salt));
         let now = judge_alone(&s);
         // Moved so that the statistic is exactly `off`.
-        let (mean, error) = (now[0].value, now[0].std_error);
+        let (mean, error) = now[0].value.zip(now[0].std_error).expect("a mean");
         set_observables(&mut s, "mis", |i, _, _| 1.0 - mean + off * error + 0.1 * uniform(i + salt));
         s
     };
@@ -313,7 +321,7 @@ fn a_first_look_between_the_levels_wants_a_second() {
     let waiting = judged_twice(4.0, None);
     assert_eq!(waiting.verdicts[0].outcome, Outcome::Fail);
     assert!(waiting.verdicts[0].note.ends_with("wants a second look on fresh streams"));
-    assert_eq!(waiting.wanted, [Wanted { case: 0, subject: Measured::Quantity(quantity("mis", 0)) }]);
+    assert_eq!(waiting.wanted, [LookAgain { case: 0, subject: Measured::Quantity(quantity("mis", 0)) }]);
     for off in [3.0, 6.5] {
         let at_once = judged_twice(off, None);
         assert!(at_once.wanted.is_empty(), "{off}");
@@ -332,7 +340,7 @@ fn the_second_look_decides() {
     assert!(cleared.wanted.is_empty());
     let confirmed = judged_twice(4.0, Some(4.0));
     assert_eq!(confirmed.verdicts[0].outcome, Outcome::Fail);
-    assert!(confirmed.verdicts[0].second_p < 5e-4);
+    assert!(confirmed.verdicts[0].second_p.is_some_and(|p| p < 5e-4));
     assert!(confirmed.verdicts[0].note.ends_with("at both looks"));
     // What needed no second look does not listen to one.
     assert!(judged_twice(3.0, Some(9.0)).verdicts[0].is_green());
@@ -352,16 +360,16 @@ fn a_second_look_that_means_nothing_clears_nothing() {
 
 #[test]
 fn shared_errors_and_controls_have_one_look() {
-    let claim = |error: f64, expect| {
+    let claim = |error: f64, expects| {
         let (mut main, retest) = two_looks(4.0, 0.0);
-        main.record.claims = json!([{"name": "c", "expect": expect, "equals": {}}]);
+        main.record.statements[0].expects = expects;
         main.record.comparisons[0].against = value(1.0, error);
         judge(&[Case { main: &main, retest: Some(&retest) }], Looks::Two).verdicts.remove(0)
     };
     let error = 0.1 / 16.0;
-    assert!(claim(0.01 * error, None).note.contains("cleared"));
-    let shared = claim(0.03 * error, None);
+    assert!(claim(0.01 * error, ExpectedOutcome::Pass).note.contains("cleared"));
+    let shared = claim(0.03 * error, ExpectedOutcome::Pass);
     assert!(shared.is_green() && shared.note.is_empty(), "{shared:?}");
-    assert!(shared.detectable > claim(0.01 * error, None).detectable);
-    assert_eq!(claim(0.0, Some("differs")).outcome, Outcome::Fail);
+    assert!(shared.detectable > claim(0.01 * error, ExpectedOutcome::Pass).detectable);
+    assert_eq!(claim(0.0, ExpectedOutcome::Differs).outcome, Outcome::Fail);
 }

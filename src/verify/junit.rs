@@ -25,8 +25,8 @@ pub fn to_junit(verdicts: &[Verdict]) -> String {
 
 fn case(v: &Verdict) -> String {
     // Of a sampler, the test says what is tested.
-    let what = if v.observable.is_empty() { &v.test } else { &v.observable };
-    let parts = [&v.cell, &v.band, what, &v.class, &v.estimators];
+    let what = if v.observable.is_empty() { v.test_name() } else { v.observable.clone() };
+    let parts = [&v.cell, &v.band, &what, &v.class, &v.estimators];
     let name: Vec<&str> =
         parts.iter().map(|part| part.as_str()).filter(|part| !part.is_empty()).collect();
     let head = format!(
@@ -39,13 +39,14 @@ fn case(v: &Verdict) -> String {
         Outcome::Fail => "failure",
         Outcome::Underpowered | Outcome::Invalid(_) => "error",
     };
-    let text =
-        format!("{} measured {:e}, expected {:e}, p {:e}", v.test, v.value, v.expected, v.p_value);
+    let numbers = [("measured", v.value), ("expected", v.expected), ("p", v.p_value)];
+    let numbers = numbers.into_iter().filter_map(|(name, x)| Some(format!("{name} {:e}", x?)));
+    let text = format!("{} {}", v.test_name(), numbers.collect::<Vec<_>>().join(", "));
     format!(
         "{head}>\n      <{element} type=\"{}\" message=\"{}\">{}</{element}>\n    </testcase>\n",
         v.outcome,
         escape(&v.note),
-        escape(text.trim_start())
+        escape(text.trim())
     )
 }
 

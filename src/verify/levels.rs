@@ -42,20 +42,26 @@ pub const SHARED_ERROR: f64 = 0.02;
 /// The probability with which a difference of size `detectable` is found.
 pub const POWER: f64 = 0.99;
 
-/// How many looks a judge has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How many looks a family of tests has.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Looks {
-    /// A record by itself, without second looks: one look at [`FAMILY_LEVEL`].
-    One,
+    /// One look, at this family-wise level.
+    One {
+        /// The probability of any false failure.
+        level: f64,
+    },
     /// Second looks are, or can be, at hand.
     Two,
 }
 
 impl Looks {
+    /// A record by itself, without second looks.
+    pub const ALONE: Looks = Looks::One { level: FAMILY_LEVEL };
+
     /// The family-wise level at which a test fails at once.
     pub fn at_once(self) -> f64 {
         match self {
-            Looks::One => FAMILY_LEVEL,
+            Looks::One { level } => level,
             Looks::Two => AT_ONCE,
         }
     }

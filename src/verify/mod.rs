@@ -29,12 +29,15 @@ pub mod weights;
 /// Evidence that adds up over nights.
 pub mod nights;
 
-/// Claims that a record comes out again.
-mod reproduction;
-
+/// What one test shows by itself.
+mod evidence;
 /// Tests under one family-wise level.
 mod family;
+/// Means against values and against each other.
+mod means;
+/// Claims that a record comes out again.
+mod reproduction;
 /// What a sampler's record shows.
 mod sampler;
-/// What one comparison shows by itself.
+/// What the comparisons of a record show.
 mod trial;

@@ -27,13 +27,13 @@ pub struct Nights {
     /// Names of the fresh streams that were counted.
     pub tokens: Vec<String>,
     /// By experiment, claim and quantity.
-    pub tests: BTreeMap<String, Evidence>,
+    pub tests: BTreeMap<String, Accumulated>,
 }
 
 /// What the nights say against one statement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Evidence {
+pub struct Accumulated {
     /// What fixes the numbers: another one begins again.
     pub code: String,
     /// Nights counted.
@@ -52,16 +52,17 @@ impl Nights {
             return false;
         }
         self.tokens.push(token.into());
-        for v in verdicts.iter().filter(|v| !v.p_value.is_nan() && !v.control) {
+        for v in verdicts.iter().filter(|v| !v.control) {
+            let Some(p) = v.p_value else { continue };
             let code = code(&v.experiment);
-            let fresh = Evidence { code: code.clone(), nights: 0, log_e: 0.0, peak: 0.0 };
+            let fresh = Accumulated { code: code.clone(), nights: 0, log_e: 0.0, peak: 0.0 };
             let evidence = self.tests.entry(name(v)).or_insert_with(|| fresh.clone());
             if evidence.code != code {
                 *evidence = fresh;
             }
             evidence.nights += 1;
             // A p-value that underflows counts as the smallest number.
-            evidence.log_e += calibrated(v.p_value.max(f64::MIN_POSITIVE));
+            evidence.log_e += calibrated(p.max(f64::MIN_POSITIVE));
             evidence.peak = evidence.peak.max(evidence.log_e);
         }
         true
@@ -86,7 +87,7 @@ impl Nights {
     }
 
     /// The tests whose evidence has reached the threshold, with it.
-    pub fn alarms(&self) -> Vec<(&str, &Evidence)> {
+    pub fn alarms(&self) -> Vec<(&str, &Accumulated)> {
         let threshold = self.threshold();
         let over = self.tests.iter().filter(|(_, evidence)| evidence.peak >= threshold);
         over.map(|(name, evidence)| (name.as_str(), evidence)).collect()
@@ -95,9 +96,8 @@ impl Nights {
 
 /// What names a test from night to night.
 fn name(v: &Verdict) -> String {
-    let parts =
-        [&v.experiment, &v.claim, &v.cell, &v.band, &v.observable, &v.class, &v.estimators, &v.test];
-    parts.map(String::as_str).join(" | ")
+    let parts = [&v.experiment, &v.claim, &v.cell, &v.band, &v.observable, &v.class, &v.estimators];
+    format!("{} | {}", parts.map(String::as_str).join(" | "), v.test_name())
 }
 
 #[cfg(test)]
@@ -108,7 +108,7 @@ mod tests {
 
     fn night(p: f64) -> Vec<Verdict> {
         let mut verdicts = judge_alone(&judged(&[("c", 1.0)]));
-        verdicts[0].p_value = p;
+        verdicts[0].p_value = Some(p);
         verdicts
     }
 

@@ -14,9 +14,11 @@
 //! Masses come with bounds of their quadrature errors. Where those could shift a test by more than
 //! `stats::goodness` allows, or D7 by more than 1e-4, the quadrature is unresolved: the test is invalid.
 
-use super::trial::{Claim, Evidence, Fit, Item, Trial};
-use super::verdict::Verdict;
-use crate::results::record::Record;
+use super::evidence::{CountsFit, Evidence};
+use super::family::Finding;
+use super::trial::{Subject, Trial, blank};
+use super::verdict::{TestKind, Verdict};
+use crate::results::record::SamplerComparison;
 use crate::results::sampler::{Bins, ContrastRun, Delta, NullMass, OWN_DENSITY, SamplerRun};
 use crate::results::store::Stored;
 use crate::stats::goodness::{Bin, contrast, pearson, proportion};
@@ -30,75 +32,41 @@ const TOTAL_BOUND: f64 = 1e-4;
 /// Sampling errors and deviations of contrasts below this, relative to the value, are rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// All that the claims of a record say of samplers.
-pub(super) fn trials(stored: &Stored) -> Vec<Trial> {
+/// All tests that comparison `index` of samplers makes.
+pub(super) fn trials(stored: &Stored, index: usize, comparison: &SamplerComparison) -> Vec<Trial> {
     let record = &stored.record;
-    let claims = record.claims.as_array().map_or(0, Vec::len);
-    let of_claim = |index: usize| {
-        let words = &record.claims[index]["sampler"];
-        let named = words["samplers"].as_array();
-        let names = move |run: &&SamplerRun| {
-            named.is_none_or(|names| names.iter().any(|name| name == run.sampler.as_str()))
-        };
-        let runs = record.samplers.iter().filter(move |run| !words.is_null() && names(run));
-        runs.flat_map(move |run| Rows::new(stored, index, run).all())
+    let claim = &record.statements[comparison.claim];
+    let verdict = Verdict { estimators: comparison.sampler.clone(), ..blank(record, claim) };
+    let findings = match record.samplers.iter().find(|run| run.sampler == comparison.sampler) {
+        Some(run) => Tests { stored, run, verdict, findings: Vec::new() }.all(comparison.detect),
+        None => {
+            let nothing = Evidence::Nothing("the record does not hold this sampler".into());
+            vec![Finding::new(verdict, nothing)]
+        }
     };
-    let missing = (0..claims).flat_map(|index| missing(record, index));
-    (0..claims).flat_map(of_claim).chain(missing).collect()
+    let trial = |finding| Trial::new(record, comparison.claim, Subject::Sampler(index), finding);
+    findings.into_iter().map(trial).collect()
 }
 
-/// Samplers that a claim names and the record of a first look does not hold.
-fn missing(record: &Record, index: usize) -> Vec<Trial> {
-    let names = record.claims[index]["sampler"]["samplers"].as_array().into_iter().flatten();
-    let held = |name: &&str| record.samplers.iter().any(|run| run.sampler == *name);
-    names
-        .filter_map(|name| name.as_str())
-        .filter(|name| !held(name) && record.stage == "main")
-        .map(|name| {
-            let nothing = Evidence::None("the record does not hold this sampler".into());
-            blank(record, index, name, "", nothing)
-        })
-        .collect()
-}
-
-fn blank(record: &Record, index: usize, sampler: &str, test: &str, evidence: Evidence) -> Trial {
-    let claim = Claim::of(record, index);
-    let verdict =
-        Verdict { estimators: sampler.into(), test: test.into(), ..super::trial::blank(record, &claim) };
-    Trial {
-        item: Item::Sampler,
-        claim,
-        claim_index: index,
-        evidence,
-        detect: None,
-        one_look: false,
-        reference: None,
-        verdict,
-    }
-}
-
-/// The rows of one sampler under one claim.
-struct Rows<'a> {
+/// The tests of one sampler.
+struct Tests<'a> {
     stored: &'a Stored,
-    index: usize,
     run: &'a SamplerRun,
-    rows: Vec<Trial>,
+    /// With the names filled in.
+    verdict: Verdict,
+    findings: Vec<Finding>,
 }
 
-impl<'a> Rows<'a> {
-    fn new(stored: &'a Stored, index: usize, run: &'a SamplerRun) -> Rows<'a> {
-        Rows { stored, index, run, rows: Vec::new() }
-    }
-
-    fn push(&mut self, test: &str, evidence: Evidence) -> &mut Trial {
+impl Tests<'_> {
+    fn push(&mut self, test: TestKind, evidence: Evidence) -> &mut Finding {
         let evidence = match self.objection() {
-            Some(objection) => Evidence::None(objection),
+            Some(objection) => Evidence::Nothing(objection),
             None => evidence,
         };
-        let trial = blank(&self.stored.record, self.index, &self.run.sampler, test, evidence);
-        self.rows.push(trial);
-        let last = self.rows.len() - 1;
-        &mut self.rows[last]
+        let verdict = Verdict { test: Some(test), ..self.verdict.clone() };
+        self.findings.push(Finding::new(verdict, evidence));
+        let last = self.findings.len() - 1;
+        &mut self.findings[last]
     }
 
     /// Why nothing that is said of this sampler is worth anything.
@@ -112,40 +80,38 @@ impl<'a> Rows<'a> {
         (values > 0).then(|| format!("{values} values of contrasts are not finite"))
     }
 
-    fn all(mut self) -> Vec<Trial> {
+    fn all(mut self, detect: Option<f64>) -> Vec<Finding> {
         let run = self.run;
-        self.bins("chi2 coarse", Some(&run.coarse), true);
-        self.bins("chi2 fine", run.fine.as_ref(), true);
-        self.bins("serial", run.serial.as_ref(), false);
-        let detect = self.stored.record.claims[self.index]["sampler"]["detect"].as_f64();
-        if let Some(row) = self.rows.iter_mut().find(|row| row.verdict.test == "chi2 coarse") {
-            row.detect = detect;
-        }
+        self.bins(TestKind::Chi2Coarse, Some(&run.coarse), detect);
+        self.bins(TestKind::Chi2Fine, run.fine.as_ref(), None);
+        self.bins(TestKind::Serial, run.serial.as_ref(), None);
         run.contrasts.iter().for_each(|contrast| self.contrast(contrast));
         run.deltas.iter().for_each(|delta| self.delta(delta));
         self.null();
         self.own_density();
         self.total();
         self.outside();
-        self.rows
+        self.findings
     }
 
-    fn bins(&mut self, test: &str, path: Option<&String>, is_everything: bool) {
+    fn bins(&mut self, test: TestKind, path: Option<&String>, detect: Option<f64>) {
         let Some(path) = path else { return };
         let Some(bins) = self.stored.bins(path) else {
-            self.push(test, Evidence::None("the record does not hold its bins".into()));
+            self.push(test, Evidence::Nothing("the record does not hold its bins".into()));
             return;
         };
         if bins.mass.iter().filter(|mass| **mass > 0.0).count() < 2 {
             return; // one outcome has all the mass: its own row says what there is to say
         }
         let counted: f64 = bins.observed.iter().sum();
+        // Pairs with a draw that is in no bin are not counted.
+        let is_everything = test != TestKind::Serial;
         let evidence = if is_everything && counted != self.run.samples as f64 {
-            Evidence::None(format!("the bins hold {counted} draws of {}", self.run.samples))
+            Evidence::Nothing(format!("the bins hold {counted} draws of {}", self.run.samples))
         } else {
             fit(&bins)
         };
-        self.push(test, evidence);
+        self.push(test, evidence).detect = detect;
     }
 
     fn contrast(&mut self, run: &ContrastRun) {
@@ -154,66 +120,68 @@ impl<'a> Rows<'a> {
         let expected = if run.expected.abs() <= run.bound { 0.0 } else { run.expected };
         let rounding = ROUNDING * moments.mean.abs().max(expected.abs());
         let evidence = if moments.n != self.run.samples {
-            Evidence::None(format!("{} values for {} draws", moments.n, self.run.samples))
+            Evidence::Nothing(format!("{} values for {} draws", moments.n, self.run.samples))
         } else if moments.std_error() <= rounding {
             let holds = (moments.mean - expected).abs() <= run.bound + rounding;
             let said = format!("no sampling error: {:e}, expected {expected:e}", moments.mean);
             Evidence::Exact { holds, said }
         } else {
             match contrast(&moments, expected, run.bound) {
-                Ok(found) => Evidence::Test { difference: found.estimate, test: found.test },
-                Err(refusal) => Evidence::None(refusal.to_string()),
+                Ok(found) => Evidence::of_difference(found.estimate),
+                Err(refusal) => Evidence::Nothing(refusal.to_string()),
             }
         };
-        let verdict = &mut self.push(&format!("contrast {}", run.name), evidence).verdict;
-        (verdict.value, verdict.std_error) = (moments.mean, moments.std_error());
-        (verdict.expected, verdict.expected_error) = (expected, run.bound);
+        let finding = self.push(TestKind::Contrast(run.name.clone()), evidence);
+        finding.verdict.set_value(moments.mean, moments.std_error());
+        finding.verdict.set_expected(expected, run.bound);
+        finding.relative_to = expected;
     }
 
     fn delta(&mut self, delta: &Delta) {
-        let test = format!("delta {}", delta.name);
+        let test = TestKind::Delta(delta.name.clone());
         if delta.inexact > 0 {
             let said =
                 format!("{} of {} values are not what they have to be", delta.inexact, delta.observed);
-            self.push(&test, Evidence::Exact { holds: false, said });
+            self.push(test, Evidence::Exact { holds: false, said });
         } else {
-            self.share(&test, delta.observed, delta.mass);
+            self.share(test, delta.observed, delta.mass);
         }
     }
 
     fn null(&mut self) {
         match self.run.null {
-            NullMass::Stated(mass) => self.share("null", self.run.nulls, mass),
+            NullMass::Stated(mass) => self.share(TestKind::Null, self.run.nulls, mass),
             NullMass::Never => {
                 let said = format!("{} draws returned nothing", self.run.nulls);
-                self.push("null", Evidence::Exact { holds: self.run.nulls == 0, said });
+                self.push(TestKind::Null, Evidence::Exact { holds: self.run.nulls == 0, said });
             }
             NullMass::Remainder => {} // a bin like others
         }
     }
 
-    fn share(&mut self, test: &str, count: u64, mass: f64) {
+    fn share(&mut self, kind: TestKind, count: u64, mass: f64) {
         let n = self.run.samples;
         let evidence = match proportion(count, n, mass, 0.0) {
             Ok(found) => {
                 let test = Test { statistic: count as f64, dof: f64::NAN, p_value: found.p_value };
                 let said = format!("{count} of {n}, expected {:.1}", mass * n as f64);
-                Evidence::Fit { fit: Fit::Share(found), test, said }
+                Evidence::Counts { fit: CountsFit::Share(found), test, said }
             }
-            Err(refusal) => Evidence::None(refusal.to_string()),
+            Err(refusal) => Evidence::Nothing(refusal.to_string()),
         };
         let share = count as f64 / n as f64;
-        let verdict = &mut self.push(test, evidence).verdict;
-        (verdict.value, verdict.std_error) = (share, (share * (1.0 - share) / n as f64).sqrt());
-        (verdict.expected, verdict.expected_error) = (mass, 0.0);
+        let verdict = &mut self.push(kind, evidence).verdict;
+        verdict.set_value(share, (share * (1.0 - share) / n as f64).sqrt());
+        verdict.set_expected(mass, 0.0);
     }
 
     fn own_density(&mut self) {
         let (n, largest) = (self.run.own_density_differs, self.run.own_density_largest);
         let said =
             format!("{n} draws whose own density is another; largest relative difference {largest:.1e}");
-        let verdict = &mut self.push("identity D5", Evidence::Exact { holds: n == 0, said }).verdict;
-        (verdict.statistic, verdict.detectable) = (largest, OWN_DENSITY);
+        let evidence = Evidence::Exact { holds: n == 0, said };
+        let verdict = &mut self.push(TestKind::OwnDensity, evidence).verdict;
+        (verdict.statistic, verdict.detectable) = (Some(largest), Some(OWN_DENSITY));
     }
 
     fn total(&mut self) {
@@ -226,18 +194,19 @@ impl<'a> Rows<'a> {
         let evidence = if excess > bound || bound <= TOTAL_BOUND {
             Evidence::Exact { holds: excess <= bound, said }
         } else {
-            Evidence::None(format!("quadrature unresolved: {said}"))
+            Evidence::Nothing(format!("quadrature unresolved: {said}"))
         };
-        let verdict = &mut self.push("identity D7", evidence).verdict;
-        (verdict.value, verdict.std_error, verdict.expected) = (total, bound, 1.0);
-        (verdict.statistic, verdict.detectable) = (total - 1.0, bound);
+        let verdict = &mut self.push(TestKind::TotalMass, evidence).verdict;
+        verdict.set_value(total, bound);
+        verdict.expected = Some(1.0);
+        (verdict.statistic, verdict.detectable) = (Some(total - 1.0), Some(bound));
     }
 
     fn outside(&mut self) {
         let nulls = if self.run.null == NullMass::Never { self.run.nulls } else { 0 };
         let n = self.run.outside.saturating_sub(nulls);
         let said = format!("{n} draws where the density is 0 or outside the chart");
-        self.push("outside", Evidence::Exact { holds: n == 0, said });
+        self.push(TestKind::Outside, Evidence::Exact { holds: n == 0, said });
     }
 }
 
@@ -261,8 +230,8 @@ fn fit(bins: &Bins) -> Evidence {
                 let (count, z) = (rows[i].count, z(&rows[i]));
                 format!("worst is bin {i}: {count}, expected {expected:.1}, {z:+.1} standard errors")
             });
-            Evidence::Fit { fit: Fit::Bins(found), test, said }
+            Evidence::Counts { fit: CountsFit::Bins(found), test, said }
         }
-        Err(refusal) => Evidence::None(refusal.to_string()),
+        Err(refusal) => Evidence::Nothing(refusal.to_string()),
     }
 }

@@ -5,7 +5,7 @@
 //! numbers the variances in the two ratios are the same as well, and only the costs differ by chance: the test is then
 //! wider than it need be. Another machine may truly have another ratio.
 
-use super::comparisons::{Row, comparisons};
+use super::comparisons::{EfficiencyRow, comparisons};
 use crate::math;
 use crate::results::record::CostMeasure;
 use crate::results::store::Stored;
@@ -22,9 +22,9 @@ const HALF_WIDTH: f64 = 1.96;
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimingRatio {
     /// The first record's.
-    pub before: Row,
+    pub before: EfficiencyRow,
     /// The second record's.
-    pub after: Row,
+    pub after: EfficiencyRow,
     /// The second's ratio over the first's.
     pub change: f64,
     /// Its 95 % interval.
@@ -42,29 +42,24 @@ impl TimingRatio {
 
 /// Every efficiency by CPU time that both records quote.
 pub fn timing_ratios(before: &Stored, after: &Stored) -> Vec<TimingRatio> {
-    let rows = |stored: &Stored| {
-        let rows = comparisons(stored).into_iter();
-        rows.filter(|row| row.cost == CostMeasure::Cpu && row.efficiency_ratio.is_finite())
-            .collect::<Vec<_>>()
-    };
-    let (before, after) = (rows(before), rows(after));
-    let name = |row: &Row| {
+    let name = |row: &EfficiencyRow| {
         [&row.cell, &row.band, &row.class, &row.metric, &row.baseline, &row.candidate].map(String::clone)
     };
-    let pairs: Vec<(Row, Row)> = before
-        .into_iter()
+    let after = comparisons(after);
+    let after: Vec<&EfficiencyRow> = after.iter().filter(|row| row.cost == CostMeasure::Cpu).collect();
+    let before = comparisons(before).into_iter().filter(|row| row.cost == CostMeasure::Cpu);
+    let pairs: Vec<(EfficiencyRow, EfficiencyRow, (f64, f64))> = before
         .filter_map(|row| {
-            let twin = after.iter().find(|other| name(other) == name(&row))?.clone();
-            Some((row, twin))
+            let twin = (*after.iter().find(|other| name(other) == name(&row))?).clone();
+            let change = log_change(row.quoted()?, twin.quoted()?);
+            Some((row, twin, change))
         })
         .collect();
-    let changes: Vec<(f64, f64)> = pairs.iter().map(|(a, b)| log_change(a, b)).collect();
-    let p: Vec<f64> = changes.iter().map(|(change, error)| normal_two_sided(change / error)).collect();
+    let p: Vec<f64> =
+        pairs.iter().map(|(_, _, (change, error))| normal_two_sided(change / error)).collect();
     let adjusted = holm(&p);
     let mut ratios = Vec::new();
-    for ((before, after), ((change, error), adjusted_p)) in
-        pairs.into_iter().zip(changes.into_iter().zip(adjusted))
-    {
+    for ((before, after, (change, error)), adjusted_p) in pairs.into_iter().zip(adjusted) {
         let interval = [-1.0, 1.0].map(|side| math::exp(change + side * HALF_WIDTH * error));
         ratios.push(TimingRatio { before, after, change: math::exp(change), interval, adjusted_p });
     }
@@ -72,10 +67,9 @@ pub fn timing_ratios(before: &Stored, after: &Stored) -> Vec<TimingRatio> {
 }
 
 /// Logarithm of the second ratio over the first, and its standard error.
-fn log_change(a: &Row, b: &Row) -> (f64, f64) {
-    let error = |row: &Row| math::ln(row.ci_high / row.ci_low) / (2.0 * HALF_WIDTH);
-    let change = math::ln(b.efficiency_ratio / a.efficiency_ratio);
-    (change, (error(a) * error(a) + error(b) * error(b)).sqrt())
+fn log_change(a: [f64; 3], b: [f64; 3]) -> (f64, f64) {
+    let error = |[_, low, high]: [f64; 3]| math::ln(high / low) / (2.0 * HALF_WIDTH);
+    (math::ln(b[0] / a[0]), (error(a) * error(a) + error(b) * error(b)).sqrt())
 }
 
 #[cfg(test)]

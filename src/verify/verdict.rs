@@ -2,7 +2,10 @@
 
 use std::fmt;
 
-use crate::results::csv_text::{self, number};
+use serde::{Serialize, Serializer};
+
+use crate::results::csv_text;
+use crate::results::record::CostMeasure;
 
 /// What verification says of one comparison. Only a pass is green.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,6 +20,12 @@ pub enum Outcome {
     Invalid(String),
 }
 
+impl Default for Outcome {
+    fn default() -> Outcome {
+        Outcome::Invalid("not judged".into())
+    }
+}
+
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self {
@@ -28,8 +37,123 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// One comparison's verdict. Numbers that do not apply are NaN.
-#[derive(Clone, Debug, PartialEq)]
+impl Serialize for Outcome {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// The tests that verdicts rest on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum TestKind {
+    /// Student's t of a mean against a value.
+    T,
+    /// Welch's t of two means.
+    WelchT,
+    /// Student's t of the differences of two runs on the same streams.
+    PairedT,
+    /// Equality to rounding, where there is no sampling error.
+    Identity,
+    /// A value without sampling error against one with a stated error.
+    StatedError,
+    /// Many cells of a claim at once.
+    SumOfSquares,
+    /// Variance times cost.
+    Efficiency(CostMeasure),
+    /// Passes that were played again.
+    Replay,
+    /// The checksum of a record's numbers.
+    Checksum,
+    /// Draws in few large bins.
+    Chi2Coarse,
+    /// Draws in many small bins.
+    Chi2Fine,
+    /// Pairs of consecutive draws.
+    Serial,
+    /// The mean of this function of a draw.
+    Contrast(String),
+    /// This discrete outcome.
+    Delta(String),
+    /// Draws that return nothing.
+    Null,
+    /// The density that a draw states against the density function.
+    OwnDensity,
+    /// All masses against 1.
+    TotalMass,
+    /// Draws where the density is 0, or outside the chart.
+    Outside,
+    /// Means of images, a seed being one observation.
+    TOfSeeds,
+    /// Means of images from the spread of independent pixels.
+    TOfPixels,
+    /// The squared bias of all pixels.
+    SquaredBias,
+    /// The same bits in two records.
+    Identical,
+    /// Two means of unknown correlation.
+    SumOfErrors,
+}
+
+impl TestKind {
+    /// Is it one that a claim on a sampler makes?
+    pub fn is_of_sampler(&self) -> bool {
+        use TestKind::{
+            Chi2Coarse, Chi2Fine, Contrast, Delta, Null, Outside, OwnDensity, Serial, TotalMass,
+        };
+        matches!(
+            self,
+            Chi2Coarse
+                | Chi2Fine
+                | Serial
+                | Contrast(_)
+                | Delta(_)
+                | Null
+                | OwnDensity
+                | TotalMass
+                | Outside
+        )
+    }
+}
+
+impl fmt::Display for TestKind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            TestKind::T => "t",
+            TestKind::WelchT => "welch t",
+            TestKind::PairedT => "paired t",
+            TestKind::Identity => "identity",
+            TestKind::StatedError => "stated error",
+            TestKind::SumOfSquares => "sum of z^2",
+            TestKind::Efficiency(CostMeasure::Counters) => "efficiency by counters",
+            TestKind::Efficiency(CostMeasure::Cpu) => "efficiency by CPU time",
+            TestKind::Replay => "replay",
+            TestKind::Checksum => "checksum",
+            TestKind::Chi2Coarse => "chi2 coarse",
+            TestKind::Chi2Fine => "chi2 fine",
+            TestKind::Serial => "serial",
+            TestKind::Contrast(name) => return write!(f, "contrast {name}"),
+            TestKind::Delta(name) => return write!(f, "delta {name}"),
+            TestKind::Null => "null",
+            TestKind::OwnDensity => "identity D5",
+            TestKind::TotalMass => "identity D7",
+            TestKind::Outside => "outside",
+            TestKind::TOfSeeds => "t of seeds",
+            TestKind::TOfPixels => "t of pixels",
+            TestKind::SquaredBias => "squared bias",
+            TestKind::Identical => "identical",
+            TestKind::SumOfErrors => "sum of errors",
+        })
+    }
+}
+
+impl Serialize for TestKind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// One comparison's verdict; as it stands here, a row of `verdicts.csv`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Verdict {
     /// Experiment name.
     pub experiment: String,
@@ -39,100 +163,53 @@ pub struct Verdict {
     pub band: String,
     /// Transport class.
     pub class: String,
-    /// The estimator; `a vs b` for two.
+    /// The estimator, or the sampler; `a vs b` for two.
     pub estimators: String,
     /// The claim's name, or its kind and place in the file.
     pub claim: String,
-    /// The test: `t`, `welch t`, `paired t`, `identity`, `stated error`, `sum of z^2`; of `judge` also `t of
-    /// seeds`, `t of pixels`, `squared bias`; of `compare` `identical`, `sum of errors`; empty for none.
-    pub test: String,
+    /// The test; none where it was not reached.
+    pub test: Option<TestKind>,
     /// Its statistic; for an identity the relative deviation.
-    pub statistic: f64,
+    pub statistic: Option<f64>,
     /// Two-sided p-value.
-    pub p_value: f64,
+    pub p_value: Option<f64>,
     /// Holm's adjusted p-value over the whole verification.
-    pub adjusted_p: f64,
+    pub adjusted_p: Option<f64>,
     /// The smallest true difference that would have been rejected with 99 % probability, relative to
     /// the expected value (for claims on `each` class, to the sum of all), or absolute where that is 0.
-    pub detectable: f64,
+    pub detectable: Option<f64>,
     /// The outcome; what a control expects has been taken into account.
     pub outcome: Outcome,
     /// Observable name.
     pub observable: String,
     /// What was measured.
-    pub value: f64,
+    pub value: Option<f64>,
     /// Its standard error, from the spread of the batches.
-    pub std_error: f64,
+    pub std_error: Option<f64>,
     /// What it was held against.
-    pub expected: f64,
+    pub expected: Option<f64>,
     /// The stated or measured standard error of that.
-    pub expected_error: f64,
+    pub expected_error: Option<f64>,
     /// Degrees of freedom of the test.
-    pub dof: f64,
+    pub dof: Option<f64>,
     /// Adjusted p-value of the second look, where there was one.
-    pub second_p: f64,
+    pub second_p: Option<f64>,
     /// The reason for the outcome, as a sentence.
     pub note: String,
     /// It expects something else than agreement.
+    #[serde(skip)]
     pub control: bool,
 }
 
-/// Columns of `verdicts.csv`.
-pub const COLUMNS: [&str; 20] = [
-    "experiment",
-    "cell",
-    "band",
-    "class",
-    "estimators",
-    "claim",
-    "test",
-    "statistic",
-    "p_value",
-    "adjusted_p",
-    "detectable",
-    "outcome",
-    "observable",
-    "value",
-    "std_error",
-    "expected",
-    "expected_error",
-    "dof",
-    "second_p",
-    "note",
-];
-
-/// The columns that hold numbers.
-const NUMBERS: [&str; 10] = [
-    "statistic",
-    "p_value",
-    "adjusted_p",
-    "detectable",
-    "value",
-    "std_error",
-    "expected",
-    "expected_error",
-    "dof",
-    "second_p",
-];
-
 /// The verdicts as CSV text.
 pub fn to_csv(verdicts: &[Verdict]) -> String {
-    csv_text::to_text(&COLUMNS, verdicts.iter().map(Verdict::fields))
+    csv_text::table(verdicts)
 }
 
 /// The verdicts as JSON: an array of objects with the columns as keys; a number that does not apply is
 /// null.
 pub fn to_json(verdicts: &[Verdict]) -> String {
-    let value = |name: &str, field: String| match field.parse::<f64>() {
-        Ok(number) if NUMBERS.contains(&name) && number.is_finite() => serde_json::json!(number),
-        _ if NUMBERS.contains(&name) => serde_json::Value::Null,
-        _ => serde_json::Value::String(field),
-    };
-    let object = |v: &Verdict| -> serde_json::Map<String, serde_json::Value> {
-        let fields = COLUMNS.iter().zip(v.fields());
-        fields.map(|(name, field)| (name.to_string(), value(name, field))).collect()
-    };
-    serde_json::json!(verdicts.iter().map(object).collect::<Vec<_>>()).to_string()
+    serde_json::to_string(verdicts).unwrap_or_else(|e| panic!("a verdict without JSON: {e}"))
 }
 
 /// 0 all green, 1 a claim failed, 3 none failed but some could not be judged.
@@ -147,34 +224,41 @@ pub fn exit_code(verdicts: &[Verdict]) -> u8 {
     }
 }
 
+/// A number that may be none.
+pub(super) fn known(x: f64) -> Option<f64> {
+    (!x.is_nan()).then_some(x)
+}
+
 impl Verdict {
     /// Does it count as evidence for its claim?
     pub fn is_green(&self) -> bool {
         self.outcome == Outcome::Pass
     }
 
-    fn fields(&self) -> Vec<String> {
-        vec![
-            self.experiment.clone(),
-            self.cell.clone(),
-            self.band.clone(),
-            self.class.clone(),
-            self.estimators.clone(),
-            self.claim.clone(),
-            self.test.clone(),
-            number(self.statistic),
-            number(self.p_value),
-            number(self.adjusted_p),
-            number(self.detectable),
-            self.outcome.to_string(),
-            self.observable.clone(),
-            number(self.value),
-            number(self.std_error),
-            number(self.expected),
-            number(self.expected_error),
-            number(self.dof),
-            number(self.second_p),
-            self.note.clone(),
-        ]
+    /// What the test is called; empty for none.
+    pub fn test_name(&self) -> String {
+        self.test.as_ref().map_or_else(String::new, TestKind::to_string)
+    }
+
+    /// Sets what was measured and its standard error.
+    pub(super) fn set_value(&mut self, value: f64, std_error: f64) {
+        (self.value, self.std_error) = (known(value), known(std_error));
+    }
+
+    /// Sets what was expected and its standard error.
+    pub(super) fn set_expected(&mut self, expected: f64, std_error: f64) {
+        (self.expected, self.expected_error) = (known(expected), known(std_error));
+    }
+
+    /// How far the value lies from what is expected, as a phrase; nothing where there are no values.
+    pub(super) fn deviation(&self) -> String {
+        let (Some(value), Some(expected)) = (self.value, self.expected) else { return String::new() };
+        let difference = value - expected;
+        let relative = 100.0 * difference / expected.abs();
+        if relative.is_finite() {
+            format!("off by {relative:+.2} %")
+        } else {
+            format!("off by {difference:+.2e}")
+        }
     }
 }

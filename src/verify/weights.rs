@@ -76,7 +76,7 @@ fn weight(name: &str) -> Option<f64> {
 
 /// Counts of one run in the order of [`WEIGHTS`], and what it took, CPU nanoseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Timed {
+pub struct TimedRun {
     /// The counts.
     pub counts: [f64; WEIGHTS.len()],
     /// The time.
@@ -84,20 +84,20 @@ pub struct Timed {
 }
 
 /// The counts and times of all runs of a record that were timed whole.
-pub fn timed(stored: &Stored) -> Vec<Timed> {
+pub fn timed(stored: &Stored) -> Vec<TimedRun> {
     let runs = stored.record.cells.iter().flat_map(|cell| cell.runs.iter().map(move |run| (cell, run)));
     let of = |(cell, run): (&crate::results::record::Cell, &EstimatorRun)| {
         let cost = stored.timing.as_ref()?.of(&cell.label, &run.estimator)?;
         let counts = WEIGHTS.map(|(name, _)| run.cost.get(name).copied().unwrap_or(0) as f64);
         let is_whole = cost.passes == run.passes && cost.cpu_seconds > 0.0;
-        is_whole.then_some(Timed { counts, nanoseconds: 1e9 * cost.cpu_seconds })
+        is_whole.then_some(TimedRun { counts, nanoseconds: 1e9 * cost.cpu_seconds })
     };
     runs.filter_map(of).collect()
 }
 
 /// The non-negative weights that predict the times best: least squares of relative errors. Weights that
 /// come out negative are set to 0, the most negative first, and the others fitted again.
-pub fn fit(runs: &[Timed]) -> [f64; WEIGHTS.len()] {
+pub fn fit(runs: &[TimedRun]) -> [f64; WEIGHTS.len()] {
     let mut free: Vec<usize> =
         (0..WEIGHTS.len()).filter(|&k| runs.iter().any(|r| r.counts[k] > 0.0)).collect();
     loop {
@@ -116,10 +116,10 @@ pub fn fit(runs: &[Timed]) -> [f64; WEIGHTS.len()] {
 
 /// Solves the normal equations of sum (sum_k w_k n_k / t - 1)^2 over the counters `free`; the diagonal is
 /// raised by 1e-9 of itself, because counters may depend on each other.
-fn least_squares(runs: &[Timed], free: &[usize]) -> Vec<f64> {
-    let x = |run: &Timed, k: usize| run.counts[free[k]] / run.nanoseconds;
+fn least_squares(runs: &[TimedRun], free: &[usize]) -> Vec<f64> {
+    let x = |run: &TimedRun, k: usize| run.counts[free[k]] / run.nanoseconds;
     let size = free.len();
-    let sum = |f: &dyn Fn(&Timed) -> f64| runs.iter().map(f).sum::<f64>();
+    let sum = |f: &dyn Fn(&TimedRun) -> f64| runs.iter().map(f).sum::<f64>();
     let mut rows: Vec<Vec<f64>> = (0..size)
         .map(|i| {
             let products = (0..size)
@@ -141,16 +141,16 @@ fn least_squares(runs: &[Timed], free: &[usize]) -> Vec<f64> {
 /// How far the predictions of [`WEIGHTS`] are from those of weights fitted to these runs: the largest
 /// relative deviation over the runs from the common factor between them (another machine's speed). Nothing
 /// for fewer runs than counters.
-pub fn drift(runs: &[Timed]) -> Option<f64> {
+pub fn drift(runs: &[TimedRun]) -> Option<f64> {
     let counted = (0..WEIGHTS.len()).filter(|&k| runs.iter().any(|run| run.counts[k] > 0.0)).count();
     if runs.len() < counted {
         return None;
     }
     let fitted = fit(runs);
-    let predicted = |run: &Timed, weights: &dyn Fn(usize) -> f64| -> f64 {
+    let predicted = |run: &TimedRun, weights: &dyn Fn(usize) -> f64| -> f64 {
         (0..WEIGHTS.len()).map(|k| weights(k) * run.counts[k]).sum()
     };
-    let ratio = |run: &Timed| predicted(run, &|k| fitted[k]) / predicted(run, &|k| WEIGHTS[k].1);
+    let ratio = |run: &TimedRun| predicted(run, &|k| fitted[k]) / predicted(run, &|k| WEIGHTS[k].1);
     let mut ratios: Vec<f64> = runs.iter().map(ratio).collect();
     ratios.sort_by(f64::total_cmp);
     let middle = ratios[ratios.len() / 2];
@@ -165,12 +165,12 @@ mod tests {
     const N: usize = WEIGHTS.len();
 
     /// Runs of all mixtures of two amounts of work, at `speed` and with weights that are off by `factors`.
-    fn runs(speed: f64, factors: [f64; N]) -> Vec<Timed> {
+    fn runs(speed: f64, factors: [f64; N]) -> Vec<TimedRun> {
         let counts = |i: usize| std::array::from_fn(|k| if (i >> k) & 1 == 1 { 9e6 } else { 1e6 });
         let time = |counts: [f64; N]| -> f64 {
             (0..N).map(|k| factors[k] * WEIGHTS[k].1 * counts[k]).sum::<f64>() * speed
         };
-        (0..1 << N).map(counts).map(|counts| Timed { counts, nanoseconds: time(counts) }).collect()
+        (0..1 << N).map(counts).map(|counts| TimedRun { counts, nanoseconds: time(counts) }).collect()
     }
 
     #[test]

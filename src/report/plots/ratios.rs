@@ -9,7 +9,7 @@ use crate::report::plot::{COLOURS, Plot, PlotAxis, PlotPoint, Series, Size, Styl
 use crate::report::summary;
 use crate::results::record::CostMeasure;
 use crate::results::store::Stored;
-use crate::verify::comparisons::Row;
+use crate::verify::comparisons::EfficiencyRow;
 
 /// Most lines of one plot: each has its own colour.
 const MOST_LINES: usize = COLOURS.len();
@@ -17,7 +17,7 @@ const MOST_LINES: usize = COLOURS.len();
 const FEWEST: usize = 3;
 
 /// A plot for each axis, pair of estimators and band.
-pub(super) fn section(stored: &Stored, rows: &[Row]) -> Section {
+pub(super) fn section(stored: &Stored, rows: &[EfficiencyRow]) -> Section {
     let axes = axes(stored);
     let mut drawn = Vec::new();
     for cost in [CostMeasure::Cpu, CostMeasure::Counters] {
@@ -111,7 +111,7 @@ fn number(label: &str) -> Option<(String, f64)> {
 
 fn of_axis(
     stored: &Stored,
-    rows: &[&Row],
+    rows: &[&EfficiencyRow],
     places: &Places,
     (axis, cost): (&str, CostMeasure),
     name: &str,
@@ -123,12 +123,12 @@ fn of_axis(
     let mut drawn = Vec::new();
     for (candidate, baseline) in pairs {
         for band in shown_bands(stored) {
-            let own = |row: &&&Row| {
+            let own = |row: &&&EfficiencyRow| {
                 (&*row.candidate, &*row.baseline) == (candidate, baseline)
                     && row.band == stored.record.bands[band].name
-                    && row.efficiency_ratio.is_finite()
+                    && row.quoted().is_some()
             };
-            let rows: Vec<&Row> = rows.iter().filter(own).copied().collect();
+            let rows: Vec<&EfficiencyRow> = rows.iter().filter(own).copied().collect();
             let lines = lines(stored, &rows, axis, places);
             if lines.iter().all(|line| line.points.len() < 2) {
                 continue;
@@ -167,7 +167,7 @@ fn of_axis(
 }
 
 /// A line for the labels of the other axes.
-fn lines(stored: &Stored, rows: &[&Row], axis: &str, places: &Places) -> Vec<Series> {
+fn lines(stored: &Stored, rows: &[&EfficiencyRow], axis: &str, places: &Places) -> Vec<Series> {
     let style = if places.names.is_empty() { Style::Line } else { Style::Marks };
     let mut lines: Vec<Series> = Vec::new();
     for row in rows {
@@ -177,7 +177,8 @@ fn lines(stored: &Stored, rows: &[&Row], axis: &str, places: &Places) -> Vec<Ser
         let Some(place) = cell.axes.get(axis).and_then(|label| places.at.get(label)) else { continue };
         let others = cell.axes.iter().filter(|(name, _)| *name != axis).map(|(_, label)| label.as_str());
         let name = joined(&others.collect::<Vec<_>>());
-        let mut point = PlotPoint::new(*place, row.efficiency_ratio, [row.ci_low, row.ci_high]);
+        let Some([ratio, low, high]) = row.quoted() else { continue };
+        let mut point = PlotPoint::new(*place, ratio, [low, high]);
         point.is_firm = row.resolved;
         match lines.iter_mut().find(|line| line.name == name) {
             Some(line) => line.points.push(point),

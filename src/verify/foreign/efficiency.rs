@@ -1,7 +1,7 @@
 //! Variance times seconds of images made elsewhere, over that of a record.
 
 use super::images::Planes;
-use super::pixels::Band;
+use super::pixels::BandImages;
 use crate::math::ln;
 use crate::results::image::Picture;
 use crate::results::record::{Cell, EstimatorRun, Observable};
@@ -26,7 +26,7 @@ const SHARE: f64 = 0.05;
 /// The ratio of costs at equal error: how much longer the other renderer takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ratio {
-    /// Band name.
+    /// BandImages name.
     pub band: String,
     /// (variance of a pixel's mean x seconds) of the images over that of the record, pixels averaged.
     pub ratio: f64,
@@ -53,7 +53,7 @@ pub fn ratios(
     let bands = stored.record.bands.iter().enumerate();
     bands
         .map(|(index, about)| {
-            let band = Band::of(planes, &picture, index, run.passes);
+            let band = BandImages::of(planes, &picture, index, run.passes);
             let pixels: Vec<usize> = (0..band.ours.len()).collect();
             let seeds = band.theirs.len();
             let theirs: f64 = pixels.iter().map(|&i| band.variance(i)).sum();
@@ -65,8 +65,8 @@ pub fn ratios(
                 std_error: (theirs.1 * theirs.1 + ours.1 * ours.1).sqrt(),
                 dof: (seeds as f64 - 1.0).max(1.0),
             };
-            let found = LogRatio::new(log, CONFIDENCE);
-            let interval: [f64; 2] = found.interval().into();
+            let found = LogRatio { log };
+            let interval: [f64; 2] = found.interval(CONFIDENCE).into();
             let share = band.largest_share(&pixels);
             let unresolved = if seeds < MIN_SEEDS {
                 Some(format!("{seeds} seeds; at least {MIN_SEEDS} are needed"))
@@ -85,14 +85,14 @@ pub fn ratios(
 }
 
 /// The error of the logarithm of the pixels' pooled variance, by leaving out a seed at a time.
-fn seeds_error(band: &Band, pixels: &[usize]) -> f64 {
+fn seeds_error(band: &BandImages, pixels: &[usize]) -> f64 {
     if band.theirs.len() < 3 {
         return f64::INFINITY;
     }
     let without = |out: usize| {
         let left = band.theirs.iter().enumerate().filter(|(k, _)| *k != out);
         let left: Vec<&[f64]> = left.map(|(_, seed)| *seed).collect();
-        let part = Band { theirs: left, ours: vec![], ours_error: vec![], ..*band };
+        let part = BandImages { theirs: left, ours: vec![], ours_error: vec![], ..*band };
         pixels.iter().map(|&i| part.squares(i)).sum::<f64>() / (part.seeds() - 1.0)
     };
     jackknife_log_error(&(0..band.theirs.len()).map(without).collect::<Vec<_>>())

@@ -9,9 +9,11 @@
 //! Convention: row 0 is the top of the image and column 0 its left; OpenEXR files are read as their data
 //! window says, whatever the order of their lines. Values are radiance, linear, without exposure.
 
-use super::family::{Finding, Shown, conclude};
-use super::trial::{Arm, SHARE_LIMIT};
-use super::verdict::{Outcome, Verdict};
+use super::evidence::Evidence;
+use super::family::{Finding, conclude};
+use super::levels::Looks;
+use super::means::{QuantityMean, SHARE_LIMIT};
+use super::verdict::{Outcome, TestKind, Verdict};
 use crate::error::{Error, Result};
 use crate::results::image::Picture;
 use crate::results::record::{EstimatorRun, Observable, ObservedRegion, Quantity};
@@ -27,7 +29,7 @@ pub mod images;
 mod pixels;
 
 use images::Planes;
-use pixels::Band;
+use pixels::BandImages;
 
 /// The default of the probability of any false alarm in one call.
 pub const LEVEL: f64 = 1e-4;
@@ -58,8 +60,8 @@ pub struct Question<'a> {
 
 /// One band's pixels for a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Map {
-    /// Band name.
+pub struct PixelMap {
+    /// BandImages name.
     pub band: String,
     /// Scores: differences in units of their error, as normal values.
     pub z: Vec<f64>,
@@ -77,7 +79,7 @@ pub struct Answer {
     /// One verdict a test.
     pub verdicts: Vec<Verdict>,
     /// One map a band; none for a single class, of which the record has no pixels.
-    pub maps: Vec<Map>,
+    pub maps: Vec<PixelMap>,
     /// What a reader must know.
     pub notes: Vec<String>,
 }
@@ -130,8 +132,8 @@ pub fn judge(question: &Question, planes: &Planes) -> Result<Answer> {
     let mut findings = Vec::new();
     let mut answer = Answer { verdicts: vec![], maps: vec![], notes: planes.notes.clone() };
     for (index, about) in question.stored.record.bands.iter().enumerate() {
-        let band = Band::of(planes, &picture, index, run.passes);
-        let asked = Asked { question, band: &band, index };
+        let band = BandImages::of(planes, &picture, index, run.passes);
+        let asked = BandQuestion { question, band: &band, index };
         let objection = band.not_finite();
         for (observable, region) in &regions {
             findings.push(asked.region(observable, region, objection.as_deref(), has_pixels));
@@ -144,11 +146,13 @@ pub fn judge(question: &Question, planes: &Planes) -> Result<Answer> {
             answer.maps.push(map(&about.name, &band));
         }
     }
-    answer.verdicts = conclude(findings, question.level);
+    let looks = Looks::One { level: question.level };
+    answer.verdicts = conclude(findings, looks, |_, _| None).verdicts;
     let differs = |v: &Verdict| v.outcome == Outcome::Fail;
     if has_pixels && answer.verdicts.iter().any(differs) {
         let bands = 0..question.stored.record.bands.len();
-        let turned = bands.map(|b| pixels::orientation(&Band::of(planes, &picture, b, run.passes)));
+        let turned =
+            bands.map(|b| pixels::orientation(&BandImages::of(planes, &picture, b, run.passes)));
         if let Some(how) = turned.flatten().next() {
             answer.notes.push(format!(
                 "the images fit far better {how}: check the camera's axes and the order of rows"
@@ -158,9 +162,9 @@ pub fn judge(question: &Question, planes: &Planes) -> Result<Answer> {
     Ok(answer)
 }
 
-fn map(name: &str, band: &Band) -> Map {
+fn map(name: &str, band: &BandImages) -> PixelMap {
     let all = 0..band.ours.len();
-    Map {
+    PixelMap {
         band: name.into(),
         z: all.clone().map(|i| band.z(i)).collect(),
         relative: all.clone().map(|i| band.mean(i) / band.ours[i] - 1.0).map(finite_or_nan).collect(),
@@ -174,13 +178,13 @@ fn finite_or_nan(x: f64) -> f64 {
 }
 
 /// One band of a question.
-struct Asked<'a> {
+struct BandQuestion<'a> {
     question: &'a Question<'a>,
-    band: &'a Band<'a>,
+    band: &'a BandImages<'a>,
     index: usize,
 }
 
-impl Asked<'_> {
+impl BandQuestion<'_> {
     fn quantity(&self, observable: &Observable) -> Quantity {
         Quantity {
             cell: self.question.cell,
@@ -190,9 +194,8 @@ impl Asked<'_> {
         }
     }
 
-    fn finding(&self, observable: &str, shown: Shown) -> Finding {
+    fn finding(&self, observable: &str, evidence: Evidence) -> Finding {
         let record = &self.question.stored.record;
-        let nothing = f64::NAN;
         let verdict = Verdict {
             experiment: record.experiment.clone(),
             cell: record.cells[self.question.cell].label.clone(),
@@ -200,29 +203,17 @@ impl Asked<'_> {
             class: self.question.class.into(),
             estimators: self.question.estimator.into(),
             claim: "judge".into(),
-            test: String::new(),
-            statistic: nothing,
-            p_value: nothing,
-            adjusted_p: nothing,
-            detectable: nothing,
-            outcome: Outcome::Invalid("not judged".into()),
             observable: observable.into(),
-            value: nothing,
-            std_error: nothing,
-            expected: nothing,
-            expected_error: nothing,
-            dof: nothing,
-            second_p: f64::NAN,
-            control: false,
-            note: String::new(),
+            ..Verdict::default()
         };
-        Finding { shown, relative_to: self.image_mean(), detect: None, verdict }
+        Finding { relative_to: self.image_mean(), ..Finding::new(verdict, evidence) }
     }
 
     /// The record's image mean, which `detectable` is relative to.
     fn image_mean(&self) -> f64 {
         let observable = Observable { name: "mean".into(), class: self.question.class.into() };
-        Arm::of(self.question.stored, &self.quantity(&observable)).map_or(f64::NAN, |arm| arm.mean.value)
+        QuantityMean::of(self.question.stored, &self.quantity(&observable))
+            .map_or(f64::NAN, |arm| arm.mean.value)
     }
 
     /// The mean of a region.
@@ -234,47 +225,53 @@ impl Asked<'_> {
         has_pixels: bool,
     ) -> Finding {
         let name = &observable.name;
-        let Some(arm) = Arm::of(self.question.stored, &self.quantity(observable)) else {
-            return self.finding(name, Shown::Nothing("the record does not hold this region".into()));
+        let Some(arm) = QuantityMean::of(self.question.stored, &self.quantity(observable)) else {
+            return self.finding(name, Evidence::Nothing("the record does not hold this region".into()));
         };
         let pixels = region.pixels(self.band.width, self.band.height);
         let theirs = self.theirs(&pixels);
-        let mut finding = self.finding(name, Shown::Nothing(String::new()));
-        (finding.verdict.value, finding.verdict.std_error) = (theirs.value, theirs.std_error);
-        (finding.verdict.expected, finding.verdict.expected_error) =
-            (arm.mean.value, arm.mean.std_error);
-        finding.shown = match objection
+        let mut finding = self.finding(name, Evidence::Nothing(String::new()));
+        finding.verdict.set_value(theirs.value, theirs.std_error);
+        finding.verdict.set_expected(arm.mean.value, arm.mean.std_error);
+        finding.evidence = match objection
             .map(String::from)
             .or_else(|| arm.objection())
             .or_else(|| has_pixels.then(|| self.misplaced(&pixels, &arm)).flatten())
         {
-            Some(reason) => Shown::Nothing(reason),
+            Some(reason) => Evidence::Nothing(reason),
             None => self.weigh(&theirs, &arm, &pixels, &mut finding.verdict),
         };
         if region.tile.is_none() {
             finding.detect = Some(self.question.detect);
-            if arm.mean.value == 0.0 && !matches!(finding.shown, Shown::Nothing(_)) {
-                finding.shown = Shown::Nothing("the record's image is black: nothing to hold".into());
+            if arm.mean.value == 0.0 && !matches!(finding.evidence, Evidence::Nothing(_)) {
+                finding.evidence =
+                    Evidence::Nothing("the record's image is black: nothing to hold".into());
             }
         }
         finding
     }
 
-    fn weigh(&self, theirs: &Estimate, arm: &Arm, pixels: &[usize], verdict: &mut Verdict) -> Shown {
+    fn weigh(
+        &self,
+        theirs: &Estimate,
+        arm: &QuantityMean,
+        pixels: &[usize],
+        verdict: &mut Verdict,
+    ) -> Evidence {
         let spread = self.band.theirs.iter().map(|seed| mean_of(seed, pixels));
         let spread = Spread::of(spread.map(|mean| (1.0, mean)));
         if spread.estimate.std_error == 0.0 && arm.mean.std_error == 0.0 && arm.mean.value == 0.0 {
-            verdict.test = "identity".into();
-            return Shown::Exact { same: theirs.value == 0.0 };
+            (verdict.test, verdict.statistic) = (Some(TestKind::Identity), Some(0.0));
+            return Evidence::of_sides(theirs.value == 0.0, verdict);
         }
         if arm.mean.std_error > 0.0
             && let Some(objection) = arm.tail_objection()
         {
-            return Shown::Nothing(objection);
+            return Evidence::Nothing(objection);
         }
         let share = self.band.largest_share(pixels);
         if pixels.len() >= FEW_PIXELS && share > SHARE_LIMIT {
-            return Shown::Nothing(format!(
+            return Evidence::Nothing(format!(
                 "heavy tail: one pixel holds {:.0} % of the spread between the images",
                 100.0 * share
             ));
@@ -285,25 +282,23 @@ impl Asked<'_> {
             let ratio = spread.estimate.std_error / predicted;
             let dof = self.band.seeds() - 1.0;
             if chi_square_sf(dof * ratio * ratio, dof) < SPREAD_LEVEL {
-                return Shown::Nothing(format!(
+                return Evidence::Nothing(format!(
                     "the images' means spread {ratio:.1} times as far as independent pixels would: judge \
                      without --independent-pixels"
                 ));
             }
         }
-        verdict.test = match self.question.independent_pixels {
-            true => "t of pixels",
-            false => "t of seeds",
-        }
-        .into();
+        verdict.test = Some(match self.question.independent_pixels {
+            true => TestKind::TOfPixels,
+            false => TestKind::TOfSeeds,
+        });
         let (a, b) = (theirs.std_error, arm.mean.std_error);
-        // The fewer degrees of freedom bound the tails for every ratio of variances: see `Band::difference`.
-        let estimate = Estimate {
+        // The fewer degrees of freedom bound the tails for every ratio of variances: see `BandImages::difference`.
+        Evidence::of_difference(Estimate {
             value: theirs.value - arm.mean.value,
             std_error: (a * a + b * b).sqrt(),
             dof: theirs.dof.min(arm.mean.dof),
-        };
-        Shown::Difference { estimate, times: 1.0 }
+        })
     }
 
     /// Their mean of a region, with its error.
@@ -329,7 +324,7 @@ impl Asked<'_> {
     }
 
     /// The record's pixels of a region must add up to its mean.
-    fn misplaced(&self, pixels: &[usize], arm: &Arm) -> Option<String> {
+    fn misplaced(&self, pixels: &[usize], arm: &QuantityMean) -> Option<String> {
         let mean = mean_of(&self.band.ours, pixels);
         let off = (mean - arm.mean.value).abs() > 1e-9 * arm.mean.value.abs();
         off.then(|| "the record's pixels do not add up to its region".to_string())
@@ -340,17 +335,19 @@ impl Asked<'_> {
         let arm = self.quantity(&Observable { name: "mean".into(), class: "all".into() });
         let objection = objection
             .map(String::from)
-            .or_else(|| Arm::of(self.question.stored, &arm).and_then(|arm| arm.objection()));
+            .or_else(|| QuantityMean::of(self.question.stored, &arm).and_then(|arm| arm.objection()));
         let found = pixels::squared_bias(self.band);
-        let shown = match objection {
-            Some(reason) => Shown::Nothing(reason),
-            None if found.noise == 0.0 => Shown::Exact { same: true },
+        let is_exact = objection.is_none() && found.noise == 0.0;
+        let evidence = match objection {
+            Some(reason) => Evidence::Nothing(reason),
+            None if is_exact => Evidence::Exact { holds: true, said: "the same".into() },
             None => {
-                Shown::Bounded { t: found.mean / found.noise, terms: found.terms, unit: found.noise }
+                Evidence::Bounded { t: found.mean / found.noise, terms: found.terms, unit: found.noise }
             }
         };
-        let mut finding = self.finding("pixels", shown);
-        finding.verdict.test = "squared bias".into();
+        let mut finding = self.finding("pixels", evidence);
+        finding.verdict.test = Some(TestKind::SquaredBias);
+        finding.verdict.statistic = is_exact.then_some(0.0);
         let mean = self.image_mean();
         let [low, high] = [-2.0, 2.0].map(|k| (found.mean + k * found.noise).max(0.0).sqrt() / mean);
         if low.is_finite() && high.is_finite() {

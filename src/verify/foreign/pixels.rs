@@ -12,7 +12,7 @@ const BLOCKS: usize = 8;
 const LARGEST_Z: f64 = 37.0;
 
 /// One band of both sides.
-pub(super) struct Band<'a> {
+pub(super) struct BandImages<'a> {
     pub width: usize,
     pub height: usize,
     /// `[seed][pixel]`.
@@ -25,9 +25,9 @@ pub(super) struct Band<'a> {
     pub rounding: f64,
 }
 
-impl<'a> Band<'a> {
-    pub fn of(planes: &'a Planes, picture: &Picture, band: usize, passes: u64) -> Band<'a> {
-        Band {
+impl<'a> BandImages<'a> {
+    pub fn of(planes: &'a Planes, picture: &Picture, band: usize, passes: u64) -> BandImages<'a> {
+        BandImages {
             width: planes.width,
             height: planes.height,
             theirs: planes.seeds.iter().map(|seed| seed[band].as_slice()).collect(),
@@ -136,7 +136,7 @@ pub(super) struct SquaredBias {
 /// pixel, and no estimated variance of a few seeds enters it. The sums of u over 8 x 8 blocks of the image
 /// are independent where noise does not reach across blocks, and symmetric about 0 without bias up to
 /// the skewness of s^2. A bias as small as the other renderer's rounding is taken off too.
-pub(super) fn squared_bias(band: &Band) -> SquaredBias {
+pub(super) fn squared_bias(band: &BandImages) -> SquaredBias {
     let seeds = band.seeds();
     let mut blocks = vec![0.0; BLOCKS * BLOCKS];
     for (pixel, ours) in band.ours.iter().enumerate() {
@@ -160,7 +160,7 @@ pub(super) fn squared_bias(band: &Band) -> SquaredBias {
 
 /// How the image would have to be turned to fit better, where turning it would at least halve the
 /// squared difference.
-pub(super) fn orientation(band: &Band) -> Option<&'static str> {
+pub(super) fn orientation(band: &BandImages) -> Option<&'static str> {
     let (width, height) = (band.width, band.height);
     let distance = |turned: &dyn Fn(usize, usize) -> (usize, usize)| -> f64 {
         let pixels = (0..height).flat_map(|row| (0..width).map(move |column| (row, column)));

@@ -1,0 +1,207 @@
+//! What the numbers of one test show by themselves, before they are held against those of other tests.
+
+use super::levels::POWER;
+use super::verdict::{Outcome, Verdict};
+use crate::stats::efficiency::LogRatio;
+use crate::stats::goodness::{Goodness, Proportion};
+use crate::stats::hypothesis::{Estimate, Test};
+use crate::stats::signs;
+
+/// Confidence of the intervals of efficiencies that decide.
+pub const CONFIDENCE: f64 = 0.999;
+
+/// What the numbers of one test show.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Evidence {
+    /// Nothing, for this reason.
+    Nothing(String),
+    /// A statement without chance: it holds, or it does not.
+    Exact { holds: bool, said: String },
+    /// A difference with its error; its p-value is this many times that of Student's t.
+    Difference { difference: Estimate, times: f64 },
+    /// A statistic with the p-value of `signs::one_sided_bound`, from `terms` terms, and the true effect
+    /// that moves it by 1; `detectable` is the root of such an effect.
+    Bounded { t: f64, terms: f64, unit: f64 },
+    /// An efficiency against a bound.
+    Efficiency(Box<EfficiencyTest>),
+    /// A test of many comparisons at once.
+    Sum(Test),
+    /// Counts against probabilities.
+    Counts { fit: CountsFit, test: Test, said: String },
+}
+
+impl Evidence {
+    /// A difference whose p-value is that of Student's t.
+    pub fn of_difference(difference: Estimate) -> Evidence {
+        Evidence::Difference { difference, times: 1.0 }
+    }
+
+    /// Two sides without sampling error, as `verdict` has them: the same, or not.
+    pub fn of_sides(holds: bool, verdict: &Verdict) -> Evidence {
+        let said = match holds {
+            true => "the same".into(),
+            false => format!("no sampling error, {}", verdict.deviation()),
+        };
+        Evidence::Exact { holds, said }
+    }
+
+    /// The test; none where there is nothing to test, or no chance.
+    pub fn test(&self) -> Option<Test> {
+        match self {
+            Evidence::Nothing(_) | Evidence::Exact { .. } => None,
+            Evidence::Difference { difference, times } => Some(test_of(difference, *times)),
+            Evidence::Bounded { t, .. } => {
+                let p_value = signs::one_sided_bound(*t);
+                Some(Test { statistic: *t, dof: f64::NAN, p_value })
+            }
+            Evidence::Efficiency(shown) => Some(shown.test),
+            Evidence::Sum(test) | Evidence::Counts { test, .. } => Some(*test),
+        }
+    }
+
+    /// The p-value of the test.
+    pub fn p_value(&self) -> Option<f64> {
+        self.test().map(|test| test.p_value).filter(|p| !p.is_nan())
+    }
+
+    /// The smallest defect that is rejected at `level` with probability [`POWER`]: of a difference relative to
+    /// `relative_to`, or absolute where that is 0.
+    pub fn detectable(&self, level: f64, relative_to: f64) -> Option<f64> {
+        let scale = if relative_to == 0.0 { 1.0 } else { relative_to.abs() };
+        match self {
+            Evidence::Nothing(_) | Evidence::Exact { .. } | Evidence::Sum(_) => None,
+            Evidence::Difference { difference, times } => {
+                Some(difference.detectable(level / times, POWER) / scale)
+            }
+            Evidence::Bounded { terms, unit, .. } => {
+                Some((unit * signs::detectable(level, POWER, *terms)).sqrt() / scale)
+            }
+            Evidence::Efficiency(shown) => Some(shown.detectable(level)),
+            Evidence::Counts { fit, .. } => Some(fit.detectable(level)),
+        }
+        .filter(|detectable| !detectable.is_nan())
+    }
+}
+
+/// The test that a difference is chance.
+fn test_of(difference: &Estimate, times: f64) -> Test {
+    let Estimate { value, std_error, dof } = *difference;
+    let statistic = value / std_error;
+    let p_value = if statistic.is_finite() {
+        // Not `min`, which would make a p-value of what is not a number.
+        let p_value = times * difference.test_zero().p_value;
+        if p_value > 1.0 { 1.0 } else { p_value }
+    } else if std_error == 0.0 && !value.is_nan() {
+        if value == 0.0 { 1.0 } else { 0.0 }
+    } else {
+        f64::NAN
+    };
+    Test { statistic, dof, p_value }
+}
+
+/// Counts against probabilities: what knows the smallest defect that it would have found.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum CountsFit {
+    /// Of many bins.
+    Bins(Goodness),
+    /// Of one outcome.
+    Share(Proportion),
+}
+
+impl CountsFit {
+    /// The smallest relative error of the density, or of the probability, that is rejected at `level`.
+    fn detectable(&self, level: f64) -> f64 {
+        match self {
+            CountsFit::Bins(found) => found.detectable(level, POWER).relative,
+            CountsFit::Share(found) => {
+                let (below, above) = found.detectable(level, POWER);
+                (found.mass - below).max(above - found.mass) / found.mass
+            }
+        }
+    }
+}
+
+/// What a claim of efficiency shows: see `verify::efficiency`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct EfficiencyTest {
+    /// E, variance times cost of the baseline over that of the candidate.
+    pub ratio: LogRatio,
+    /// The bound e that E must exceed.
+    pub bound: f64,
+    /// Kurtosis of a pass: candidate, baseline.
+    pub kurtosis: (f64, f64),
+    /// The difference of the means, relative to the larger.
+    pub difference: Estimate,
+    /// Is it the means that speak against the claim, more than E?
+    pub blames_means: bool,
+    /// A control wants E to fall short.
+    pub fails: bool,
+    /// Student's t of ln E - ln e, with the p-value of the claim as a whole.
+    pub test: Test,
+}
+
+impl EfficiencyTest {
+    /// What it says, where the p-value adjusted over the family is `adjusted_p` and a test fails below
+    /// `level`; `own_level` is the level of this test alone. A control that expects failure wants it of E.
+    pub fn outcome(
+        &self,
+        adjusted_p: Option<f64>,
+        level: f64,
+        own_level: f64,
+        detect: Option<f64>,
+    ) -> Outcome {
+        match adjusted_p {
+            None => Outcome::Invalid("the test has no p-value".into()),
+            Some(p) if p < level && self.fails && self.blames_means => {
+                Outcome::Invalid(self.means_differ())
+            }
+            Some(p) if p < level => Outcome::Fail,
+            _ if self.ratio.interval(CONFIDENCE).0 <= self.bound => Outcome::Underpowered,
+            _ if detect.is_some_and(|d| self.unseen(own_level) > d) => Outcome::Underpowered,
+            _ => Outcome::Pass,
+        }
+    }
+
+    fn means_differ(&self) -> String {
+        format!("the means differ by {:+.2} %", 100.0 * self.difference.value)
+    }
+
+    /// The relative difference of the means that could have gone unseen.
+    fn unseen(&self, own_level: f64) -> f64 {
+        self.difference.detectable(own_level, POWER)
+    }
+
+    /// The smallest shortfall of E below e, relative to e, that would have failed: 1 - exp(-d) with d that of
+    /// ln E. The p-value is twice the one-sided one, so that its level is that of a two-sided test.
+    fn detectable(&self, own_level: f64) -> f64 {
+        let log = Estimate::known(-self.ratio.log.detectable(own_level, POWER), 0.0);
+        1.0 - LogRatio { log }.ratio()
+    }
+
+    /// The reason for an outcome.
+    pub fn note(&self, found: &Outcome, own_level: f64) -> String {
+        let (low, high) = self.ratio.interval(CONFIDENCE);
+        let numbers = format!(
+            "{:.3} times the efficiency, 99.9 % interval {low:.3} to {high:.3}{}",
+            self.ratio.ratio(),
+            kurtosis_words(self.kurtosis, 1)
+        );
+        match found {
+            Outcome::Invalid(reason) => reason.clone(),
+            Outcome::Fail if self.blames_means => self.means_differ(),
+            Outcome::Underpowered if low <= self.bound => {
+                format!("not shown to exceed {:.3}: {numbers}", self.bound)
+            }
+            Outcome::Underpowered => format!(
+                "a difference of the means of {:.1} % could have gone unseen; {numbers}",
+                100.0 * self.unseen(own_level)
+            ),
+            _ => format!("{numbers}; means agree within {:.1} %", 100.0 * self.unseen(own_level)),
+        }
+    }
+}
+
+/// Two kurtoses at the end of a sentence; nothing where there are none, as of pixels.
+pub(super) fn kurtosis_words((a, b): (f64, f64), decimals: usize) -> String {
+    if a.is_nan() { String::new() } else { format!("; kurtosis {a:.decimals$} and {b:.decimals$}") }
+}
