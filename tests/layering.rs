@@ -87,7 +87,7 @@ const DOORS: [(&str, &[&str]); 21] = [
     ("exr", &["results"]),
     ("png", &["results"]),
     ("csv", &["results", "experiment"]),
-    ("schemars", &["experiment"]),
+    ("schemars", &DERIVES),
     ("strsim", &["experiment"]),
     ("toml", &["experiment"]),
     ("indicatif", &["run"]),
@@ -96,12 +96,28 @@ const DOORS: [(&str, &[&str]); 21] = [
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("serde", &SERDE),
-    ("serde_json", &SERDE),
+    ("serde_json", &JSON),
 ];
-const SERDE: [&str; 6] = ["stats", "results", "verify", "report", "experiment", "run"];
+/// Options are deserialised, and described, where they are used.
+const DERIVES: [&str; 6] = ["sampling", "optics", "geometry", "samplers", "estimators", "experiment"];
+const SERDE: [&str; 11] = [
+    "sampling",
+    "optics",
+    "geometry",
+    "samplers",
+    "estimators",
+    "stats",
+    "results",
+    "verify",
+    "report",
+    "experiment",
+    "run",
+];
+const JSON: [&str; 8] =
+    ["samplers", "estimators", "stats", "results", "verify", "report", "experiment", "run"];
 
 /// Crates that test code may name anywhere.
-const TEST_CRATES: [&str; 1] = ["serde_json"];
+const TEST_CRATES: [&str; 2] = ["serde_json", "toml"];
 
 /// Functions of std (and of glam, which calls std's) whose last digits depend on the machine.
 const NOT_PORTABLE: [&str; 39] = [
@@ -406,8 +422,8 @@ fn planted_crates_are_found() {
     for (path, text, name) in [
         ("src/scene/mod.rs", "use glam::DVec3;", "glam"),
         ("src/optics/fresnel.rs", "fn f(x: f64) -> f64 { libm::exp(x) }", "libm"),
-        ("src/estimators/mod.rs", "use serde::Serialize;", "serde"),
-        ("src/estimators/mod.rs", "use ::serde::Serialize;", "serde"),
+        ("src/scene/mod.rs", "use serde::Serialize;", "serde"),
+        ("src/scene/mod.rs", "use ::serde::Serialize;", "serde"),
         ("src/stats/mod.rs", "use blake3;", "blake3"),
         ("src/stats/mod.rs", "extern crate png;", "png"),
         ("src/cli/run.rs", "use toml::Value;", "toml"),

@@ -7,29 +7,17 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 
-/// The words for BSSRDF models.
-pub mod bssrdf;
-
-/// Words for the estimators that integrate a BSSRDF without a point cloud.
-pub mod bssrdf_probe;
-
 /// From words to scenes.
 pub mod build;
 
 /// Words for claims.
 mod claim_words;
 
-/// Options of the samplers of clouds and bodies.
-pub mod cloud_samplers;
-
 /// A TOML text as a tree with places.
 pub mod document;
 
 /// Claims of efficiency.
 mod duel;
-
-/// The estimators that come with the program.
-pub mod estimators;
 
 /// From a text to an experiment.
 pub mod load;
@@ -43,10 +31,7 @@ mod overrides;
 /// What pictures a file may ask for.
 pub mod picture;
 
-/// Words for `point_cloud`.
-pub mod point_cloud;
-
-/// The estimators and samplers that a program knows by name.
+/// The kinds of estimators and samplers that a file may name.
 pub mod registry;
 
 /// What entries mean: bands, unit directions, coefficients per band.
@@ -61,9 +46,6 @@ pub mod sampler_file;
 /// From a text to an experiment on samplers.
 mod sampler_load;
 
-/// The samplers that come with the program.
-pub mod samplers;
-
 /// Rules between values.
 mod rules;
 
@@ -72,12 +54,6 @@ pub mod schema;
 
 /// The JSON Schema of a file.
 pub mod schema_json;
-
-/// Words for skin.
-mod skin;
-
-/// Words for `snee`, and its presets.
-pub mod snee;
 
 /// "Did you mean".
 pub mod suggest;
@@ -94,7 +70,7 @@ pub mod validate;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use registry::{Registry, RegistryEntry};
+pub use registry::Registry;
 pub use sampler_file::SamplerExperiment;
 pub use sweep::resolve_path;
 

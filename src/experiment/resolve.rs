@@ -5,7 +5,6 @@ use crate::math::{DVec3, cos, sin};
 use crate::optics::colour::{self, BandColours};
 use crate::optics::dispersion::{self, Dispersion};
 use crate::optics::materials;
-use crate::optics::skin::Skin;
 
 /// One wavelength band.
 #[derive(Clone, Debug, PartialEq)]
@@ -148,7 +147,7 @@ impl Medium {
             Medium::Skin(words) => {
                 let g = words.g.unwrap_or(0.0);
                 let band = |band: &Band| {
-                    let (sigma_a, reduced) = Skin::from(words).band(band.range_nm?);
+                    let (sigma_a, reduced) = words.band(band.range_nm?);
                     Some(BandMedium { sigma_a, sigma_s: reduced / (1.0 - g), g })
                 };
                 bands.iter().map(band).collect()

@@ -11,7 +11,8 @@ use serde_json::Value;
 pub use super::claim_words::{Agree, ClaimEntry, Differs, Equals, Expect, Reproduces};
 pub use super::duel::{CONTROL, CostMeasure, Duel, Faster, NotSlower};
 use super::picture::PictureEntry;
-pub use super::skin::SkinFractions;
+pub use crate::optics::microfacet::MicrofacetKind;
+pub use crate::optics::skin::SkinFractions;
 
 /// One experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -274,7 +275,7 @@ pub enum Boundary {
     /// A rough dielectric of microfacets with separable Smith masking (Walter et al. 2007).
     Rough {
         /// Distribution of microfacet normals.
-        distribution: Distribution,
+        distribution: MicrofacetKind,
         /// Its roughness.
         #[schemars(range(min = 0.0001, max = 1.0))]
         alpha: f64,
@@ -283,16 +284,6 @@ pub enum Boundary {
     },
     /// No surface: the same index inside and outside.
     Matched {},
-}
-
-/// Microfacet distributions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Distribution {
-    /// Trowbridge-Reitz.
-    Ggx,
-    /// Gaussian slopes.
-    Beckmann,
 }
 
 /// A relative refractive index.

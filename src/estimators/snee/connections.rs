@@ -20,6 +20,9 @@
 //!   throughput * albedo * f_k L / (p_B + p_L + sum of rivals / U),
 //! whichever technique it comes from.
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::guess::Guess;
 use super::guide::Guide;
 use super::{BandSetup, last_vertex, subdivision};
@@ -64,11 +67,15 @@ impl Vertex {
 
 /// With which probability a technique is called at a vertex: `most` e^(-decay sigma d), d being the distance to
 /// the boundary along the specular guess. It depends on the vertex alone, so that every density can name it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Call {
     /// Probability at the boundary.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub most: f64,
-    /// How fast it falls with the optical distance that light has to go.
+    /// How fast it falls per mean free path that light has to go.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
     pub decay: f64,
 }
 
