@@ -171,7 +171,8 @@ fn paths(criterion: &mut Criterion) {
     for (boundary_name, boundary) in boundaries {
         for (light_name, emission) in lights() {
             let scene = Arc::new(unit_sphere(boundary, emission));
-            let tracer = PathTracer::new(scene.clone(), Roulette::Below(0.25));
+            let tracer =
+                PathTracer::new(scene.clone(), Roulette::Below(0.25)).expect("a scene that it serves");
             let mut scores = Scores::new(Layout::new(&scene));
             let key = pass();
             group.bench_function(format!("{boundary_name}, {light_name}"), |bencher| {

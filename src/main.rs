@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    scatterproof::cli::main(&scatterproof::experiment::estimators::builtin())
+    scatterproof::cli::main(&scatterproof::experiment::Registry::builtin())
 }

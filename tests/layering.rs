@@ -86,7 +86,7 @@ const DOORS: [(&str, &[&str]); 21] = [
     ("exr", &["results"]),
     ("png", &["results"]),
     ("csv", &["results", "experiment"]),
-    ("schemars", &["experiment"]),
+    ("schemars", &DERIVES),
     ("strsim", &["experiment"]),
     ("toml", &["experiment"]),
     ("indicatif", &["run"]),
@@ -95,9 +95,25 @@ const DOORS: [(&str, &[&str]); 21] = [
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("serde", &SERDE),
-    ("serde_json", &["results", "verify", "report", "experiment", "run", "cli"]),
+    ("serde_json", &JSON),
 ];
-const SERDE: [&str; 6] = ["stats", "results", "verify", "report", "experiment", "run"];
+/// Options are deserialised, and described, where they are used.
+const DERIVES: [&str; 6] = ["sampling", "optics", "geometry", "samplers", "estimators", "experiment"];
+const SERDE: [&str; 11] = [
+    "sampling",
+    "optics",
+    "geometry",
+    "samplers",
+    "estimators",
+    "stats",
+    "results",
+    "verify",
+    "report",
+    "experiment",
+    "run",
+];
+const JSON: [&str; 8] =
+    ["samplers", "estimators", "stats", "results", "verify", "report", "experiment", "run"];
 
 /// Type names that may stand for several types: clap's arguments of each subcommand, and nodes of trees.
 const SHARED_NAMES: [&str; 2] = ["Args", "Node"];
@@ -512,8 +528,8 @@ fn planted_crates_are_found() {
     for (path, text, name) in [
         ("src/scene/mod.rs", "use glam::DVec3;", "glam"),
         ("src/optics/fresnel.rs", "fn f(x: f64) -> f64 { libm::exp(x) }", "libm"),
-        ("src/estimators/mod.rs", "use serde::Serialize;", "serde"),
-        ("src/estimators/mod.rs", "use ::serde::Serialize;", "serde"),
+        ("src/scene/mod.rs", "use serde::Serialize;", "serde"),
+        ("src/scene/mod.rs", "use ::serde::Serialize;", "serde"),
         ("src/stats/mod.rs", "use blake3;", "blake3"),
         ("src/stats/mod.rs", "extern crate png;", "png"),
         ("src/cli/run.rs", "use toml::Value;", "toml"),

@@ -7,15 +7,15 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use scatterproof::experiment::Registry;
-use scatterproof::experiment::registry::SamplerEntry as Entry;
 use scatterproof::experiment::sampler_file::{
     SamplerClaim, SamplerClaimEntry, SamplerEntry, SamplerExperiment, SamplerFile,
 };
 use scatterproof::results::store::{RecordFolder, Stored};
 use scatterproof::run::interrupt::Interrupt;
 use scatterproof::run::{Options, samplers};
+use scatterproof::samplers::SamplerKind;
 use scatterproof::samplers::phase::HenyeyGreensteinSampler;
-use scatterproof::samplers::{Axis, Contrast, Discrete, Draw, Null, Piece, Sampler};
+use scatterproof::samplers::{Contrast, Coordinate, Discrete, Draw, Null, Piece, Sampler};
 use scatterproof::sampling::stream::Stream;
 use scatterproof::verify::judge::{Case, Judgement, Looks, Measured, judge, judge_alone};
 use scatterproof::verify::verdict::{Outcome, Verdict};
@@ -115,7 +115,7 @@ impl Sampler for Mixture {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::line("line", Axis::over(0.0, 1.0))]
+        vec![Piece::line("line", Coordinate::over(0.0, 1.0))]
     }
 
     fn density(&self, _piece: usize, [x, _]: [f64; 2]) -> f64 {
@@ -153,7 +153,7 @@ impl Sampler for Mixture {
 }
 
 fn registry() -> Registry {
-    let phase = Entry {
+    let phase = SamplerKind {
         kind: "phase",
         doc: "",
         options_schema: || unreachable!("files are made here"),
@@ -166,7 +166,7 @@ fn registry() -> Registry {
             Ok(Box::new(Phase { inner, cosine, g, error: number("error"), flip }))
         },
     };
-    let mixture = Entry {
+    let mixture = SamplerKind {
         kind: "mixture",
         build: |options| {
             let defect = options["defect"].as_str().unwrap_or_default().to_string();

@@ -7,6 +7,7 @@ use clap::ValueEnum;
 
 use crate::error::{Error, Result};
 use crate::experiment::Registry;
+use crate::experiment::registry::option_docs;
 use crate::experiment::schema_json::json_schema;
 use crate::experiment::validate::grammar::{Form, Grammar, doc, keys};
 use crate::optics::{dispersion, materials};
@@ -96,22 +97,21 @@ fn lines(topic: Topic, registry: &Registry) -> String {
 }
 
 fn estimators(registry: &Registry) -> String {
-    let entries = registry.entries.iter().map(|entry| {
-        let options = indented(&table(&entry.option_docs()));
-        format!("{}  {}\n{options}", entry.kind, entry.doc)
+    let entries = registry.estimators.iter().map(|known| {
+        let options = indented(&table(&option_docs(&known.options())));
+        format!("{}  {}\n{options}  serves: {}\n", known.kind, known.doc, known.serves)
     });
     entries.collect()
 }
 
 fn samplers(registry: &Registry) -> String {
-    let entries = registry.samplers.iter().map(|entry| {
-        let options = indented(&table(&entry.option_docs()));
-        format!("{}  {}\n{options}", entry.kind, entry.doc)
+    let entries = registry.samplers.iter().map(|known| {
+        format!("{}  {}\n{}", known.kind, known.doc, indented(&table(&option_docs(&known.options()))))
     });
     entries.collect()
 }
 
-fn numbers(material: &materials::Material) -> String {
+fn numbers(material: &materials::MeasuredMaterial) -> String {
     format!(
         "reduced sigma_s {:?}, sigma_a {:?} per mm, eta {}; {}",
         material.reduced_sigma_s,

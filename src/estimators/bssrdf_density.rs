@@ -20,10 +20,15 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::bssrdf_single::{adds_single, score_single};
 use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
 use super::illumination::{Entrance, Illumination};
-use super::{BandUse, Bias, Cost, Estimator, Scores, TransportClass};
+use super::{
+    BandUse, Bias, Bodies, Cost, Estimator, EstimatorKind, Scores, Serves, TransportClass, read_options,
+};
 use crate::error::{Error, Result};
 use crate::geometry::{BodyPoint, BodySampler, FaceChoice, Hit, Ray};
 use crate::math::DVec3;
@@ -31,18 +36,23 @@ use crate::optics::bssrdf::{Entry, Model};
 use crate::sampling::stream::{PassKey, Purpose};
 use crate::scene::Scene;
 
-/// What the estimator is built with.
-#[derive(Clone, Debug, PartialEq)]
+/// Options of `bssrdf_density`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct DensityOptions {
-    /// The model.
+    /// The model; one that needs no directions.
     pub model: Model,
-    /// M, at least 2.
+    /// Points of the surface per pass.
+    #[schemars(range(min = 2, max = 16777216))]
     pub samples: usize,
-    /// r, mm; `None`: every point has its own irradiance alone.
+    /// Radius of the discs over which irradiance is averaged, mm; biased. Without it none is averaged.
+    #[serde(rename = "radius_mm")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
-    /// Whether the single-scattering term is added; `None`: where the model leaves it out.
+    /// Whether single scattering is added by sampling; without it where the model leaves it out.
     pub single: Option<bool>,
-    /// Whether light that goes straight through is followed.
+    /// Whether light that goes straight through the body is followed.
+    #[serde(default = "super::kind::on")]
     pub straight: bool,
 }
 
@@ -59,17 +69,23 @@ pub struct BssrdfDensity {
 }
 
 impl BssrdfDensity {
-    /// For a scene with a finite body.
+    /// `bssrdf_density` in experiment files.
+    pub const KIND: EstimatorKind = EstimatorKind {
+        kind: "bssrdf_density",
+        doc: "a BSSRDF summed over points whose irradiance is a density of flux; biased, unbiased without `radius_mm`",
+        serves: Serves { bodies: Bodies::Finite, ..Serves::BSSRDF },
+        options_schema: || schemars::schema_for!(DensityOptions),
+        build: |options, scene| Ok(Box::new(BssrdfDensity::new(scene, &read_options(options)?)?)),
+    };
+
+    /// For a scene.
     ///
     /// # Errors
-    /// A half-space or slab, a rough boundary, a medium that the model does not fit, a model that needs directions.
+    /// A scene that it does not serve; a medium that the model does not fit; a model that needs directions.
     pub fn new(scene: Arc<Scene>, options: &DensityOptions) -> Result<BssrdfDensity> {
-        let Some(sampler) = BodySampler::new(&scene.shape, FaceChoice::Area) else {
-            return Err(Error::input_help(
-                "bssrdf_density draws points uniformly from the surface, which a half-space or slab has without end",
-                "use a finite body, or bssrdf_probe",
-            ));
-        };
+        BssrdfDensity::KIND.check(&scene)?;
+        let sampler = BodySampler::new(&scene.shape, FaceChoice::Area)
+            .ok_or_else(|| Error::input("bssrdf_density needs a finite body"))?;
         let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
         if bssrdf.models.iter().any(|model| model.needs_directions()) {
             return Err(Error::input_help(
@@ -89,7 +105,7 @@ impl BssrdfDensity {
     }
 
     /// Points of one pass with their irradiance.
-    fn store(&self, key: &PassKey, scores: &mut Scores) -> Stored {
+    fn store(&self, key: &PassKey, scores: &mut Scores) -> StoredPoints {
         let scene = &*self.bssrdf.scene;
         let stride = scene.bands() * scene.lights.len();
         let mut points = Vec::with_capacity(self.samples);
@@ -104,7 +120,7 @@ impl BssrdfDensity {
         if let Some(radius) = self.radius {
             irradiance = self.averaged(&points, &irradiance, stride, radius);
         }
-        Stored { points, irradiance, stride }
+        StoredPoints { points, irradiance, stride }
     }
 
     /// Irradiance that goes in at a point, `[light][band]`, from one light sample per band.
@@ -168,7 +184,7 @@ impl BssrdfDensity {
 }
 
 /// The points of a pass.
-struct Stored {
+struct StoredPoints {
     /// With their geometric normals.
     points: Vec<(DVec3, DVec3)>,
     /// `[point][light][band]`, W/mm^2.
@@ -217,7 +233,7 @@ impl Estimator for BssrdfDensity {
 
 struct Sum<'a> {
     estimator: &'a BssrdfDensity,
-    stored: &'a Stored,
+    stored: &'a StoredPoints,
     streams: PathStreams,
 }
 
@@ -227,7 +243,7 @@ impl Gather for Sum<'_> {
         if *single {
             score_single(bssrdf, illumination, emergence, &mut self.streams.single, scores);
         }
-        let Stored { points, irradiance, stride } = self.stored;
+        let StoredPoints { points, irradiance, stride } = self.stored;
         let bands = bssrdf.scene.bands();
         let area = sampler.area() / points.len() as f64;
         for (&band, throughput) in emergence.bands.iter().zip(emergence.throughput) {

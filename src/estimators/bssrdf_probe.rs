@@ -18,10 +18,13 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::bssrdf_single::{adds_single, score_single};
 use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
 use super::illumination::Illumination;
-use super::{Anomaly, BandUse, Bias, Cost, Estimator, Scores};
+use super::{Anomaly, BandUse, Bias, Cost, Estimator, EstimatorKind, Scores, Serves, read_options};
 use crate::error::Result;
 use crate::geometry::{Hit, Lines};
 use crate::math::Frame;
@@ -29,18 +32,24 @@ use crate::optics::bssrdf::Model;
 use crate::sampling::stream::PassKey;
 use crate::scene::Scene;
 
-/// What the estimator is built with.
-#[derive(Clone, Debug, PartialEq)]
+/// Options of `bssrdf_probe`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct ProbeOptions {
     /// The model.
     pub model: Model,
-    /// Lines per emergence, positive.
+    /// Lines per refraction of a camera path.
+    #[serde(default = "super::kind::one")]
+    #[schemars(range(min = 1, max = 65536))]
     pub probes: usize,
-    /// Whether the single-scattering term is added; `None`: where the model leaves it out.
+    /// Whether single scattering is added by sampling; without it where the model leaves it out.
     pub single: Option<bool>,
-    /// Whether light that goes straight through is followed.
+    /// Whether light that goes straight through the body is followed.
+    #[serde(default = "super::kind::on")]
     pub straight: bool,
-    /// Entries farther from the exit than this are left out, mm.
+    /// Light that enters farther from the exit is left out, mm; biased. Without it none is.
+    #[serde(rename = "reach_mm")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub reach: Option<f64>,
 }
 
@@ -57,11 +66,21 @@ pub struct BssrdfProbe {
 }
 
 impl BssrdfProbe {
+    /// `bssrdf_probe` in experiment files.
+    pub const KIND: EstimatorKind = EstimatorKind {
+        kind: "bssrdf_probe",
+        doc: "a BSSRDF integrated by lines through the body near the exit; unbiased for the model without `reach_mm`",
+        serves: Serves::BSSRDF,
+        options_schema: || schemars::schema_for!(ProbeOptions),
+        build: |options, scene| Ok(Box::new(BssrdfProbe::new(scene, &read_options(options)?)?)),
+    };
+
     /// For a scene.
     ///
     /// # Errors
-    /// A rough boundary; a medium that the model does not fit.
+    /// A scene that it does not serve; a medium that the model does not fit.
     pub fn new(scene: Arc<Scene>, options: &ProbeOptions) -> Result<BssrdfProbe> {
+        BssrdfProbe::KIND.check(&scene)?;
         let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
         Ok(BssrdfProbe {
             lines: Lines::new(

@@ -276,7 +276,7 @@ fn single_scattering_of_a_half_space() {
 fn single_scattering_is_that_of_path_tracing() {
     let media = [medium(2.0, 0.5, 0.4)];
     let scene = scene(Shape::HalfSpace, &[1.3], &media, sky(1, 1.0), 1024);
-    let path = PathTracer::new(Arc::clone(&scene), Roulette::Analog);
+    let path = PathTracer::new(Arc::clone(&scene), Roulette::Analog {}).expect("a scene that it serves");
     let [ours, traced] =
         [("ours", &single(&scene) as &dyn Estimator), ("path", &path)].map(|(name, e)| {
             let test = format!("single_scattering_is_that_of_path_tracing, {name}");

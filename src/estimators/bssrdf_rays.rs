@@ -13,10 +13,13 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::bssrdf_single::{adds_single, score_single};
 use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
 use super::illumination::Illumination;
-use super::{Anomaly, BandUse, Bias, Cost, Estimator, Scores};
+use super::{Anomaly, BandUse, Bias, Cost, Estimator, EstimatorKind, Scores, Serves, read_options};
 use crate::error::Result;
 use crate::geometry::{Mesh, Ray, Shape, Side};
 use crate::math::DVec3;
@@ -25,19 +28,27 @@ use crate::sampling::stream::PassKey;
 use crate::sampling::warp::{pdf_cap, square_to_cap};
 use crate::scene::Scene;
 
-/// What the estimator is built with.
-#[derive(Clone, Debug, PartialEq)]
+/// Options of `bssrdf_rays`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct RayOptions {
     /// The model.
     pub model: Model,
-    /// Rays per emergence, positive.
+    /// Rays per refraction of a camera path.
+    #[serde(default = "super::kind::one")]
+    #[schemars(range(min = 1, max = 65536))]
     pub rays: usize,
-    /// How far below the exit they start, mm; `None`: the reduced mean free path (of a group of bands,
-    /// the geometric mean of its least and its largest).
+    /// How far under the exit the rays start, mm; without it the reduced mean free path.
+    ///
+    /// Of bands that share a path the geometric mean of the least and the largest. At most half way to the
+    /// opposite side.
+    #[serde(rename = "depth_mm")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub depth: Option<f64>,
-    /// Whether the single-scattering term is added; `None`: where the model leaves it out.
+    /// Whether single scattering is added by sampling; without it where the model leaves it out.
     pub single: Option<bool>,
-    /// Whether light that goes straight through is followed.
+    /// Whether light that goes straight through the body is followed.
+    #[serde(default = "super::kind::on")]
     pub straight: bool,
 }
 
@@ -54,11 +65,21 @@ pub struct BssrdfRays {
 }
 
 impl BssrdfRays {
+    /// `bssrdf_rays` in experiment files.
+    pub const KIND: EstimatorKind = EstimatorKind {
+        kind: "bssrdf_rays",
+        doc: "a BSSRDF integrated by rays from under the exit; unbiased for the model in convex bodies",
+        serves: Serves::BSSRDF,
+        options_schema: || schemars::schema_for!(RayOptions),
+        build: |options, scene| Ok(Box::new(BssrdfRays::new(scene, &read_options(options)?)?)),
+    };
+
     /// For a scene.
     ///
     /// # Errors
-    /// A rough boundary; a medium that the model does not fit.
+    /// A scene that it does not serve; a medium that the model does not fit.
     pub fn new(scene: Arc<Scene>, options: &RayOptions) -> Result<BssrdfRays> {
+        BssrdfRays::KIND.check(&scene)?;
         let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
         Ok(BssrdfRays {
             illumination: Illumination::new(&bssrdf.scene),

@@ -101,20 +101,12 @@ pub(super) trait Gather {
 const ROULETTE: f64 = 0.05;
 
 impl BssrdfScene {
-    /// For a scene with smooth or matched boundaries.
+    /// For a scene with smooth or matched boundaries, as [`super::Serves::BSSRDF`] has it.
     ///
     /// # Errors
-    /// A rough boundary; a medium that the model does not fit.
+    /// A medium that the model does not fit.
     pub fn new(scene: Arc<Scene>, model: &Model, straight: bool) -> Result<BssrdfScene> {
-        let eta = scene.boundary.iter().map(|boundary| match boundary {
-            Boundary::Matched => Ok(1.0),
-            Boundary::Smooth { eta } => Ok(*eta),
-            Boundary::Rough { .. } => Err(Error::input_help(
-                "a BSSRDF here lies under a smooth boundary, this one is rough",
-                "use `object.boundary.smooth`",
-            )),
-        });
-        let eta = eta.collect::<Result<Vec<f64>>>()?;
+        let eta: Vec<f64> = scene.boundary.iter().map(Boundary::eta).collect();
         let bands = eta.len();
         let models = scene.medium.iter().zip(&eta).enumerate();
         let models = models.map(|(band, (medium, &eta))| model.of(band, bands, medium, eta));

@@ -33,9 +33,14 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::choice::{choose_light, light_shares};
 use super::crossing::{other, radiance_scale};
-use super::{Anomaly, Bias, Cost, Estimator, History, Scores};
+use super::{
+    Anomaly, Bias, Cost, Estimator, EstimatorKind, History, Scores, SensorKind, Serves, read_options,
+};
 use crate::error::{Error, Result};
 use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Shape, Side};
 use crate::math::{DVec3, Frame};
@@ -44,6 +49,15 @@ use crate::optics::medium::Medium;
 use crate::sampling::distance::sample_exponential;
 use crate::sampling::stream::{PassKey, Purpose, Stream};
 use crate::scene::Scene;
+
+/// Options of `light_trace`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LightTraceOptions {
+    /// Photons whose sum is one pass; without it as many as the sensor has rays.
+    #[schemars(range(min = 1, max = 1073741824))]
+    pub paths: Option<usize>,
+}
 
 /// The estimator, for one scene.
 #[derive(Debug)]
@@ -57,23 +71,41 @@ pub struct LightTracer {
 }
 
 impl LightTracer {
+    /// `light_trace` in experiment files.
+    pub const KIND: EstimatorKind = EstimatorKind {
+        kind: "light_trace",
+        doc: "analog tracing from the lights, into `flux`, `rings` or `acceptance_sr`; unbiased at true normals",
+        serves: Serves {
+            sensors: &[SensorKind::Flux, SensorKind::Rings, SensorKind::Accepting],
+            ..Serves::ALL
+        },
+        options_schema: || schemars::schema_for!(LightTraceOptions),
+        build: |options, scene| {
+            let LightTraceOptions { paths } = read_options(options)?;
+            Ok(Box::new(LightTracer::new(scene, paths)?))
+        },
+    };
+
     /// For a scene; `photons` per band and pass, as many as the sensor has rays without it.
     ///
     /// # Errors
-    /// A sensor that photons cannot hit, or whose unit does not fit the body; no photons.
+    /// A scene that it does not serve: photons hit no single point or direction; a sensor whose unit does not fit
+    /// the body; no photons.
     pub fn new(scene: Arc<Scene>, photons: Option<usize>) -> Result<LightTracer> {
+        LightTracer::KIND.check(&scene)?;
         let bounds = scene.shape.bounds();
         if !scene.sensor.receives(bounds.is_some()) {
             return Err(Error::input_help(
-                "light_trace cannot serve this sensor: no photon hits a single point or direction",
-                "it serves `flux`, `rings`, and `orthographic` with `acceptance_sr` (bodies of finite size)",
+                "light_trace: the sensor and the body do not fit",
+                "`rings` and the `flux` of faces need a half-space or slab; other `flux` and `acceptance_sr` a \
+                 finite body",
             ));
         }
         let photons = photons.unwrap_or(scene.sensor.rays_per_pass());
         if photons == 0 {
             return Err(Error::input_help(
                 "light_trace: `paths` is 0",
-                "play at least one photon a pass",
+                "trace at least one photon a pass",
             ));
         }
         Ok(LightTracer { bounds, photons, choice: light_shares(&scene), scene })

@@ -213,7 +213,7 @@ fn agrees_with_path() {
             let layout = Layout::new(&scene);
             let photons = if i == 0 { 4096 } else { 1536 };
             let light = LightTracer::new(Arc::clone(&scene), Some(photons)).expect("it serves");
-            let path = PathTracer::new(scene, Roulette::Below(0.25));
+            let path = PathTracer::new(scene, Roulette::Below(0.25)).expect("a scene that it serves");
             let (from_light, scores) = measure(&light, &layout, 150, "agrees_with_path, light");
             let (from_sensor, _) = measure(&path, &layout, 150, "agrees_with_path, path");
             assert_eq!(scores.anomalies, [0; 3]);

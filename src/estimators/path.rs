@@ -19,14 +19,27 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::bands::OneBand;
 use super::walk::{CameraWalk, Field, Path, Unrivalled, unscattered_notes};
-use super::{Estimator, Scores};
+use super::{Estimator, EstimatorKind, Scores, Serves, read_options};
+use crate::error::Result;
 use crate::optics::boundary::Boundary;
 use crate::sampling::stream::PassKey;
 use crate::scene::Scene;
 
 pub use super::walk::Roulette;
+
+/// Options of `path` and `bidirectional`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PathOptions {
+    /// When a path is ended by chance; both ways are unbiased.
+    #[serde(default)]
+    pub roulette: Roulette,
+}
 
 /// The estimator, for one scene.
 #[derive(Debug)]
@@ -35,9 +48,25 @@ pub struct PathTracer {
 }
 
 impl PathTracer {
+    /// `path` in experiment files.
+    pub const KIND: EstimatorKind = EstimatorKind {
+        kind: "path",
+        doc: "unidirectional path tracing with MIS between BSDF and light sampling; unbiased",
+        serves: Serves::FROM_OUTSIDE,
+        options_schema: || schemars::schema_for!(PathOptions),
+        build: |options, scene| {
+            let PathOptions { roulette } = read_options(options)?;
+            Ok(Box::new(PathTracer::new(scene, roulette)?))
+        },
+    };
+
     /// For a scene.
-    pub fn new(scene: Arc<Scene>, roulette: Roulette) -> PathTracer {
-        PathTracer { field: Field::new(scene, roulette) }
+    ///
+    /// # Errors
+    /// A scene that it does not serve.
+    pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Result<PathTracer> {
+        PathTracer::KIND.check(&scene)?;
+        Ok(PathTracer { field: Field::new(scene, roulette) })
     }
 }
 

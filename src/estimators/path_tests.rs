@@ -34,7 +34,7 @@ fn down() -> Ray {
 /// Mean and standard error of every observable over passes.
 fn measure(scene: Scene, roulette: Roulette, passes: u64, test: &str) -> (Vec<(f64, f64)>, Scores) {
     let layout = Layout::new(&scene);
-    let tracer = PathTracer::new(Arc::new(scene), roulette);
+    let tracer = PathTracer::new(Arc::new(scene), roulette).expect("a scene that it serves");
     let mut scores = Scores::new(layout);
     let key = StreamKey::named(test);
     let mut moments = vec![(0.0, 0.0); scores.observables.len()];
@@ -54,7 +54,7 @@ fn measure(scene: Scene, roulette: Roulette, passes: u64, test: &str) -> (Vec<(f
 }
 
 const SPHERE: Shape = Shape::Sphere { radius: 1.0 };
-const ROULETTES: [Roulette; 2] = [Roulette::Analog, Roulette::Below(0.25)];
+const ROULETTES: [Roulette; 2] = [Roulette::Analog {}, Roulette::Below(0.25)];
 
 fn off_axis() -> Ray {
     Ray { origin: DVec3::new(0.3, -0.5, 3.0), dir: -DVec3::Z }
@@ -79,7 +79,7 @@ fn white_furnace_has_no_variance() {
 fn matched_furnace() {
     let sky = environment(1.0, DVec3::Z, 2.0, "sky");
     let scene = scene(SPHERE, Boundary::Matched, medium(5.0, 1.0, 0.3), vec![sky], off_axis());
-    let (means, _) = measure(scene, Roulette::Analog, 200, "matched_furnace");
+    let (means, _) = measure(scene, Roulette::Analog {}, 200, "matched_furnace");
     let (mean, error) = means[0];
     assert!((mean - 1.0).abs() < 5.0 * error && error < 5e-3, "{mean} {error}");
 }
@@ -216,7 +216,7 @@ fn draws_per_event() {
     let scene =
         scene(SPHERE, Boundary::Smooth { eta: 1.3 }, medium(4.0, 0.8, 0.4), vec![sky], off_axis());
     let layout = Layout::new(&scene);
-    let tracer = PathTracer::new(Arc::new(scene), Roulette::Analog);
+    let tracer = PathTracer::new(Arc::new(scene), Roulette::Analog {}).expect("a scene that it serves");
     let key = StreamKey::named("draws_per_event").pass(0);
     let (mut absorbed, mut escaped) = (0, 0);
     for index in 0..1000 {
@@ -246,7 +246,8 @@ fn equal_bands_on_one_key_are_equal() {
     let one = scene(SPHERE, boundary, medium(3.0, 0.9, 0.5), vec![light(vec![1.0; 2])], off_axis());
     let scene = Scene { boundary: vec![boundary; 2], medium: vec![one.medium[0]; 2], ..one };
     let layout = Layout::new(&scene);
-    let tracer = PathTracer::new(Arc::new(scene), Roulette::Below(0.25));
+    let tracer =
+        PathTracer::new(Arc::new(scene), Roulette::Below(0.25)).expect("a scene that it serves");
     let key = StreamKey::named("equal_bands_on_one_key_are_equal");
     let mut scores = Scores::new(layout);
     tracer.pass(&[0, 1], &key.pass(0), &mut scores);

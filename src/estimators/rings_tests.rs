@@ -135,7 +135,8 @@ fn photons_and_camera_paths_agree_ring_by_ring() {
     ] {
         let scene = Arc::new(scene(shape, boundary, height, rings(4096)));
         let photons = LightTracer::new(Arc::clone(&scene), None).expect("a sensor that it serves");
-        let paths = PathTracer::new(Arc::clone(&scene), Roulette::Below(0.25));
+        let paths =
+            PathTracer::new(Arc::clone(&scene), Roulette::Below(0.25)).expect("a scene that it serves");
         let [light, camera] =
             [("light", &photons as &dyn Estimator), ("camera", &paths)].map(|(kind, e)| {
                 let test = format!("photons_and_camera_paths_agree_ring_by_ring, {name}, {kind}");

@@ -11,6 +11,9 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::bands::{ScorePlace, WalkBands};
 use super::choice::{choose_light, light_shares};
 use super::crossing::{other, radiance_scale};
@@ -23,14 +26,21 @@ use crate::sampling::distance::{sample_exponential, transmittance};
 use crate::sampling::stream::{PassKey, Purpose, Stream};
 use crate::scene::Scene;
 
-/// When a path is ended by chance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Russian roulette: when a path is ended by chance.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Roulette {
     /// At every scattering event with probability 1 - albedo: the weight never changes.
-    Analog,
+    Analog {},
     /// Only where the path's weight has fallen below this: it survives with probability weight over
     /// threshold and continues with the threshold as weight.
-    Below(f64),
+    Below(#[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))] f64),
+}
+
+impl Default for Roulette {
+    fn default() -> Self {
+        Roulette::Below(0.25)
+    }
 }
 
 /// What all walks of an estimator share.
@@ -361,7 +371,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     #[inline]
     fn survive(&mut self, factor: f64) -> Option<()> {
         match self.roulette {
-            Roulette::Analog => (self.stream.draw() < factor).then_some(()),
+            Roulette::Analog {} => (self.stream.draw() < factor).then_some(()),
             Roulette::Below(threshold) => {
                 self.throughput *= factor;
                 self.survival *= factor;

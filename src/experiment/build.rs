@@ -13,7 +13,7 @@ use crate::geometry::{Shape, Side, load_obj, procedural};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 use crate::optics::medium::Medium;
-use crate::optics::microfacet::{MicrofacetKind, Microfacets};
+use crate::optics::microfacet::Microfacets;
 use crate::results::exr_file::{ExrImage, read_exr};
 use crate::results::json::hash_hex;
 use crate::results::record::Band;
@@ -80,11 +80,7 @@ impl<'a> Builder<'a> {
                 eta(words)?.into_iter().map(|eta| Boundary::Smooth { eta }).collect()
             }
             BoundaryEntry::Rough { distribution, alpha, eta: words } => {
-                let kind = match distribution {
-                    schema::Distribution::Ggx => MicrofacetKind::Ggx,
-                    schema::Distribution::Beckmann => MicrofacetKind::Beckmann,
-                };
-                let facets = Microfacets { kind, alpha: *alpha };
+                let facets = Microfacets { kind: *distribution, alpha: *alpha };
                 eta(words)?.into_iter().map(|eta| Boundary::Rough { eta, facets }).collect()
             }
         })

@@ -7,20 +7,11 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 
-/// The words for BSSRDF models.
-pub mod bssrdf;
-
-/// Words for the estimators that integrate a BSSRDF without a point cloud.
-pub mod bssrdf_probe;
-
 /// From words to scenes.
 pub mod build;
 
 /// Words for claims.
 mod claim_words;
-
-/// Options of the samplers of clouds and bodies.
-pub mod cloud_samplers;
 
 /// Words for directions.
 mod direction;
@@ -30,9 +21,6 @@ pub mod document;
 
 /// Claims of efficiency.
 mod duel;
-
-/// The estimators that come with the program.
-pub mod estimators;
 
 /// From a text to an experiment.
 pub mod load;
@@ -46,10 +34,7 @@ mod overrides;
 /// What pictures a file may ask for.
 pub mod picture;
 
-/// Words for `point_cloud`.
-pub mod point_cloud;
-
-/// The estimators and samplers that a program knows by name.
+/// The kinds of estimators and samplers that a file may name.
 pub mod registry;
 
 /// What entries mean: bands, coefficients per band.
@@ -64,9 +49,6 @@ pub mod sampler_file;
 /// From a text to an experiment on samplers.
 mod sampler_load;
 
-/// The samplers that come with the program.
-pub mod samplers;
-
 /// Rules between values.
 mod rules;
 
@@ -78,12 +60,6 @@ pub mod schema_json;
 
 /// Words for sensors.
 mod sensor;
-
-/// Words for skin.
-mod skin;
-
-/// Words for `snee`, and its presets.
-pub mod snee;
 
 /// "Did you mean".
 pub mod suggest;
@@ -100,7 +76,7 @@ pub mod validate;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use registry::{Registry, RegistryEntry};
+pub use registry::Registry;
 pub use sampler_file::SamplerExperiment;
 pub use sweep::resolve_path;
 

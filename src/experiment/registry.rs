@@ -1,96 +1,43 @@
-//! The estimators and samplers that a program knows by name.
+//! The kinds of estimators and samplers that an experiment file may name.
 
-use std::sync::Arc;
-
-use schemars::Schema;
 use serde_json::Value as Json;
 
 use super::validate::grammar;
-use crate::error::Result;
-use crate::estimators::Estimator;
-use crate::samplers::Sampler;
-use crate::scene::Scene;
+use crate::estimators::{self, EstimatorKind};
+use crate::samplers::{self, SamplerKind};
 
-/// What an estimator of one's own derives its options with: these very versions, under
+/// What an estimator of your own derives its options with: these very versions, under
 /// `#[serde(crate = "scatterproof::experiment::registry::serde")]`.
 pub use {schemars, serde, serde_json};
 
-/// How a registered estimator is built from its options and a scene.
-pub type Build = fn(&Json, Arc<Scene>) -> Result<Box<dyn Estimator>>;
-
-/// The estimators and samplers that an experiment file may name.
+/// The kinds of estimators and samplers that an experiment file may name.
 #[derive(Clone, Debug, Default)]
 pub struct Registry {
-    /// One entry a kind of estimator, in the order in which they are listed.
-    pub entries: Vec<RegistryEntry>,
-    /// One entry a kind of sampler, in the order in which they are listed.
-    pub samplers: Vec<SamplerEntry>,
-}
-
-/// One kind of sampler.
-#[derive(Clone, Copy, Debug)]
-pub struct SamplerEntry {
-    /// The name under which a `[[sampler]]` asks for it.
-    pub kind: &'static str,
-    /// What it draws, in one line.
-    pub doc: &'static str,
-    /// The schema of its options, as [`RegistryEntry::options_schema`].
-    pub options_schema: fn() -> Schema,
-    /// Builds it from its validated options.
-    pub build: fn(&Json) -> Result<Box<dyn Sampler>>,
-}
-
-/// One kind of estimator.
-#[derive(Clone, Copy, Debug)]
-pub struct RegistryEntry {
-    /// The name under which an `[[estimator]]` asks for it.
-    pub kind: &'static str,
-    /// What it does, in one line.
-    pub doc: &'static str,
-    /// The schema of its options, `|| schemars::schema_for!(Options)`; options must refuse unknown
-    /// keys and keep to the keywords that validation understands.
-    pub options_schema: fn() -> Schema,
-    /// Builds it from its validated options and a scene.
-    pub build: Build,
+    /// The kinds of estimators, in the order in which they are listed.
+    pub estimators: Vec<EstimatorKind>,
+    /// The kinds of samplers, in the order in which they are listed.
+    pub samplers: Vec<SamplerKind>,
 }
 
 impl Registry {
-    /// The entry of a kind.
-    pub fn get(&self, kind: &str) -> Option<&RegistryEntry> {
-        self.entries.iter().find(|entry| entry.kind == kind)
+    /// Every estimator and sampler of this crate; a program of your own may push its kinds on top.
+    pub fn builtin() -> Registry {
+        Registry { estimators: estimators::KINDS.to_vec(), samplers: samplers::KINDS.to_vec() }
     }
 
-    /// The names of all kinds.
+    /// The kind of estimator of a name.
+    pub fn get(&self, kind: &str) -> Option<&EstimatorKind> {
+        self.estimators.iter().find(|known| known.kind == kind)
+    }
+
+    /// The names of all kinds of estimators.
     pub fn kinds(&self) -> Vec<&'static str> {
-        self.entries.iter().map(|entry| entry.kind).collect()
+        self.estimators.iter().map(|known| known.kind).collect()
     }
 }
 
-impl RegistryEntry {
-    /// The schema of its options as JSON, with its own definitions beside it.
-    pub fn options(&self) -> Json {
-        (self.options_schema)().to_value()
-    }
-
-    /// Its options with the first line of their documentation.
-    pub fn option_docs(&self) -> Vec<(String, String)> {
-        option_docs(&self.options())
-    }
-}
-
-impl SamplerEntry {
-    /// The schema of its options as JSON, with its own definitions beside it.
-    pub fn options(&self) -> Json {
-        (self.options_schema)().to_value()
-    }
-
-    /// Its options with the first line of their documentation.
-    pub fn option_docs(&self) -> Vec<(String, String)> {
-        option_docs(&self.options())
-    }
-}
-
-fn option_docs(options: &Json) -> Vec<(String, String)> {
+/// Options, by the schema of their type, with the first line of their documentation.
+pub fn option_docs(options: &Json) -> Vec<(String, String)> {
     let keys = grammar::keys(options).into_iter();
     keys.map(|key| (key.to_string(), grammar::doc(&options["properties"][key]).to_string())).collect()
 }

@@ -4,7 +4,6 @@ use super::schema::{Bands, Coefficients, Eta, EtaFormula, MediumEntry, Spectrum}
 use crate::optics::colour::{self, BandColours};
 use crate::optics::dispersion::{self, Dispersion};
 use crate::optics::materials;
-use crate::optics::skin::Skin;
 
 /// One wavelength band.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,7 +125,7 @@ impl MediumEntry {
             MediumEntry::Skin(words) => {
                 let g = words.g.unwrap_or(0.0);
                 let band = |band: &Band| {
-                    let (sigma_a, reduced) = Skin::from(words).band(band.range_nm?);
+                    let (sigma_a, reduced) = words.band(band.range_nm?);
                     Some(BandMedium { sigma_a, sigma_s: reduced / (1.0 - g), g })
                 };
                 bands.iter().map(band).collect()

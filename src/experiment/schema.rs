@@ -13,7 +13,8 @@ pub use super::direction::{Direction, Polar};
 pub use super::duel::{CONTROL, CostMeasure, Duel, Faster, NotSlower};
 use super::picture::PictureEntry;
 pub use super::sensor::SensorEntry;
-pub use super::skin::SkinFractions;
+pub use crate::optics::microfacet::MicrofacetKind;
+pub use crate::optics::skin::SkinFractions;
 
 /// One experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -255,7 +256,7 @@ pub enum BoundaryEntry {
     /// A rough dielectric of microfacets with separable Smith masking (Walter et al. 2007).
     Rough {
         /// Distribution of microfacet normals.
-        distribution: Distribution,
+        distribution: MicrofacetKind,
         /// Its roughness.
         #[schemars(range(min = 0.0001, max = 1.0))]
         alpha: f64,
@@ -264,16 +265,6 @@ pub enum BoundaryEntry {
     },
     /// No surface: the same index inside and outside.
     Matched {},
-}
-
-/// Microfacet distributions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Distribution {
-    /// Trowbridge-Reitz.
-    Ggx,
-    /// Gaussian slopes.
-    Beckmann,
 }
 
 /// A relative refractive index.

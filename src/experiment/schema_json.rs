@@ -11,7 +11,7 @@ use super::schema::ExperimentFile;
 pub fn json_schema(registry: &Registry) -> Json {
     let mut schema = schemars::schema_for!(ExperimentFile).to_value();
     schema["title"] = json!("scatterproof experiment");
-    let kinds = registry.entries.iter().map(|entry| (entry.kind, entry.doc, entry.options()));
+    let kinds = registry.estimators.iter().map(|entry| (entry.kind, entry.doc, entry.options()));
     inject("EstimatorEntry", kinds.collect(), &mut schema);
     schema
 }

@@ -6,27 +6,29 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::load::load_text;
-use super::{Experiment, LoadOptions, Registry, RegistryEntry};
+use super::{Experiment, LoadOptions, Registry};
 use crate::error::Error;
+use crate::estimators::{EstimatorKind, Serves};
+use crate::samplers;
 
 /// Options of an estimator that only these tests register.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[allow(dead_code)]
-struct Options {
+struct StubOptions {
     /// The longest path.
     #[serde(default)]
     #[schemars(range(min = 1))]
     max_bounces: Option<u32>,
     /// How it samples.
     #[serde(default)]
-    strategy: Option<Strategy>,
+    strategy: Option<StubStrategy>,
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[allow(dead_code)]
-enum Strategy {
+enum StubStrategy {
     /// All of them.
     All,
     /// None of them.
@@ -36,12 +38,12 @@ enum Strategy {
 /// The registry of the tests: `path` and `snee`.
 pub fn registry() -> Registry {
     let entry = |kind, doc| {
-        let options_schema = || schemars::schema_for!(Options);
+        let options_schema = || schemars::schema_for!(StubOptions);
         let build = |_: &_, _| Err(crate::error::Error::input("never built"));
-        RegistryEntry { kind, doc, options_schema, build }
+        EstimatorKind { kind, doc, serves: Serves::ALL, options_schema, build }
     };
-    let entries = vec![entry("path", "Path tracing."), entry("snee", "Specular connections.")];
-    Registry { entries, samplers: super::samplers::builtin() }
+    let estimators = vec![entry("path", "Path tracing."), entry("snee", "Specular connections.")];
+    Registry { estimators, samplers: samplers::KINDS.to_vec() }
 }
 
 /// The parts of a good experiment; every test replaces one.

@@ -1,16 +1,21 @@
 //! Points on the surface of a finite body, with their density per area and the normals there.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::{FaceId, Mesh, Shape, SurfaceSampler};
 use crate::math::DVec3;
 use crate::sampling::warp::square_to_cap;
 
 /// How a face (triangle of a mesh, side of a box) is chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum FaceChoice {
     /// In proportion to its area: density 1/A.
     #[default]
+    #[serde(rename = "by_area")]
     Area,
     /// Each as likely as any other of K: density 1/(K A_i).
+    #[serde(rename = "by_index")]
     Index,
 }
 

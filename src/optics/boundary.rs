@@ -5,10 +5,11 @@
 //! is radiance from `wi` to `wo`: refraction changes it by the squared index of the receiving side over
 //! that of the sending side.
 //!
-//! Rough surface (Walter, Marschner, Li & Torrance 2007), index n_o on the side of wo, n_i on that of wi:
-//!   reflection  h ~ wo + wi,           f |cos_i| = F D G1(wo) G1(wi) / (4 |cos_o|)              (eq. 20)
+//! Rough surface (Walter, Marschner, Li & Torrance 2007), index n_o on the side of wo, n_i on that of
+//! wi:
+//!   reflection  h ~ wo + wi,           f |cos_i| = F D G1(wo) G1(wi) / (4 |cos_o|)      (eq. 20)
 //!   refraction  h ~ n_o wo + n_i wi,   f |cos_i| = |wo.h| |wi.h| D G1(wo) G1(wi) (1 - F) n_o^2
-//!                                                  / (|cos_o| (n_o wo.h + n_i wi.h)^2)          (eq. 21)
+//!                                                  / (|cos_o| (n_o wo.h + n_i wi.h)^2)  (eq. 21)
 //! with h turned to the side of wo. Their n_i^2 is our n_o^2: eq. 21 transports importance, here it is
 //! radiance. Sampling: h from the visible normals of wo, reflection with probability F(wo.h). Then
 //!   pdf = F G1(wo) D / (4 |cos_o|),   (1 - F) G1(wo) D |wo.h| n_i^2 |wi.h| / (|cos_o| (...)^2)
@@ -114,9 +115,10 @@ impl Boundary {
         }
     }
 
-    /// Draws the direction on the other side for `from`, refraction forced: h from the visible normals of
-    /// `from`, then Snell about h, without a choice of lobe. `None` is a failed sample and scores 0: the facet
-    /// reflects totally, or it sends the light to the side it came from. A delta surface gives
+    /// Draws the direction on the other side for `from`, refraction forced: h from the visible normals
+    /// of
+    /// `from`, then Snell about h, without a choice of lobe. `None` is a failed sample and scores 0: the
+    /// facet reflects totally, or it sends the light to the side it came from. A delta surface gives
     /// [`Self::refract`].
     #[inline]
     pub fn sample_refraction(&self, from: DVec3, u: [f64; 2]) -> Option<DVec3> {
@@ -136,8 +138,8 @@ impl Boundary {
     ///   G1(from) D |from.h| n_to^2 |to.h| / (|cos_from| (n_from from.h + n_to to.h)^2).
     /// The index squared is that of the *sampled* side, so that with `from` = wo
     ///   f |cos_i| / pdf_refraction(wo, wi) = (1 - F) G1(wi) (n_o / n_i)^2.
-    /// Its integral falls short of 1 by the probability of a failed sample. 0 for delta surfaces and where no
-    /// facet joins the directions.
+    /// Its integral falls short of 1 by the probability of a failed sample. 0 for delta surfaces and
+    /// where no facet joins the directions.
     #[inline]
     pub fn pdf_refraction(&self, from: DVec3, to: DVec3) -> f64 {
         let Boundary::Rough { eta, facets } = self else { return 0.0 };
@@ -152,8 +154,8 @@ impl Boundary {
         visible * from_h * square(relative) * -to_h / square(from_h + relative * to_h)
     }
 
-    /// The direction on the other side by Snell about the macroscopic normal, whatever the roughness; `None`
-    /// under total internal reflection. Straight through where there is no surface.
+    /// The direction on the other side by Snell about the macroscopic normal, whatever the roughness;
+    /// `None` under total internal reflection. Straight through where there is no surface.
     #[inline]
     pub fn refract(&self, from: DVec3) -> Option<DVec3> {
         if matches!(self, Boundary::Matched) {
@@ -165,8 +167,8 @@ impl Boundary {
         (cos_t > 0.0).then_some(to)
     }
 
-    /// 1 - F about the macroscopic normal at the angle of `from`, whatever the roughness; 1 where there is no
-    /// surface.
+    /// 1 - F about the macroscopic normal at the angle of `from`, whatever the roughness; 1 where there
+    /// is no surface.
     #[inline]
     pub fn transmittance_smooth(&self, from: DVec3) -> f64 {
         match self {
@@ -211,7 +213,8 @@ fn visible_facet(facets: &Microfacets, wo: DVec3, u: [f64; 2]) -> DVec3 {
     DVec3::new(h.x, h.y, h.z * sign)
 }
 
-/// Snell: the tangential part of `wo` shrinks by `eta` (far side over near side), the normal part is -cos_t.
+/// Snell: the tangential part of `wo` shrinks by `eta` (far side over near side), the normal part is
+/// -cos_t.
 #[inline]
 fn through(wo: DVec3, h: DVec3, eta: f64, cos_t: f64) -> DVec3 {
     (wo.dot(h) / eta - cos_t) * h - wo / eta
@@ -457,9 +460,9 @@ mod tests {
         }
     }
 
-    /// The probability of the sides that forced refraction may fail with, and of what it draws, is 1: the
-    /// density over the far side by quadrature, failures counted over an evenly spread cube. The tolerances
-    /// are those of [`densities_and_failures_sum_to_one`].
+    /// The probability of the sides that forced refraction may fail with, and of what it draws, is 1:
+    /// the density over the far side by quadrature, failures counted over an evenly spread cube. The
+    /// tolerances are those of [`densities_and_failures_sum_to_one`].
     #[test]
     fn refraction_and_its_failures_sum_to_one() {
         for surface in rough_surfaces() {
@@ -520,7 +523,8 @@ mod tests {
                         drawn += 1;
                     }
                 }
-                // Towards the thinner side oblique facets reflect totally, all of them where they are flat.
+                // Towards the thinner side oblique facets reflect totally, all of them where they are
+                // flat.
                 let is_total = fresnel(cos.abs(), far / near).reflectance == 1.0;
                 assert!(is_total || drawn > 300, "{surface:?} {cos}: {drawn}");
             }

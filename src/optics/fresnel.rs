@@ -44,7 +44,8 @@ mod tests {
     }
 
     /// D8: the reflectance is the same from both sides at Snell partners. Coming back out near grazing,
-    /// cos_t^2 is a difference of numbers near 1 and carries eps / cos^2, so 1e-12 is asked from cos 0.05.
+    /// cos_t^2 is a difference of numbers near 1 and carries eps / cos^2, so 1e-12 is asked from cos
+    /// 0.05.
     #[test]
     fn snell_partners_reflect_alike() {
         for eta in [1.05, 1.3, 1.5, 2.4] {

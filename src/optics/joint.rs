@@ -2,19 +2,19 @@
 //!
 //! Light that arrives at a vertex along `w_in`, goes on along w to x, and from there to a given point b,
 //! carries phase(w_in.w) / (|x - a|^2 |x - b|^2). Over the distance along an infinite ray the geometry
-//! integrates to (pi - theta) / (R sin theta) ([`crate::sampling::towards`]), so the direction's density has
-//! to be in proportion to
+//! integrates to (pi - theta) / (R sin theta) ([`crate::sampling::towards`]), so the direction's density
+//! has to be in proportion to
 //!   target(w) = phase(w_in.w) (pi - theta) / sin(theta),     theta the angle between w and b,
-//! and the distance equiangular (joint importance sampling: Georgiev, Krivanek, Hachisuka, Nowrouzezahrai &
-//! Jarosz 2013; Kulla & Fajardo 2012; the phase function of the next vertex is left out). Beside the
-//! isotropic density iso(w) = (pi - theta) / (pi^3 sin theta), which its own map realises exactly, only
-//! phase(w_in.w) is left to tabulate, and it is bounded: a table of it over (theta, azimuth) for each angle
-//! alpha between `w_in` and b, piecewise constant, gives
+//! and the distance equiangular (joint importance sampling: Georgiev, Krivanek, Hachisuka,
+//! Nowrouzezahrai & Jarosz 2013; Kulla & Fajardo 2012; the phase function of the next vertex is left
+//! out). Beside the isotropic density iso(w) = (pi - theta) / (pi^3 sin theta), which its own map
+//! realises exactly, only phase(w_in.w) is left to tabulate, and it is bounded: a table of it over
+//! (theta, azimuth) for each angle alpha between `w_in` and b, piecewise constant, gives
 //!   pdf(w) = iso(w) P(texel) / I(texel),     I(texel) = the isotropic probability of the texel,
 //! which is the density of what is drawn to the last bit, however coarse the texels.
 //!
-//! How close: the mean of target / pdf over the target (both normalised) is 1 where they are the same, and
-//! its excess over 1 is the relative variance of a sample's weight. By the angle alpha (test
+//! How close: the mean of target / pdf over the target (both normalised) is 1 where they are the same,
+//! and its excess over 1 is the relative variance of a sample's weight. By the angle alpha (test
 //! `closer_than_the_mixture`; `PhaseTowards` is the mixture that needs no table):
 //!
 //! | g   | table at 20, 90, 160 degrees | mixture             |
@@ -24,8 +24,9 @@
 //! | 0.8 | 1.009, 1.018, 1.008          | 2.033, 1.387, 1.371 |
 //! | 0.9 | 1.035, 1.083, 1.033          | 1.862, 1.584, 1.591 |
 //!
-//! Beyond that the texels, 2.8 by 5.6 degrees, become coarse beside the phase function's peak, and the variance
-//! grows. Tables for one g are built in 0.05 s and take 1.2 MB; drawing costs about 60 ns, a density 45 ns.
+//! Beyond that the texels, 2.8 by 5.6 degrees, become coarse beside the phase function's peak, and the
+//! variance grows. Tables for one g are built in 0.05 s and take 1.2 MB; drawing costs about 60 ns, a
+//! density 45 ns.
 
 use std::f64::consts::PI;
 
@@ -34,7 +35,8 @@ use crate::math::{DVec3, Frame, cos, sin};
 use crate::sampling::discrete::{Cumulative, choose};
 use crate::sampling::towards::TowardsPoint;
 
-/// Texels in theta, in the half turn of azimuth (the target is even about the plane of `w_in`), in alpha.
+/// Texels in theta, in the half turn of azimuth (the target is even about the plane of `w_in`), in
+/// alpha.
 const ROWS: usize = 64;
 const COLUMNS: usize = 32;
 const NODES: usize = 64;
@@ -46,7 +48,8 @@ const GAUSS: [(f64, f64); 3] =
 /// Tables of the joint density for one phase function.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointTable {
-    /// By alpha, in equal steps over [0, pi]; empty for an isotropic phase function, whose density is exact.
+    /// By alpha, in equal steps over [0, pi]; empty for an isotropic phase function, whose density is
+    /// exact.
     nodes: Vec<Node>,
     /// Cosines of the ends of the steps of alpha and of azimuth, falling; the last end is left out.
     alpha_ends: Vec<f64>,
@@ -72,12 +75,12 @@ pub struct Joint<'a> {
 }
 
 impl JointTable {
-    /// Texels in theta over [0, pi], and in azimuth over the half turn from the plane of `w_in`; in both the
-    /// density jumps at the edges.
+    /// Texels in theta over [0, pi], and in azimuth over the half turn from the plane of `w_in`; in both
+    /// the density jumps at the edges.
     pub const TEXELS: [usize; 2] = [ROWS, COLUMNS];
 
-    /// Builds the tables: for each step of alpha and each texel the mean of the phase function over both,
-    /// by three Gauss points along each of the three angles. No mean is 0.
+    /// Builds the tables: for each step of alpha and each texel the mean of the phase function over
+    /// both, by three Gauss points along each of the three angles. No mean is 0.
     pub fn new(phase: HenyeyGreenstein) -> JointTable {
         let ends = |n: usize| (1..n).map(move |k| cos(PI * k as f64 / n as f64)).collect();
         let (alpha_ends, azimuth_ends) = (ends(NODES), ends(COLUMNS));
@@ -293,8 +296,8 @@ mod tests {
         (frame.to_world(DVec3::new(sin(alpha), 0.0, cos(alpha))), frame)
     }
 
-    /// Sum of f over directions, weighted by the isotropic density: theta and azimuth by the midpoint rule,
-    /// exact in theta for what is constant over the rows, since 2 (pi - theta) / pi^2 is linear.
+    /// Sum of f over directions, weighted by the isotropic density: theta and azimuth by the midpoint
+    /// rule, exact in theta for what is constant over the rows, since 2 (pi - theta) / pi^2 is linear.
     fn isotropic_mean(frame: &Frame, n: usize, f: impl Fn(DVec3) -> f64) -> f64 {
         let mut sum = 0.0;
         for i in 0..n * ROWS {
@@ -368,8 +371,8 @@ mod tests {
         }
     }
 
-    /// Second moment of target / pdf under pdf, both normalised: 1 where the density is the target, and 1 plus
-    /// the relative variance of a sample's weight else.
+    /// Second moment of target / pdf under pdf, both normalised: 1 where the density is the target, and
+    /// 1 plus the relative variance of a sample's weight else.
     fn second_moment(phase: HenyeyGreenstein, alpha: f64, pdf: impl Fn(DVec3) -> f64) -> f64 {
         let (w_in, frame) = arrival(alpha);
         let target = |dir: DVec3| phase.pdf(w_in.dot(dir));
@@ -422,7 +425,8 @@ mod tests {
         assert_eq!(by_mixture.towards(w_in, TO).pdf(DVec3::X), mixture.pdf(DVec3::X));
     }
 
-    /// What building, drawing and asking cost; `cargo test --release joint::tests::cost -- --ignored --nocapture`.
+    /// What building, drawing and asking cost; `cargo test --release joint::tests::cost -- --ignored
+    /// --nocapture`.
     #[test]
     #[ignore = "times, for people"]
     fn cost() {

@@ -8,7 +8,7 @@
 
 /// A measured material; the arrays hold the bands R, G, B.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Material {
+pub struct MeasuredMaterial {
     /// Name in experiment files.
     pub name: &'static str,
     /// Reduced scattering coefficient sigma_s (1 - g), 1/mm.
@@ -30,12 +30,12 @@ const fn material(
     sigma_a: [f64; 3],
     reflectance: [f64; 3],
     eta: f64,
-) -> Material {
-    Material { name, reduced_sigma_s, sigma_a, reflectance, eta }
+) -> MeasuredMaterial {
+    MeasuredMaterial { name, reduced_sigma_s, sigma_a, reflectance, eta }
 }
 
 /// The materials by name.
-pub const MATERIALS: [Material; 8] = [
+pub const MATERIALS: [MeasuredMaterial; 8] = [
     material("apple", [2.29, 2.39, 1.97], [0.003, 0.0034, 0.046], [0.85, 0.84, 0.53], 1.3),
     material("chicken1", [0.15, 0.21, 0.38], [0.015, 0.077, 0.19], [0.31, 0.15, 0.1], 1.3),
     material("cream", [7.38, 5.47, 3.15], [0.0002, 0.0028, 0.0163], [0.98, 0.9, 0.73], 1.3),
@@ -47,7 +47,7 @@ pub const MATERIALS: [Material; 8] = [
 ];
 
 /// The material of a name.
-pub fn find(name: &str) -> Option<&'static Material> {
+pub fn find(name: &str) -> Option<&'static MeasuredMaterial> {
     MATERIALS.iter().find(|material| material.name == name)
 }
 

@@ -3,10 +3,14 @@
 
 use std::f64::consts::FRAC_1_PI;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::math::{DVec3, erf_inv, erfc, exp, increasing_root, ln_1p, sin_cos_turns};
 
 /// Shape of the distribution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum MicrofacetKind {
     /// Trowbridge & Reitz 1975; Walter et al. 2007, eq. 33.
     Ggx,
@@ -15,11 +19,14 @@ pub enum MicrofacetKind {
 }
 
 /// A distribution of microfacet normals.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Microfacets {
-    /// Its shape.
+    /// Shape of the distribution.
+    #[serde(rename = "distribution")]
     pub kind: MicrofacetKind,
-    /// Its roughness.
+    /// Roughness of the facets.
+    #[schemars(range(min = 0.001, max = 1.0))]
     pub alpha: f64,
 }
 
@@ -188,7 +195,8 @@ mod tests {
         for facets in all() {
             for cos in [1.0, 0.7, 0.2, 0.01] {
                 let v = view(cos, 0.0);
-                // Slopes: h = (-x, -y, 1)/sqrt(1 + x^2 + y^2), d omega = h.z^3 dx dy; y by symmetry twice.
+                // Slopes: h = (-x, -y, 1)/sqrt(1 + x^2 + y^2), d omega = h.z^3 dx dy; y by symmetry
+                // twice.
                 let norm = integrate(
                     |p| {
                         let s = p / (1.0 - p * p);

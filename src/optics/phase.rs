@@ -2,12 +2,17 @@
 
 use std::f64::consts::{FRAC_1_PI, PI};
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use crate::math::{DVec3, Frame, sin_cos_turns};
 
 /// Henyey & Greenstein 1941, for every |g| < 1; g = 0 is isotropic.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct HenyeyGreenstein {
     /// Mean cosine; positive is forward.
+    #[schemars(range(min = -0.9999, max = 0.9999))]
     pub g: f64,
 }
 

@@ -1,29 +1,44 @@
 //! The spectral absorption and scattering of skin, one homogeneous layer.
 //!
-//! Donner & Jensen, "A Spectral BSSRDF for Shading Human Skin" (2006), after Jacques (1998), l in nm, all in 1/mm:
+//! Donner & Jensen, "A Spectral BSSRDF for Shading Human Skin" (2006), after Jacques (1998), l in nm,
+//! all in 1/mm:
 //!   eumelanin      6.6e10 l^-3.33          pheomelanin   2.9e14 l^-4.75
 //!   baseline       0.0244 + 8.53 e^(-(l - 154)/66.2)
 //!   scattering     sigma_s' = 14.74 l^-0.22 + 2.2e11 l^-4
-//! and haemoglobin (150 g/l of blood, 64500 g/mol) from its molar extinction: ln 10 * eps * 150/64500 /10 per mm.
+//! and haemoglobin (150 g/l of blood, 64500 g/mol) from its molar extinction: ln 10 * eps * 150/64500
+//! /10 per mm.
 //!   sigma_a = m (b eu + (1 - b) pheo) + h (o HbO2 + (1 - o) Hb) + (1 - m - h) baseline
-//! with the volume fractions m of melanosomes and h of blood, the share b of eumelanin, and the oxygenation o. Real skin
-//! has its melanin above its blood; mixing them in one layer keeps the colours and loses the layers' order.
+//! with the volume fractions m of melanosomes and h of blood, the share b of eumelanin, and the
+//! oxygenation o. Real skin has its melanin above its blood; mixing them in one layer keeps the colours
+//! and loses the layers' order.
 
 use std::sync::LazyLock;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::math::{exp, ln, pow};
 
-/// Volume fractions of skin.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Skin {
-    /// m: melanosomes, 0 to 1; light skin about 0.01, dark 0.4.
+/// Skin by its constituents: volume fractions, and the mean cosine of the phase function.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SkinFractions {
+    /// Melanosomes: about 0.01 in light skin, 0.4 in dark.
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub melanin: f64,
-    /// b: eumelanin of all melanin, 0 to 1.
+    /// Eumelanin of all melanin.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub eumelanin_share: f64,
-    /// h: blood, 0 to 1 - m; about 0.002 to 0.07.
+    /// Blood: about 0.002 to 0.07.
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub blood: f64,
-    /// o: oxygenated haemoglobin of all, 0 to 1; about 0.7.
+    /// Oxygenated haemoglobin of all: about 0.7.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub oxygenation: f64,
+    /// Mean cosine; sigma_s = sigma_s' / (1 - g). Without it g = 0 and sigma_s = sigma_s'.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 1))]
+    pub g: Option<f64>,
 }
 
 /// Rows of wavelength, HbO2 and Hb.
@@ -41,8 +56,9 @@ static HAEMOGLOBIN: LazyLock<Vec<[f64; 3]>> = LazyLock::new(|| {
 /// The wavelengths of the table, nm.
 pub const RANGE_NM: [f64; 2] = [380.0, 780.0];
 
-impl Skin {
-    /// Absorption and reduced scattering, 1/mm, at a wavelength in [`RANGE_NM`]; outside it the table's ends hold.
+impl SkinFractions {
+    /// Absorption and reduced scattering, 1/mm, at a wavelength in [`RANGE_NM`]; outside it the table's
+    /// ends hold.
     pub fn at(&self, nm: f64) -> (f64, f64) {
         let [oxygenated, deoxygenated] = haemoglobin(nm);
         let melanin = self.eumelanin_share * 6.6e10 * pow(nm, -3.33)
@@ -78,12 +94,12 @@ fn haemoglobin(nm: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    fn pure(melanin: f64, eumelanin_share: f64, blood: f64, oxygenation: f64) -> Skin {
-        Skin { melanin, eumelanin_share, blood, oxygenation }
+    fn pure(melanin: f64, eumelanin_share: f64, blood: f64, oxygenation: f64) -> SkinFractions {
+        SkinFractions { melanin, eumelanin_share, blood, oxygenation, g: None }
     }
 
-    /// Each constituent alone, to the six digits of a table computed elsewhere: l; HbO2, Hb, eumelanin, pheomelanin,
-    /// baseline, sigma_s'.
+    /// Each constituent alone, to the six digits of a table computed elsewhere: l; HbO2, Hb, eumelanin,
+    /// pheomelanin, baseline, sigma_s'.
     #[test]
     fn constituents() {
         for (nm, expected) in [

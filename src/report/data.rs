@@ -21,7 +21,7 @@ pub struct ReportData {
     /// The mean of every observable.
     pub rows: Vec<Measurement>,
     /// Efficiencies of pairs of estimators.
-    pub comparisons: Vec<Row>,
+    pub comparisons: Vec<EfficiencyRow>,
     /// Errors of models against light transport.
     pub model_errors: Vec<ModelError>,
     /// The pictures by cell, in viewers that compare them.

@@ -1,14 +1,49 @@
 //! Points on the surface of a sphere or a box.
 //!
-//! Charts: the sphere by (1 + z/R)/2 and azimuth in turns, each of density 1 by area (Archimedes); a side of a box by its
-//! two coordinates over their range.
+//! Charts: the sphere by (1 + z/R)/2 and azimuth in turns, each of density 1 by area (Archimedes); a
+//! side of a box by its two coordinates over their range.
 
 use std::f64::consts::PI;
 
-use super::{Axis, Contrast, Draw, Piece, Sampler, turns};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::kind::{SamplerKind, sampler_kind};
+use super::sampler::{Contrast, Coordinate, Draw, Piece, Sampler, turns};
 use crate::geometry::{BodySampler, FaceChoice, FaceId, Shape};
 use crate::math::DVec3;
 use crate::sampling::stream::Stream;
+
+/// `body_surface` in experiment files.
+pub const KIND: SamplerKind = sampler_kind!(
+    "body_surface",
+    "points on a sphere or a box",
+    BodyOptions => |o| Ok(match o.shape {
+        BodyShape::Sphere(radius) => BodySurfaceSampler::sphere(radius),
+        BodyShape::Box(edges) => BodySurfaceSampler::cuboid(edges, o.faces),
+    })
+);
+
+/// Options of `body_surface`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct BodyOptions {
+    /// The body.
+    shape: BodyShape,
+    /// How a side of a box is chosen.
+    #[serde(default)]
+    faces: FaceChoice,
+}
+
+/// Bodies with exact surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+enum BodyShape {
+    /// A sphere of this radius, mm.
+    Sphere(#[schemars(extend("exclusiveMinimum" = 0))] f64),
+    /// A box with these edges, mm.
+    Box([f64; 3]),
+}
 
 /// The surface of a sphere or box.
 pub struct BodySurfaceSampler {
@@ -77,10 +112,10 @@ impl Sampler for BodySurfaceSampler {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        let square = || [Axis::over(0.0, 1.0), Axis::over(0.0, 1.0)];
+        let square = || [Coordinate::over(0.0, 1.0), Coordinate::over(0.0, 1.0)];
         match self.shape {
             Shape::Box { .. } => (0..6).map(|k| Piece::plane(format!("side {k}"), square())).collect(),
-            _ => vec![Piece::plane("sphere", [Axis::over(0.0, 1.0), Axis::turns()])],
+            _ => vec![Piece::plane("sphere", [Coordinate::over(0.0, 1.0), Coordinate::turns()])],
         }
     }
 

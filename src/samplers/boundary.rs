@@ -1,19 +1,124 @@
-//! The refractive surface as a whole: the rough dielectric in charts of its half vectors, the smooth one by
-//! its masses and directions.
+//! The refractive surface as a whole: the rough dielectric in charts of its half vectors, the smooth one
+//! by its masses and directions.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
 
 use super::facets::{SlopeChart, Slopes, view};
-use super::{Axis, Contrast, Discrete, Draw, Null, Piece, Sampler};
+use super::kind::{SamplerKind, sampler_kind};
+use super::sampler::{Contrast, Coordinate, Discrete, Draw, Null, Piece, Sampler};
+use crate::error::{Error, Result};
 use crate::math::{DVec3, acos, asin, atan2, integrate, sin, tan};
 use crate::optics::boundary::{Boundary, BoundarySample, Density, Event};
 use crate::optics::fresnel::fresnel;
-use crate::optics::microfacet::Microfacets;
+use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::sampling::stream::Stream;
+
+/// `rough_dielectric` in experiment files.
+pub const ROUGH: SamplerKind = sampler_kind!(
+    "rough_dielectric",
+    "the rough dielectric as a whole: reflection, refraction, total reflection",
+    RoughOptions => |o| o.sampler(RoughSampler::new)
+);
+
+/// `rough_refraction` in experiment files.
+pub const ROUGH_REFRACTION: SamplerKind = sampler_kind!(
+    "rough_refraction",
+    "refraction through a rough dielectric, without a choice of lobe",
+    RoughOptions => |o| o.sampler(RoughSampler::refraction)
+);
+
+/// `smooth_dielectric` in experiment files.
+pub const SMOOTH: SamplerKind = sampler_kind!(
+    "smooth_dielectric",
+    "which lobe of the smooth dielectric, with exact directions",
+    SmoothOptions => |o| Ok(SmoothSampler::smooth(o.eta, o.view.signed(o.cos)))
+);
+
+/// `matched_boundary` in experiment files.
+pub const MATCHED: SamplerKind = sampler_kind!(
+    "matched_boundary",
+    "the boundary that is none: straight through",
+    MatchedOptions => |o| Ok(SmoothSampler::matched(o.view.signed(o.cos)))
+);
+
+/// Options of `rough_dielectric` and `rough_refraction`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct RoughOptions {
+    /// Shape of the distribution.
+    distribution: MicrofacetKind,
+    /// Roughness of the facets.
+    #[schemars(range(min = 0.001, max = 1.0))]
+    alpha: f64,
+    /// Index inside over outside, not 1.
+    #[schemars(range(min = 0.25, max = 4.0))]
+    eta: f64,
+    /// From where it is seen.
+    view: ViewSide,
+    /// Cosine of the view.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
+    cos: f64,
+}
+
+impl RoughOptions {
+    fn sampler(&self, new: fn(f64, Microfacets, f64) -> RoughSampler) -> Result<RoughSampler> {
+        if self.eta == 1.0 {
+            return Err(Error::input(
+                "sampler options: eta = 1 is no rough dielectric; use matched_boundary",
+            ));
+        }
+        let facets = Microfacets { kind: self.distribution, alpha: self.alpha };
+        Ok(new(self.eta, facets, self.view.signed(self.cos)))
+    }
+}
+
+/// Options of `smooth_dielectric`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct SmoothOptions {
+    /// Index inside over outside.
+    #[schemars(range(min = 0.25, max = 4.0))]
+    eta: f64,
+    /// From where it is seen.
+    view: ViewSide,
+    /// Cosine of the view.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
+    cos: f64,
+}
+
+/// Options of `matched_boundary`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct MatchedOptions {
+    /// From where it is seen.
+    view: ViewSide,
+    /// Cosine of the view.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
+    cos: f64,
+}
+
+/// From where a boundary is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum ViewSide {
+    /// From the vacuum.
+    Outside,
+    /// From the medium.
+    Inside,
+}
+
+impl ViewSide {
+    fn signed(self, cos: f64) -> f64 {
+        if self == ViewSide::Outside { cos } else { -cos }
+    }
+}
 
 /// Every direction to which a rough dielectric sends one `wo`.
 ///
-/// For one `wo` (cosine c, sine s) reflection and refraction each map half vectors to directions one to one,
-/// so each is charted by its half vector's slopes (X, Y); r is the index of the far side over that of the
-/// side of `wo`. With A = c - X s, q = 1 + X^2 + Y^2, m = wo.h = A / sqrt(q), h.z = 1 / sqrt(q):
+/// For one `wo` (cosine c, sine s) reflection and refraction each map half vectors to directions one to
+/// one, so each is charted by its half vector's slopes (X, Y); r is the index of the far side over that
+/// of the side of `wo`. With A = c - X s, q = 1 + X^2 + Y^2, m = wo.h = A / sqrt(q), h.z = 1 / sqrt(q):
 ///   wi above the surface      2 m h.z > c                    q < q_r = 2 A / c          (a disc)
 ///   total reflection (r < 1)  m^2 < m_c^2 = 1 - r^2          q > q_c = A^2 / m_c^2      (a cone)
 ///   refracted wi below        m h.z - h.z sqrt(m^2 - m_c^2) < c, from wi = (m/r - cos_t) h - wo/r; for
@@ -23,29 +128,29 @@ use crate::sampling::stream::Stream;
 ///   partial reflection  q < min(q_r, q_c);   refraction  q < q_c or q_w;
 ///   total reflection    between q_c and q_r: beside the cone at both sides of it in Y, and before and
 ///                       beyond it in X, where the cone is not met.
-/// In the plane of view a facet turned by angle xi has m = cos(theta + xi): the ends in X are the tangents of
-/// -(pi/4 + theta/2) and pi/4 - theta/2 for q_r, of -theta - gamma and -theta + gamma for q_c (cos gamma =
-/// m_c), and (r - s) / c for q_w, the root of q_w = 1 + X^2.
+/// In the plane of view a facet turned by angle xi has m = cos(theta + xi): the ends in X are the
+/// tangents of -(pi/4 + theta/2) and pi/4 - theta/2 for q_r, of -theta - gamma and -theta + gamma for q_c (cos gamma
+/// = m_c), and (r - s) / c for q_w, the root of q_w = 1 + X^2.
 ///
 /// Jacobians: about wo, h is at the polar angle g, wi at b(g) and the same azimuth, so that
-/// d omega_i / d omega_h = |sin b b'| / sin g. Reflection: b = 2g, 4 cos g. Refraction: b = pi + g - g_t,
-/// sin g_t = sin g / r: (cos g_t - cos g / r)^2 / cos g_t.
+/// d omega_i / d omega_h = |sin b b'| / sin g. Reflection: b = 2g, 4 cos g. Refraction: b = pi + g -
+/// g_t, sin g_t = sin g / r: (cos g_t - cos g / r)^2 / cos g_t.
 ///
-/// Forced refraction is the piece of refraction alone; it fails beyond the piece's end, by a wrong side or
-/// by total reflection, whatever the reflectance: where q > q_w or else q > q_c.
+/// Forced refraction is the piece of refraction alone; it fails beyond the piece's end, by a wrong side
+/// or by total reflection, whatever the reflectance: where q > q_w or else q > q_c.
 pub struct RoughSampler {
     boundary: Boundary,
     is_forced: bool,
     /// Towards the sensor; below the surface for light from inside.
     wo: DVec3,
-    region: Region,
-    parts: Vec<Part>,
+    region: SlopeRegion,
+    parts: Vec<SlopePiece>,
     null: f64,
 }
 
 /// The curves of the slope plane.
 #[derive(Clone, Copy)]
-struct Region {
+struct SlopeRegion {
     slopes: Slopes,
     /// r.
     relative: f64,
@@ -55,7 +160,7 @@ struct Region {
 
 /// One piece.
 #[derive(Clone, Copy)]
-struct Part {
+struct SlopePiece {
     name: &'static str,
     event: Event,
     chart: SlopeChart,
@@ -69,13 +174,15 @@ struct Part {
 enum Reach {
     Refraction,
     PartialReflection,
-    /// The whole disc at this X.
-    Total,
+    /// The whole disc at this X, before the cone begins in X.
+    TotalBefore,
+    /// The whole disc at this X, beyond the end of the cone in X.
+    TotalBeyond,
     /// The disc without the cone, at the side of Y with this sign.
     TotalBeside(f64),
 }
 
-impl Region {
+impl SlopeRegion {
     fn along(&self, x: f64) -> f64 {
         self.slopes.cos - x * self.slopes.sin
     }
@@ -104,21 +211,21 @@ impl Region {
                 [-top, top]
             }
             Reach::PartialReflection => [-y(reflected.min(critical)), y(reflected.min(critical))],
-            Reach::Total => [-y(reflected), y(reflected)],
+            Reach::TotalBefore | Reach::TotalBeyond => [-y(reflected), y(reflected)],
             Reach::TotalBeside(sign) if sign > 0.0 => [y(critical), y(reflected)],
             Reach::TotalBeside(_) => [-y(reflected), -y(critical)],
         }
     }
 
     /// Where the curves begin and end in X.
-    fn edges(&self) -> Edges {
+    fn edges(&self) -> SlopeEdges {
         let Slopes { cos, sin: s, .. } = self.slopes;
         let theta = atan2(s, cos);
         let quarter = 0.25 * std::f64::consts::PI;
         let gamma = asin(self.relative.min(1.0));
         let over =
             |numerator: f64| if s > 0.0 { numerator / (cos * s) } else { numerator * f64::INFINITY };
-        Edges {
+        SlopeEdges {
             disc: [-tan(quarter + 0.5 * theta), tan(quarter - 0.5 * theta)],
             cone: [Slopes::turned(-theta - gamma), Slopes::turned(gamma - theta)],
             wrong_side: (self.relative - s) / cos,
@@ -129,7 +236,7 @@ impl Region {
     }
 }
 
-struct Edges {
+struct SlopeEdges {
     disc: [f64; 2],
     cone: [f64; 2],
     wrong_side: f64,
@@ -156,7 +263,7 @@ impl RoughSampler {
         let sign = 1f64.copysign(cos);
         let relative = if cos > 0.0 { eta } else { 1.0 / eta };
         let critical2 = if relative < 1.0 { (1.0 - relative) * (1.0 + relative) } else { 0.0 };
-        let region = Region { slopes: Slopes::about(up), relative, critical2 };
+        let region = SlopeRegion { slopes: Slopes::about(up), relative, critical2 };
         let mut parts = parts(&region, facets.alpha);
         parts.retain(|part| !is_forced || part.event == Event::Refract);
         let wo = DVec3::new(up.x, up.y, up.z * sign);
@@ -187,7 +294,8 @@ impl RoughSampler {
         let shift = cos - m / self.region.relative;
         match event {
             Event::Reflect => 4.0 * m,
-            // At the critical angle the share that is refracted vanishes with the cosine, the density with it.
+            // At the critical angle the share that is refracted vanishes with the cosine, the density
+            // with it.
             Event::Refract if cos == 0.0 => 0.0,
             Event::Refract => shift * shift / cos,
         }
@@ -203,14 +311,10 @@ impl RoughSampler {
             Event::Reflect if x > edges.cone[0] && x < edges.cone[1] => {
                 Reach::TotalBeside(1f64.copysign(y))
             }
-            Event::Reflect => Reach::Total,
+            Event::Reflect if x < edges.cone[1] => Reach::TotalBefore,
+            Event::Reflect => Reach::TotalBeyond,
         };
-        let holds = |part: &Part| {
-            let is_before = reach != Reach::Total
-                || part.name.ends_with(if x < edges.cone[1] { "before" } else { "beyond" });
-            part.reach == reach && is_before
-        };
-        self.parts.iter().position(holds)
+        self.parts.iter().position(|part| part.reach == reach)
     }
 
     /// A direction with its event and the density that the code says it has.
@@ -234,7 +338,7 @@ impl RoughSampler {
         let h = if sum.z < 0.0 { -sum.normalize() } else { sum.normalize() };
         let slopes = self.region.slopes.of(h);
         let piece = self.part_of(event, slopes)?;
-        let Part { chart, reach, .. } = self.parts[piece];
+        let SlopePiece { chart, reach, .. } = self.parts[piece];
         let at = chart.coordinates(slopes, self.region.range(reach, slopes[0]));
         let (_, solid_angle) = chart.at(at, |x| self.region.range(reach, x));
         // The cosine of wi itself: by Snell from that of wo it loses its digits at the critical angle.
@@ -243,13 +347,13 @@ impl RoughSampler {
     }
 }
 
-fn parts(region: &Region, alpha: f64) -> Vec<Part> {
+fn parts(region: &SlopeRegion, alpha: f64) -> Vec<SlopePiece> {
     let edges = region.edges();
     let mut parts = Vec::new();
     let mut add = |name, event, reach, [from, to]: [f64; 2], kink: f64| {
         if from < to {
             let chart = SlopeChart::new(region.slopes, alpha, [from, to]);
-            parts.push(Part { name, event, chart, reach, kink });
+            parts.push(SlopePiece { name, event, chart, reach, kink });
         }
     };
     let never = f64::NAN;
@@ -274,11 +378,11 @@ fn parts(region: &Region, alpha: f64) -> Vec<Part> {
         let name = if sign < 0.0 { "total reflection, left" } else { "total reflection, right" };
         add(name, Event::Reflect, Reach::TotalBeside(sign), beside, never);
     }
-    add("total reflection, before", Event::Reflect, Reach::Total, [disc[0], cone[0]], never);
+    add("total reflection, before", Event::Reflect, Reach::TotalBefore, [disc[0], cone[0]], never);
     add(
         "total reflection, beyond",
         Event::Reflect,
-        Reach::Total,
+        Reach::TotalBeyond,
         [cone[1].max(disc[0]), disc[1]],
         never,
     );
@@ -287,8 +391,9 @@ fn parts(region: &Region, alpha: f64) -> Vec<Part> {
 
 /// The probability that the chosen facet sends the light to the wrong side, from the facets' density and
 /// Fresnel's reflectance F over the rest of the half-plane of visible slopes: reflection (F) where
-/// q > q_r, refraction (1 - F) where q_w < q < q_c. Of forced refraction all of what lies beyond its piece.
-fn null(region: &Region, facets: &Microfacets, wo: DVec3, is_forced: bool) -> f64 {
+/// q > q_r, refraction (1 - F) where q_w < q < q_c. Of forced refraction all of what lies beyond its
+/// piece.
+fn null(region: &SlopeRegion, facets: &Microfacets, wo: DVec3, is_forced: bool) -> f64 {
     let edges = region.edges();
     let mut ends = vec![f64::NEG_INFINITY, edges.horizon];
     ends.extend(edges.disc);
@@ -346,17 +451,17 @@ impl Sampler for RoughSampler {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        let piece = |part: &Part| {
+        let piece = |part: &SlopePiece| {
             let kink = part.chart.along(part.kink);
-            let mut along = Axis::over(0.0, 1.0);
+            let mut along = Coordinate::over(0.0, 1.0);
             along.kinks.extend((kink > 0.0 && kink < 1.0).then_some(kink));
-            Piece::plane(part.name, [along, Axis::over(0.0, 1.0)])
+            Piece::plane(part.name, [along, Coordinate::over(0.0, 1.0)])
         };
         self.parts.iter().map(piece).collect()
     }
 
     fn density(&self, piece: usize, at: [f64; 2]) -> f64 {
-        let Part { event, chart, reach, .. } = self.parts[piece];
+        let SlopePiece { event, chart, reach, .. } = self.parts[piece];
         let (slopes, solid_angle) = chart.at(at, |x| self.region.range(reach, x));
         let (wi, jacobian) = self.direction(event, self.region.slopes.normal(slopes));
         let pdf = if self.is_forced {
@@ -375,7 +480,7 @@ impl Sampler for RoughSampler {
         let events: Vec<Event> = self.parts.iter().map(|part| part.event).collect();
         let (parts, region) = (self.parts.clone(), self.region);
         let slope = move |piece: usize, at: [f64; 2], axis: usize| {
-            let Part { chart, reach, .. } = parts[piece];
+            let SlopePiece { chart, reach, .. } = parts[piece];
             let (slopes, _) = chart.at(at, |x| region.range(reach, x));
             chart.bounded(slopes)[axis]
         };
@@ -404,9 +509,9 @@ impl Sampler for RoughSampler {
 
 /// The smooth dielectric or the matched boundary: which lobe, with its direction and weight checked.
 ///
-/// The masses are Fresnel's formulas by angles (Born & Wolf, 1.5.2): with i and t the angles on both sides,
-/// R = (sin^2(i - t) / sin^2(i + t) + tan^2(i - t) / tan^2(i + t)) / 2, and ((r - 1) / (r + 1))^2 along the
-/// normal.
+/// The masses are Fresnel's formulas by angles (Born & Wolf, 1.5.2): with i and t the angles on both
+/// sides, R = (sin^2(i - t) / sin^2(i + t) + tan^2(i - t) / tan^2(i + t)) / 2, and ((r - 1) / (r + 1))^2
+/// along the normal.
 pub struct SmoothSampler {
     boundary: Boundary,
     wo: DVec3,

@@ -1,11 +1,31 @@
 //! Discrete choices: bands, and a flight by a hero band.
 
-use super::distance::{Unbounded, line, unit};
-use super::{Contrast, Discrete, Draw, Piece, Sampler};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::chart::{Charted, Technique, Unbounded};
+use super::kind::{SamplerKind, sampler_kind, some};
+use super::sampler::{Contrast, Discrete, Draw, Piece, Sampler};
 use crate::math::exp;
 use crate::sampling::discrete::Cumulative;
 use crate::sampling::distance::{pdf_distance_exponential, sample_exponential};
 use crate::sampling::stream::Stream;
+
+/// `band_selection` in experiment files.
+pub const BAND: SamplerKind = sampler_kind!(
+    "band_selection",
+    "one band of many, by its probability",
+    BandOptions => |o| some(BandSampler::new(&o.weights))
+);
+
+/// Options of `band_selection`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct BandOptions {
+    /// Weights of the bands, in any unit.
+    #[schemars(length(min = 1), inner(range(min = 0.0)))]
+    weights: Vec<f64>,
+}
 
 /// One band of many, and whether its table says the probability that was asked for.
 pub struct BandSampler {
@@ -43,49 +63,52 @@ impl Sampler for BandSampler {
     }
 }
 
-/// An exponential flight by a band that is chosen first, with what is left of the same number: the density
-/// is the mixture over all bands. Charted by t = l x / (1 - x), l the mean of the mean free paths.
-pub struct HeroFlightSampler {
+/// `hero_flight` in experiment files, charted by t = l x / (1 - x), l the mean of the mean free paths.
+pub const HERO_FLIGHT: SamplerKind = sampler_kind!(
+    "hero_flight",
+    "free flights by a hero band, with the density of all bands together",
+    HeroOptions => |o| {
+        let sigma_t = o.sigma_t_per_mm;
+        let table = Cumulative::new(&o.weights).filter(|_| sigma_t.len() == o.weights.len());
+        let mean = sigma_t.iter().map(|s| 1.0 / s).sum::<f64>() / sigma_t.len() as f64;
+        Ok(Charted::new(HeroFlight { table: some(table)?, sigma_t }, Unbounded(mean)))
+    }
+);
+
+/// Options of `hero_flight`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct HeroOptions {
+    /// Extinctions of the bands, 1/mm.
+    #[schemars(length(min = 1), inner(range(min = 1e-6)))]
+    sigma_t_per_mm: Vec<f64>,
+    /// Weights of the bands, as many, in any unit.
+    #[schemars(length(min = 1), inner(range(min = 0.0)))]
+    weights: Vec<f64>,
+}
+
+/// An exponential flight by a band that is chosen first, with what is left of the same number: the
+/// density is the mixture over all bands.
+struct HeroFlight {
     table: Cumulative,
     sigma_t: Vec<f64>,
-    chart: Unbounded,
 }
 
-impl HeroFlightSampler {
-    /// Extinctions (1/mm) and the weights of their bands, as many; `None` if these are no distribution.
-    pub fn new(sigma_t: Vec<f64>, weights: &[f64]) -> Option<HeroFlightSampler> {
-        let table = Cumulative::new(weights)?;
-        if sigma_t.len() != weights.len() {
-            return None;
-        }
-        let mean = sigma_t.iter().map(|s| 1.0 / s).sum::<f64>() / sigma_t.len() as f64;
-        Some(HeroFlightSampler { table, sigma_t, chart: Unbounded(mean) })
-    }
-}
-
-impl Sampler for HeroFlightSampler {
-    fn draw(&self, stream: &mut Stream) -> Draw {
+impl Technique<Unbounded> for HeroFlight {
+    fn sample(&self, stream: &mut Stream) -> (f64, Option<f64>) {
         let (hero, u) = self.table.sample(stream.draw());
-        let x = self.chart.coordinate(sample_exponential(self.sigma_t[hero], u));
-        line(x, self.density(0, [x, 0.5]))
+        (sample_exponential(self.sigma_t[hero], u), None)
     }
 
-    fn pieces(&self) -> Vec<Piece> {
-        unit("distance")
+    fn pdf(&self, t: f64) -> f64 {
+        self.table.mixture_pdf(self.sigma_t.iter().map(|&s| pdf_distance_exponential(s, t)))
     }
 
-    fn density(&self, _piece: usize, [x, _]: [f64; 2]) -> f64 {
-        let pdfs = |t| self.sigma_t.iter().map(move |&s| pdf_distance_exponential(s, t));
-        self.chart.at(x).map_or(0.0, |(t, dt)| self.table.mixture_pdf(pdfs(t)) * dt)
-    }
-
-    fn contrasts(&self) -> Vec<Contrast> {
+    fn contrasts(&self, chart: &Unbounded) -> Vec<Contrast> {
         // int s e^(-s t) e^(-c t) dt = s / (s + c) in every band.
-        let rate = 1.0 / self.chart.0;
+        let rate = 1.0 / chart.0;
         let mean = |(k, s): (usize, &f64)| self.table.probability(k) * s / (s + rate);
         let expected = self.sigma_t.iter().enumerate().map(mean).sum();
-        let chart = self.chart;
-        let decay = move |[x, _]: [f64; 2]| chart.at(x).map_or(0.0, |(t, _)| exp(-rate * t));
-        vec![Contrast::of("mean decay", Some(expected), decay)]
+        vec![chart.contrast("mean decay", expected, move |t| exp(-rate * t))]
     }
 }

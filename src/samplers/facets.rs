@@ -2,10 +2,44 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::{Axis, Contrast, Draw, Piece, Sampler};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::kind::{SamplerKind, sampler_kind};
+use super::sampler::{Contrast, Coordinate, Draw, Piece, Sampler};
 use crate::math::{DVec3, atan, atan2, sin, sin_cos_turns, tan};
-use crate::optics::microfacet::Microfacets;
+use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::sampling::stream::Stream;
+
+/// `facet_normals` in experiment files.
+pub const NORMALS: SamplerKind = sampler_kind!(
+    "facet_normals",
+    "microfacet normals in proportion to their projected area",
+    Microfacets => |facets| Ok(NormalSampler::plain(facets))
+);
+
+/// `visible_normals` in experiment files.
+pub const VISIBLE_NORMALS: SamplerKind = sampler_kind!(
+    "visible_normals",
+    "microfacet normals as seen from a direction",
+    VisibleOptions => |VisibleOptions { distribution: kind, alpha, cos }| {
+        Ok(NormalSampler::visible(Microfacets { kind, alpha }, cos))
+    }
+);
+
+/// Options of `visible_normals`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct VisibleOptions {
+    /// Shape of the distribution.
+    distribution: MicrofacetKind,
+    /// Roughness of the facets.
+    #[schemars(range(min = 0.001, max = 1.0))]
+    alpha: f64,
+    /// Cosine of the view.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
+    cos: f64,
+}
 
 /// A direction at this cosine to +z, at an azimuth that is aligned with nothing.
 pub fn view(cos: f64) -> DVec3 {
@@ -135,8 +169,8 @@ fn bend([from, to]: [f64; 2], p: f64) -> (f64, f64) {
     (from + half * 2.0 * s * s, half * PI * sin(PI * p))
 }
 
-/// The coordinate of an angle. What rounding has put beyond an end is put back; what is farther out stays
-/// outside [0, 1], where no sample may be.
+/// The coordinate of an angle. What rounding has put beyond an end is put back; what is farther out
+/// stays outside [0, 1], where no sample may be.
 fn unbend([from, to]: [f64; 2], angle: f64) -> f64 {
     let share = (angle - from) / (to - from);
     if !(-1e-9..=1.0 + 1e-9).contains(&share) {
@@ -193,7 +227,7 @@ impl Sampler for NormalSampler {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("normals", [Axis::over(0.0, 1.0), Axis::over(0.0, 1.0)])]
+        vec![Piece::plane("normals", [Coordinate::over(0.0, 1.0), Coordinate::over(0.0, 1.0)])]
     }
 
     fn density(&self, _piece: usize, at: [f64; 2]) -> f64 {

@@ -2,181 +2,67 @@
 //!
 //! A sampler's outcomes fall apart into nothing at all (`Null`), discrete outcomes (`Delta`), and points
 //! of continuous pieces. A piece has a *chart*: one or two coordinates over a box, in which the density
-//! is smooth but for its stated kinks, graded so that a narrow lobe is as wide as the box. Densities here
-//! are per unit of the chart (the code's density times the chart's Jacobian, which is written down beside
-//! the chart and not taken from the sampler). What a sampler draws and what its density says come from
-//! different functions of the code under test, so that each is held against the other.
+//! is smooth but for its stated kinks, graded so that a narrow lobe is as wide as the box. Densities
+//! here are per unit of the chart (the code's density times the chart's Jacobian, which is written down
+//! beside the chart and not taken from the sampler). What a sampler draws and what its density says come
+//! from different functions of the code under test, so that each is held against the other.
+//!
+//! Samplers of directions, of distances along a line and of points of a plane need no chart of their
+//! own: [`chart`] has one for each of these domains. A sampler's file also says under which name and
+//! with which options an experiment asks for it ([`SamplerKind`]); [`KINDS`] lists them all.
 
 pub mod body;
 pub mod boundary;
+pub mod chart;
 pub mod discrete;
 pub mod distance;
 pub mod facets;
 pub mod joint;
+mod kind;
 pub mod light;
 pub mod lines;
 pub mod lobe;
 pub mod phase;
 pub mod radial;
+mod sampler;
 pub mod surface;
 pub mod thinning;
 pub mod towards;
 
-use std::f64::consts::TAU;
+pub use chart::{Chart, Charted, Measure, Technique};
+pub use kind::{SamplerKind, read_options};
+pub use sampler::{Contrast, Coordinate, Discrete, Draw, Null, Piece, Sampler, turns};
 
-use crate::math::{atan2, sin_cos_turns};
-use crate::sampling::stream::Stream;
+/// Every sampler of this crate, in the order in which they are listed.
+pub const KINDS: &[SamplerKind] = &[
+    phase::KIND,
+    surface::TRIANGLE,
+    surface::MESH,
+    body::KIND,
+    lines::KIND,
+    thinning::KIND,
+    distance::EXPONENTIAL,
+    distance::TRUNCATED_EXPONENTIAL,
+    distance::EQUIANGULAR,
+    distance::MIXTURE,
+    towards::DIRECTION,
+    towards::DIRECTION_AND_DISTANCE,
+    joint::TABLE,
+    joint::MIXTURE,
+    lobe::POWER,
+    lobe::PLANE,
+    facets::NORMALS,
+    facets::VISIBLE_NORMALS,
+    boundary::ROUGH,
+    boundary::ROUGH_REFRACTION,
+    boundary::SMOOTH,
+    boundary::MATCHED,
+    light::CAP,
+    light::LAT_LONG,
+    radial::KIND,
+    discrete::BAND,
+    discrete::HERO_FLIGHT,
+];
 
-/// One sampler with its parameters: what it draws, and the distribution that it claims to draw from.
-pub trait Sampler: Send + Sync {
-    /// Draws once.
-    fn draw(&self, stream: &mut Stream) -> Draw;
-
-    /// The continuous pieces.
-    fn pieces(&self) -> Vec<Piece>;
-
-    /// Density of piece `piece` per unit of its chart, from the code's own density function.
-    fn density(&self, piece: usize, at: [f64; 2]) -> f64;
-
-    /// The discrete outcomes.
-    fn deltas(&self) -> Vec<Discrete> {
-        Vec::new()
-    }
-
-    /// How often it returns nothing.
-    fn null(&self) -> Null {
-        Null::Never
-    }
-
-    /// Whether every draw takes as many random numbers as any other.
-    fn takes_as_many(&self) -> bool {
-        true
-    }
-
-    /// Directed contrasts: cheap means in which the likely defects show (mean cosine, ...).
-    fn contrasts(&self) -> Vec<Contrast> {
-        Vec::new()
-    }
-}
-
-/// One outcome.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Draw {
-    /// The sampler returned nothing.
-    Null,
-    /// Discrete outcome `index`; `exact` is false where its value is farther than 1e-12 from what it
-    /// has to be.
-    Delta {
-        /// Index into [`Sampler::deltas`].
-        index: usize,
-        /// Whether its value is right.
-        exact: bool,
-    },
-    /// A point of piece `piece`; `density` is what the sampler itself says of it, per unit of the chart.
-    Point {
-        /// Index into [`Sampler::pieces`].
-        piece: usize,
-        /// Chart coordinates; the second is 0.5 in pieces of one dimension.
-        at: [f64; 2],
-        /// The sampler's own density there.
-        density: f64,
-    },
-}
-
-/// A continuous piece and its chart.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Piece {
-    /// Its name in tables.
-    pub name: String,
-    /// The coordinates.
-    pub axes: [Axis; 2],
-    /// 1 where the second coordinate is not used (its axis is then [0, 1]).
-    pub dimensions: usize,
-}
-
-/// One coordinate of a chart.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
-    /// From and to.
-    pub range: [f64; 2],
-    /// Values at which the density or its slope jumps, besides the ends.
-    pub kinks: Vec<f64>,
-    /// Both ends are the same point (an azimuth): bins may start anywhere.
-    pub periodic: bool,
-}
-
-/// A discrete outcome.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Discrete {
-    /// Its name in tables.
-    pub name: String,
-    /// Its probability.
-    pub mass: f64,
-}
-
-/// How often a sampler returns nothing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Null {
-    /// Never; one null is an error.
-    Never,
-    /// With this probability, known by other means than the density.
-    Stated(f64),
-    /// With what the densities leave of 1: the normalisation is then not tested.
-    Remainder,
-}
-
-/// The mean of a bounded function over all outcomes; 0 for `Null` and `Delta`.
-pub struct Contrast {
-    /// Its name in tables.
-    pub name: &'static str,
-    /// The function of piece and chart coordinates.
-    pub of: Box<dyn Fn(usize, [f64; 2]) -> f64 + Send + Sync>,
-    /// Its mean by definition (g for the mean cosine of a phase function); by quadrature of the density
-    /// without it.
-    pub expected: Option<f64>,
-}
-
-impl Contrast {
-    /// A function of the chart coordinates of the only piece.
-    pub fn of(
-        name: &'static str,
-        expected: Option<f64>,
-        of: impl Fn([f64; 2]) -> f64 + Send + Sync + 'static,
-    ) -> Contrast {
-        Contrast { name, of: Box::new(move |_, at| of(at)), expected }
-    }
-
-    /// The cosine of an azimuth that is the second coordinate, in turns, and uniform.
-    pub fn azimuth() -> Contrast {
-        Contrast::of("cos azimuth", Some(0.0), |[_, turns]| sin_cos_turns(turns).1)
-    }
-}
-
-/// The azimuth of (x, y), in turns, from 0 to 1.
-pub fn turns(x: f64, y: f64) -> f64 {
-    (atan2(y, x) / TAU).rem_euclid(1.0)
-}
-
-impl Axis {
-    /// A coordinate over [from, to] without kinks.
-    pub fn over(from: f64, to: f64) -> Axis {
-        Axis { range: [from, to], kinks: Vec::new(), periodic: false }
-    }
-
-    /// An azimuth in turns.
-    pub fn turns() -> Axis {
-        Axis { range: [0.0, 1.0], kinks: Vec::new(), periodic: true }
-    }
-}
-
-impl Piece {
-    /// A piece of one dimension.
-    pub fn line(name: impl Into<String>, axis: Axis) -> Piece {
-        Piece { name: name.into(), axes: [axis, Axis::over(0.0, 1.0)], dimensions: 1 }
-    }
-
-    /// A piece of two.
-    pub fn plane(name: impl Into<String>, axes: [Axis; 2]) -> Piece {
-        Piece { name: name.into(), axes, dimensions: 2 }
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -2,16 +2,25 @@
 
 use std::f64::consts::TAU;
 
-use super::{Axis, Contrast, Draw, Piece, Sampler, turns};
+use super::chart::AXIS;
+use super::kind::{SamplerKind, sampler_kind};
+use super::sampler::{Contrast, Coordinate, Draw, Piece, Sampler, turns};
 use crate::math::{DVec3, Frame, exp_m1, ln_1p};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::Stream;
 
+/// `henyey_greenstein` in experiment files.
+pub const KIND: SamplerKind = sampler_kind!(
+    "henyey_greenstein",
+    "directions of the Henyey-Greenstein phase function",
+    HenyeyGreenstein => |phase| Ok(HenyeyGreensteinSampler::new(phase.g))
+);
+
 /// Henyey-Greenstein about a direction of travel that is aligned with nothing.
 ///
 /// Chart: x = ln(1 + (1 - mu)/s) / L with s = (1 - |g|)^2 and L = ln(1 + 2/s), so that the peak and the
-/// rest are both of size 1; the azimuth in turns. 1 - mu = s (e^(L x) - 1), d(1 - mu)/dx = L (s + 1 - mu),
-/// hence density = pdf * 2 pi * L (s + 1 - mu). For g < 0 the chart is mirrored: 1 + mu for 1 - mu.
+/// rest are both of size 1; the azimuth in turns. 1 - mu = s (e^(L x) - 1), d(1 - mu)/dx = L (s + 1 -
+/// mu), hence density = pdf * 2 pi * L (s + 1 - mu). For g < 0 the chart is mirrored: 1 + mu for 1 - mu.
 pub struct HenyeyGreensteinSampler {
     phase: HenyeyGreenstein,
     about: Frame,
@@ -24,7 +33,7 @@ impl HenyeyGreensteinSampler {
     /// For this mean cosine.
     pub fn new(g: f64) -> HenyeyGreensteinSampler {
         let scale = (1.0 - g.abs()) * (1.0 - g.abs());
-        let dir = DVec3::new(0.48, -0.6, 0.64);
+        let dir = AXIS;
         let phase = HenyeyGreenstein { g };
         let length = ln_1p(2.0 / scale);
         HenyeyGreensteinSampler { phase, about: Frame::about(dir), dir, scale, length }
@@ -59,7 +68,7 @@ impl Sampler for HenyeyGreensteinSampler {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("directions", [Axis::over(0.0, 1.0), Axis::turns()])]
+        vec![Piece::plane("directions", [Coordinate::over(0.0, 1.0), Coordinate::turns()])]
     }
 
     fn density(&self, _piece: usize, [x, _]: [f64; 2]) -> f64 {

@@ -1,103 +1,125 @@
 //! Points of a plane by the radial profiles of subsurface scattering.
-//!
-//! Chart: x = l / (l + r) with a length l of the profile's own size, or r = r_max x in a disc; azimuth in
-//! turns. dA = 2 pi r dr per turn. The far tail lies at x = 0, where numbers are dense: a profile without
-//! absorption draws r = 1e7 l once in 1e7, and 1 - x would keep half of its digits.
 
-use std::f64::consts::TAU;
+use schemars::JsonSchema;
+use serde::Deserialize;
 
-use super::{Axis, Contrast, Draw, Piece, Sampler, turns};
+use super::chart::{Charted, PlaneChart, PolarPoint, Technique};
+use super::distance::end;
+use super::kind::{SamplerKind, sampler_kind};
+use super::sampler::Contrast;
 use crate::math::exp;
 use crate::sampling::radial::{Dipole, Radial};
 use crate::sampling::stream::Stream;
 
-/// Points by one profile.
-pub struct RadialSampler {
-    code: Radial,
-    chart: Chart,
-}
-
-#[derive(Clone, Copy)]
-enum Chart {
-    /// The whole plane; l.
-    Plane(f64),
-    Disc(f64),
-}
-
-impl Chart {
-    fn coordinate(self, r: f64) -> f64 {
-        match self {
-            Chart::Plane(l) => l / (l + r),
-            Chart::Disc(r_max) => r / r_max,
-        }
+/// `radial` in experiment files.
+pub const KIND: SamplerKind = sampler_kind!(
+    "radial",
+    "points of a plane by a BSSRDF's radial profile",
+    RadialOptions => |o| {
+        let profile = Radial::from(o);
+        Ok(Charted::new(profile, chart(profile)))
     }
+);
 
-    /// r and |dr/dx|; nothing at infinity.
-    fn at(self, x: f64) -> Option<(f64, f64)> {
-        match self {
-            Chart::Plane(l) => (x > 0.0).then(|| (l * (1.0 - x) / x, l / (x * x))),
-            Chart::Disc(r_max) => Some((r_max * x, r_max)),
-        }
-    }
+/// Options of `radial`: the profile.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+enum RadialOptions {
+    /// Exponential radius.
+    Exponential {
+        /// 1/mm.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        sigma_per_mm: f64,
+    },
+    /// A Gaussian of the plane.
+    Gaussian {
+        /// Along each axis.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        variance_mm2: f64,
+        /// Radius of the disc that it is cut to; left out, it is not.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        r_max_mm: Option<f64>,
+    },
+    /// Normalized diffusion (Christensen & Burley 2015).
+    NormalizedDiffusion {
+        /// Its parameter d.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        d_mm: f64,
+    },
+    /// The classical dipole (Jensen et al. 2001).
+    Dipole {
+        /// Effective transport coefficient.
+        #[schemars(range(min = 0.0))]
+        sigma_tr_per_mm: f64,
+        /// Depth of the real source.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        z_real_mm: f64,
+        /// Height of the virtual source.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        z_virtual_mm: f64,
+    },
 }
 
-impl RadialSampler {
-    /// For this profile.
-    pub fn new(code: Radial) -> RadialSampler {
-        let chart = match code {
-            Radial::Exponential { sigma } => Chart::Plane(1.0 / sigma),
-            Radial::Gaussian { r_max, .. } if r_max.is_finite() => Chart::Disc(r_max),
-            Radial::Gaussian { variance, .. } => Chart::Plane(variance.sqrt()),
-            Radial::NormalizedDiffusion { d } => Chart::Plane(2.0 * d),
-            // A strongly absorbing layer narrows the profile from z to sqrt(z / sigma_tr).
-            Radial::Dipole(Dipole { sigma_tr, z_real, .. }) => {
-                Chart::Plane(z_real / (1.0 + sigma_tr * z_real).sqrt())
+impl From<RadialOptions> for Radial {
+    fn from(profile: RadialOptions) -> Radial {
+        match profile {
+            RadialOptions::Exponential { sigma_per_mm: sigma } => Radial::Exponential { sigma },
+            RadialOptions::Gaussian { variance_mm2: variance, r_max_mm } => {
+                Radial::Gaussian { variance, r_max: end(r_max_mm) }
             }
-        };
-        RadialSampler { code, chart }
-    }
-
-    /// A bounded function of r whose mean is known: of the radius of the exponential e^(-sigma r), 1/2; of
-    /// the Gaussian e^(-r^2/2v), 1/2 over the plane; of normalized diffusion e^(-r/d), with a quarter
-    /// Exp(d) and three quarters Exp(3d): 1/4 * 1/2 + 3/4 * 1/4 = 5/16.
-    fn decay(&self) -> (Option<f64>, Box<dyn Fn(f64) -> f64 + Send + Sync>) {
-        match self.code {
-            Radial::Exponential { sigma } => (Some(0.5), Box::new(move |r| exp(-sigma * r))),
-            Radial::Gaussian { variance, r_max } => {
-                let known = r_max.is_infinite().then_some(0.5);
-                (known, Box::new(move |r| exp(-r * r / (2.0 * variance))))
-            }
-            Radial::NormalizedDiffusion { d } => (Some(5.0 / 16.0), Box::new(move |r| exp(-r / d))),
-            Radial::Dipole(Dipole { z_real, .. }) => (None, Box::new(move |r| z_real / (r + z_real))),
+            RadialOptions::NormalizedDiffusion { d_mm: d } => Radial::NormalizedDiffusion { d },
+            RadialOptions::Dipole {
+                sigma_tr_per_mm: sigma_tr,
+                z_real_mm: z_real,
+                z_virtual_mm: z_virtual,
+            } => Radial::Dipole(Dipole { sigma_tr, z_real, z_virtual }),
         }
-    }
-
-    fn per_chart(&self, r: f64, dr: f64) -> f64 {
-        self.code.pdf_area(r) * TAU * r * dr
     }
 }
 
-impl Sampler for RadialSampler {
-    fn draw(&self, stream: &mut Stream) -> Draw {
-        let [x, y] = self.code.sample(stream.draw2());
-        let r = (x * x + y * y).sqrt();
-        let at = [self.chart.coordinate(r), turns(x, y)];
-        let density = self.chart.at(at[0]).map_or(0.0, |(_, dr)| self.per_chart(r, dr));
-        Draw::Point { piece: 0, at, density }
+/// A chart of the profile's own size.
+fn chart(profile: Radial) -> PlaneChart {
+    match profile {
+        Radial::Exponential { sigma } => PlaneChart::Plane(1.0 / sigma),
+        Radial::Gaussian { r_max, .. } if r_max.is_finite() => PlaneChart::Disc(r_max),
+        Radial::Gaussian { variance, .. } => PlaneChart::Plane(variance.sqrt()),
+        Radial::NormalizedDiffusion { d } => PlaneChart::Plane(2.0 * d),
+        // A strongly absorbing layer narrows the profile from z to sqrt(z / sigma_tr).
+        Radial::Dipole(Dipole { sigma_tr, z_real, .. }) => {
+            PlaneChart::Plane(z_real / (1.0 + sigma_tr * z_real).sqrt())
+        }
+    }
+}
+
+impl Technique<PlaneChart> for Radial {
+    fn sample(&self, stream: &mut Stream) -> (PolarPoint, Option<f64>) {
+        let point = PolarPoint::of(self.sample(stream.draw2()));
+        (point, Some(self.pdf_area(point.r)))
     }
 
-    fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("points", [Axis::over(0.0, 1.0), Axis::turns()])]
+    fn pdf(&self, PolarPoint { r, .. }: PolarPoint) -> f64 {
+        self.pdf_area(r)
     }
 
-    fn density(&self, _piece: usize, [x, _]: [f64; 2]) -> f64 {
-        self.chart.at(x).map_or(0.0, |(r, dr)| self.per_chart(r, dr))
-    }
-
-    fn contrasts(&self) -> Vec<Contrast> {
-        let (expected, decay) = self.decay();
-        let chart = self.chart;
+    fn contrasts(&self, chart: &PlaneChart) -> Vec<Contrast> {
+        let (expected, decay) = decay(*self);
+        let chart = *chart;
         let mean = move |[x, _]: [f64; 2]| chart.at(x).map_or(0.0, |(r, _)| decay(r));
         vec![Contrast::of("mean decay", expected, mean), Contrast::azimuth()]
+    }
+}
+
+/// A bounded function of r whose mean is known: of the radius of the exponential e^(-sigma r), 1/2; of
+/// the Gaussian e^(-r^2/2v), 1/2 over the plane; of normalized diffusion e^(-r/d), with a quarter
+/// Exp(d) and three quarters Exp(3d): 1/4 * 1/2 + 3/4 * 1/4 = 5/16.
+fn decay(profile: Radial) -> (Option<f64>, Box<dyn Fn(f64) -> f64 + Send + Sync>) {
+    match profile {
+        Radial::Exponential { sigma } => (Some(0.5), Box::new(move |r| exp(-sigma * r))),
+        Radial::Gaussian { variance, r_max } => {
+            let known = r_max.is_infinite().then_some(0.5);
+            (known, Box::new(move |r| exp(-r * r / (2.0 * variance))))
+        }
+        Radial::NormalizedDiffusion { d } => (Some(5.0 / 16.0), Box::new(move |r| exp(-r / d))),
+        Radial::Dipole(Dipole { z_real, .. }) => (None, Box::new(move |r| z_real / (r + z_real))),
     }
 }

@@ -1,12 +1,68 @@
 //! Points on triangles and meshes.
 //!
-//! Chart of a triangle (a, b, c): s in [0, 1] from a to the side bc, v in [0, 1] along the parallel to bc,
-//! the point a + s ((b - a) (1 - v) + (c - a) v); |d/ds x d/dv| = s |(b - a) x (c - a)| = 2 area s.
+//! Chart of a triangle (a, b, c): s in [0, 1] from a to the side bc, v in [0, 1] along the parallel to
+//! bc, the point a + s ((b - a) (1 - v) + (c - a) v); |d/ds x d/dv| = s |(b - a) x (c - a)| = 2 area s.
 
-use super::{Axis, Contrast, Draw, Piece, Sampler};
-use crate::geometry::{FaceId, Mesh, SurfaceSampler, Triangle};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::kind::{SamplerKind, sampler_kind};
+use super::sampler::{Contrast, Coordinate, Draw, Piece, Sampler};
+use crate::error::Result;
+use crate::geometry::{FaceChoice, FaceId, Mesh, SurfaceSampler, Triangle, procedural};
 use crate::math::DVec3;
 use crate::sampling::stream::Stream;
+
+/// `triangle` in experiment files.
+pub const TRIANGLE: SamplerKind = sampler_kind!(
+    "triangle",
+    "points of a triangle, uniform per area",
+    TriangleOptions => |o| Ok(TriangleSampler::new(o.corners_mm))
+);
+
+/// Options of `triangle`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct TriangleOptions {
+    /// Its corners, mm.
+    corners_mm: [[f64; 3]; 3],
+}
+
+/// `mesh_surface` in experiment files.
+pub const MESH: SamplerKind = sampler_kind!(
+    "mesh_surface",
+    "points on a mesh, its triangles by area or by index",
+    MeshOptions => |o| Ok(MeshSampler::new(&o.shape.mesh()?, o.triangles == FaceChoice::Area))
+);
+
+/// Options of `mesh_surface`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct MeshOptions {
+    /// The mesh.
+    shape: UnevenShape,
+    /// How a triangle is chosen.
+    triangles: FaceChoice,
+}
+
+/// Meshes of triangles of very different sizes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum UnevenShape {
+    /// A thin plate with a small hole: 64 triangles, areas 1 to 750.
+    DrilledBox,
+    /// A torus whose inner rim is nearly closed: 192 triangles, areas 1 to 13.
+    Torus,
+}
+
+impl UnevenShape {
+    fn mesh(self) -> Result<Mesh> {
+        match self {
+            UnevenShape::DrilledBox => procedural::drilled_box(DVec3::new(1.5, 1.0, 0.05), [1, 1], 0.02),
+            UnevenShape::Torus => procedural::torus(1.0, 0.9, [12, 8], false),
+        }
+    }
+}
 
 /// s and v of a point, and how far it is off the triangle's plane in units of its longest side.
 fn coordinates(Triangle([a, b, c]): &Triangle, point: DVec3) -> ([f64; 2], f64) {
@@ -27,7 +83,7 @@ fn within(x: f64) -> f64 {
 }
 
 fn pieces(name: String) -> Piece {
-    Piece::plane(name, [Axis::over(0.0, 1.0), Axis::over(0.0, 1.0)])
+    Piece::plane(name, [Coordinate::over(0.0, 1.0), Coordinate::over(0.0, 1.0)])
 }
 
 /// The area of a triangle by the lengths of its sides (Heron, in Kahan's stable order).

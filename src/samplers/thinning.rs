@@ -1,40 +1,106 @@
-//! Thinning of a cloud of points by distance: whether each point is accepted with its probability, two neighbours
-//! independently, and so many in all as independence has it.
+//! Thinning of a cloud of points by distance: whether each point is accepted with its probability, two
+//! neighbours independently, and so many in all as independence has it.
 //!
 //! The cloud is fixed, on a sphere of diameter D. One draw is one query. Views:
-//!   distance   a point j is chosen, and the query stands at distance d from it, uniform in [0, D], in a uniform direction;
-//!              the outcome is the chart coordinate d/D where j is accepted (density p(d) per unit), else nothing.
-//!              The density that the sampler reports is 1 over the weight that it gave.
-//!   pair       the query stands still; of a random pair of neighbours in the tree neither, one or both are accepted.
+//!   distance   a point j is chosen, and the query stands at distance d from it, uniform in [0, D], in a
+//!              uniform direction; the outcome is the chart coordinate d/D where j is accepted (density
+//!              p(d) per unit), else nothing. The density that the sampler reports is 1 over the weight
+//!              that it gave.
+//!   pair       the query stands still; of a random pair of neighbours in the tree neither, one or both
+//!              are accepted.
 //!   number     the query stands still; how many points are accepted, whose law is Poisson-binomial.
 
-use super::{Axis, Discrete, Draw, Null, Piece, Sampler};
-use crate::math::{DVec3, integrate, sin_cos_turns};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::kind::{SamplerKind, sampler_kind};
+use super::sampler::{Coordinate, Discrete, Draw, Null, Piece, Sampler};
+use crate::math::{DVec3, exp, integrate, sin_cos_turns};
 use crate::sampling::stream::Stream;
-use crate::sampling::thinning::{Accepted, PointTree, ThinningRule, ThinningWork, scan};
+use crate::sampling::thinning::{
+    Accepted, PointTree, Search, ThinningForm, ThinningRule, ThinningWork, scan,
+};
 use crate::sampling::warp::square_to_cap;
 
+/// `thinning` in experiment files.
+pub const KIND: SamplerKind = sampler_kind!(
+    "thinning",
+    "points of a cloud accepted by distance, by hierarchy or by asking all",
+    ThinningOptions => |o| Ok(ThinningSampler::new(o))
+);
+
+/// Options of `thinning`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ThinningOptions {
+    /// The probability of acceptance by distance.
+    pub rule: NumericRule,
+    /// How accepted points are found.
+    #[serde(default)]
+    pub search: Search,
+    /// What of a query is looked at.
+    pub view: QueryView,
+    /// Points of the cloud, on a sphere.
+    #[schemars(range(min = 2, max = 1048576))]
+    pub points: usize,
+    /// Its radius, mm.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius_mm: f64,
+}
+
+/// Rules with the coefficients in numbers.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum NumericRule {
+    /// e^(-this d), 1/mm.
+    Exponential(#[schemars(range(min = 0.0))] f64),
+    /// The mean of e^(-s d) over these, 1/mm.
+    MeanOfExponentials(Vec<f64>),
+    /// max(e^(-s d), least): [s in 1/mm, least].
+    Floor([f64; 2]),
+    /// In proportion to e^(-s d) / (1 + d^2): [s in 1/mm, mean over a disc as wide as the sphere].
+    Proportional([f64; 2]),
+}
+
 /// What of a query is looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum View {
-    /// One point, by its distance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum QueryView {
+    /// A single point, by its distance.
     Distance,
     /// Two neighbours.
     Pair,
-    /// All points.
+    /// How many points.
     Number,
+}
+
+impl NumericRule {
+    fn rule(&self, diameter: f64) -> ThinningRule {
+        ThinningRule::new(match self {
+            NumericRule::Exponential(sigma) => ThinningForm::Exponential { sigma: *sigma },
+            NumericRule::MeanOfExponentials(sigmas) => {
+                ThinningForm::MeanOfExponentials { sigmas: sigmas.clone() }
+            }
+            NumericRule::Floor([sigma, least]) => ThinningForm::Floor { sigma: *sigma, least: *least },
+            NumericRule::Proportional([sigma, mean]) => {
+                let falloff = |d: f64| exp(-sigma * d) / (1.0 + d * d);
+                ThinningForm::proportional(falloff, diameter, *mean)
+            }
+        })
+    }
 }
 
 /// Queries of one cloud by one rule.
 pub struct ThinningSampler {
     tree: PointTree,
     rule: ThinningRule,
-    by_tree: bool,
-    view: View,
+    search: Search,
+    view: QueryView,
     diameter: f64,
     /// Where a query stands that does not move.
     at: DVec3,
-    /// Numbers of points that are outcomes of their own; what is less or more counts as the first or last.
+    /// Numbers of points that are outcomes of their own; what is less or more counts as the first or
+    /// last.
     numbers: (usize, usize),
     masses: Vec<f64>,
 }
@@ -43,33 +109,30 @@ pub struct ThinningSampler {
 const RARE: f64 = 1e-5;
 
 impl ThinningSampler {
-    /// `count` points on a sphere of radius `radius` mm.
-    pub fn new(
-        rule: ThinningRule,
-        by_tree: bool,
-        view: View,
-        count: usize,
-        radius: f64,
-    ) -> ThinningSampler {
+    /// Of points on a sphere.
+    pub fn new(options: ThinningOptions) -> ThinningSampler {
+        let ThinningOptions { rule, search, view, points: count, radius_mm: radius } = options;
+        let rule = rule.rule(2.0 * radius);
         let points: Vec<DVec3> = (0..count).map(|k| radius * golden(k, count)).collect();
         let tree = PointTree::new(&points);
         let at = radius * DVec3::new(0.36, -0.48, 0.8);
         let p: Vec<f64> =
             (0..count).map(|place| rule.probability((tree.point(place) - at).length())).collect();
         let (numbers, masses) = match view {
-            View::Distance => ((0, 0), Vec::new()),
-            View::Pair => ((0, 0), pairs(&p)),
-            View::Number => number(&p),
+            QueryView::Distance => ((0, 0), Vec::new()),
+            QueryView::Pair => ((0, 0), pairs(&p)),
+            QueryView::Number => number(&p),
         };
-        ThinningSampler { tree, rule, by_tree, view, diameter: 2.0 * radius, at, numbers, masses }
+        ThinningSampler { tree, rule, search, view, diameter: 2.0 * radius, at, numbers, masses }
     }
 
     fn query(&self, at: DVec3, stream: &mut Stream, accept: impl FnMut(Accepted)) {
         let mut work = ThinningWork::default();
-        if self.by_tree {
-            self.tree.thin(at, &self.rule, stream, &mut work, accept);
-        } else {
-            scan(self.tree.axes(), 0..self.tree.len(), at, &self.rule, stream, &mut work, accept);
+        match self.search {
+            Search::Hierarchy => self.tree.thin(at, &self.rule, stream, &mut work, accept),
+            Search::Scan => {
+                scan(self.tree.axes(), 0..self.tree.len(), at, &self.rule, stream, &mut work, accept);
+            }
         }
     }
 }
@@ -96,7 +159,8 @@ fn pairs(p: &[f64]) -> Vec<f64> {
     masses
 }
 
-/// Poisson-binomial masses by adding one point after the other, with rare numbers put together at both ends.
+/// Poisson-binomial masses by adding one point after the other, with rare numbers put together at both
+/// ends.
 fn number(p: &[f64]) -> ((usize, usize), Vec<f64>) {
     let mut masses = vec![1.0];
     for &p in p {
@@ -118,7 +182,7 @@ impl Sampler for ThinningSampler {
     fn draw(&self, stream: &mut Stream) -> Draw {
         let count = self.tree.len();
         match self.view {
-            View::Distance => {
+            QueryView::Distance => {
                 let [u, x] = stream.draw2();
                 let place = (u * count as f64) as usize;
                 let away = square_to_cap(2.0, stream.draw2());
@@ -132,7 +196,7 @@ impl Sampler for ThinningSampler {
                 });
                 outcome
             }
-            View::Pair => {
+            QueryView::Pair => {
                 let first = (stream.draw() * count as f64) as usize;
                 let (mut index, mut exact) = (0, true);
                 self.query(self.at, stream, |accepted| {
@@ -143,7 +207,7 @@ impl Sampler for ThinningSampler {
                 });
                 Draw::Delta { index, exact }
             }
-            View::Number => {
+            QueryView::Number => {
                 let mut number = 0;
                 self.query(self.at, stream, |_| number += 1);
                 let (first, last) = self.numbers;
@@ -154,8 +218,8 @@ impl Sampler for ThinningSampler {
 
     fn pieces(&self) -> Vec<Piece> {
         match self.view {
-            View::Distance => vec![Piece::line("distance", Axis::over(0.0, 1.0))],
-            View::Pair | View::Number => Vec::new(),
+            QueryView::Distance => vec![Piece::line("distance", Coordinate::over(0.0, 1.0))],
+            QueryView::Pair | QueryView::Number => Vec::new(),
         }
     }
 
@@ -165,7 +229,7 @@ impl Sampler for ThinningSampler {
 
     fn deltas(&self) -> Vec<Discrete> {
         let name = |k: usize| match self.view {
-            View::Pair => ["neither", "the first", "the second", "both"][k].to_string(),
+            QueryView::Pair => ["neither", "the first", "the second", "both"][k].to_string(),
             _ => format!("{} points", self.numbers.0 + k),
         };
         self.masses.iter().enumerate().map(|(k, &mass)| Discrete { name: name(k), mass }).collect()
@@ -178,12 +242,12 @@ impl Sampler for ThinningSampler {
 
     fn null(&self) -> Null {
         match self.view {
-            View::Distance => {
+            QueryView::Distance => {
                 let accepted =
                     integrate(|x| self.rule.probability(x * self.diameter), 0.0, 1.0, 1e-10).value;
                 Null::Stated(1.0 - accepted)
             }
-            View::Pair | View::Number => Null::Never,
+            QueryView::Pair | QueryView::Number => Null::Never,
         }
     }
 }

@@ -1,82 +1,47 @@
 //! Direction and distance towards a point.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
-use super::distance::AngleChart;
-use super::{Axis, Contrast, Draw, Piece, Sampler, turns};
-use crate::math::{DVec3, Frame, atan2, cos, sin, sin_cos_turns};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::chart::{AXIS, Charted, Directions, EvenAngle, Technique};
+use super::distance::{AngleChart, end};
+use super::kind::{SamplerKind, sampler_kind, some};
+use super::sampler::{Contrast, Coordinate, Draw, Piece, Sampler};
+use crate::math::{DVec3, Frame, cos, sin, sin_cos_turns};
 use crate::sampling::stream::Stream;
 use crate::sampling::towards::TowardsPoint;
 
-/// What charts about the axis to a point share: theta = pi x from the axis.
-#[derive(Clone, Copy)]
-pub(super) struct Axial {
-    /// The axis is its normal.
-    pub frame: Frame,
+/// `towards_point` in experiment files.
+pub const DIRECTION: SamplerKind = sampler_kind!(
+    "towards_point",
+    "directions of joint direction-distance sampling towards a point",
+    DirectionOptions => |o| {
+        Ok(Charted::new(some(TowardsPoint::new(AXIS * o.distance_mm))?, Directions::even()))
+    }
+);
+
+/// Options of `towards_point`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct DirectionOptions {
+    /// Distance of the point, mm.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    distance_mm: f64,
 }
 
-impl Axial {
-    /// Per unit of theta / pi and of the azimuth in turns.
-    pub fn solid_angle(theta: f64) -> f64 {
-        TAU * PI * sin(theta)
+impl Technique<Directions> for TowardsPoint {
+    fn sample(&self, stream: &mut Stream) -> (DVec3, Option<f64>) {
+        let dir = self.sample(stream.draw2());
+        (dir, Some(self.pdf(dir)))
     }
 
-    pub fn theta(&self, dir: DVec3) -> f64 {
-        let axis = self.frame.n;
-        2.0 * atan2((dir - axis).length(), (dir + axis).length())
+    fn pdf(&self, dir: DVec3) -> f64 {
+        self.pdf(dir)
     }
 
-    pub fn dir(&self, theta: f64, turns: f64) -> DVec3 {
-        let (s, c) = sin_cos_turns(turns);
-        self.frame.to_world(DVec3::new(sin(theta) * c, sin(theta) * s, cos(theta)))
-    }
-}
-
-/// Towards a point along an axis that is aligned with nothing.
-struct Aimed {
-    code: TowardsPoint,
-    offset: DVec3,
-    axial: Axial,
-}
-
-impl Aimed {
-    fn new(distance: f64) -> Option<Aimed> {
-        let axis = DVec3::new(0.48, -0.6, 0.64);
-        let code = TowardsPoint::new(axis * distance)?;
-        Some(Aimed { code, offset: axis * distance, axial: Axial { frame: Frame::about(axis) } })
-    }
-}
-
-/// The direction alone: theta / pi and the azimuth, d omega = 2 pi^2 sin(theta) per unit of both.
-pub struct TowardsSampler(Aimed);
-
-impl TowardsSampler {
-    /// Towards a point at this distance, mm.
-    pub fn new(distance: f64) -> Option<TowardsSampler> {
-        Aimed::new(distance).map(TowardsSampler)
-    }
-}
-
-impl Sampler for TowardsSampler {
-    fn draw(&self, stream: &mut Stream) -> Draw {
-        let TowardsSampler(Aimed { code, axial, .. }) = self;
-        let dir = code.sample(stream.draw2());
-        let theta = axial.theta(dir);
-        let local = axial.frame.to_local(dir);
-        let at = [theta / PI, turns(local.x, local.y)];
-        Draw::Point { piece: 0, at, density: code.pdf(dir) * Axial::solid_angle(theta) }
-    }
-
-    fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("directions", [Axis::over(0.0, 1.0), Axis::turns()])]
-    }
-
-    fn density(&self, _piece: usize, [x, turns]: [f64; 2]) -> f64 {
-        let TowardsSampler(Aimed { code, axial, .. }) = self;
-        code.pdf(axial.dir(PI * x, turns)) * Axial::solid_angle(PI * x)
-    }
-
-    fn contrasts(&self) -> Vec<Contrast> {
+    fn contrasts(&self, _chart: &Directions) -> Vec<Contrast> {
         vec![mean_cosine(), Contrast::azimuth()]
     }
 }
@@ -86,49 +51,69 @@ fn mean_cosine() -> Contrast {
     Contrast::of("mean cosine", Some(4.0 / (PI * PI)), |[x, _]| cos(PI * x))
 }
 
-/// Direction and distance: theta / pi, and the angle at the point as in [`super::distance`] with foot
-/// R cos(theta) and height R sin(theta). All azimuths of a theta together, 2 pi^2 sin(theta) per unit of the
-/// first coordinate; the azimuth alone is [`TowardsSampler`]'s.
-pub struct JointSampler {
-    aimed: Aimed,
+/// `direction_distance` in experiment files.
+pub const DIRECTION_AND_DISTANCE: SamplerKind = sampler_kind!(
+    "direction_distance",
+    "joint direction-distance sampling towards a point",
+    JointOptions => |o| {
+        let code = some(TowardsPoint::new(AXIS * o.distance_mm))?;
+        Ok(JointSampler { code, offset: AXIS * o.distance_mm, t_max: end(o.t_max_mm) })
+    }
+);
+
+/// Options of `direction_distance`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct JointOptions {
+    /// Distance of the point, mm.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    distance_mm: f64,
+    /// Length of the rays, mm; left out, they have no end.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    t_max_mm: Option<f64>,
+}
+
+/// Direction and distance: theta / pi, and the angle at the point as in [`AngleChart`] with foot R
+/// cos(theta) and height R sin(theta). All azimuths of a theta together, 2 pi^2 sin(theta) per unit of
+/// the first coordinate; the azimuth alone is [`DIRECTION`]'s.
+struct JointSampler {
+    code: TowardsPoint,
+    /// The point.
+    offset: DVec3,
     t_max: f64,
 }
 
 impl JointSampler {
-    /// Towards a point at this distance, along rays of this length (mm; may be infinite).
-    pub fn new(distance: f64, t_max: f64) -> Option<JointSampler> {
-        Aimed::new(distance).map(|aimed| JointSampler { aimed, t_max })
-    }
-
     fn chart(&self, theta: f64) -> AngleChart {
-        let distance = self.aimed.offset.length();
+        let distance = self.offset.length();
         AngleChart::new(distance * cos(theta), distance * sin(theta), self.t_max)
     }
 
     fn joint(&self, dir: DVec3, theta: f64, t: f64, slope: f64) -> f64 {
-        let pdf_distance = self.aimed.code.distances(dir, self.t_max).map_or(0.0, |d| d.pdf_distance(t));
-        self.aimed.code.pdf(dir) * pdf_distance * Axial::solid_angle(theta) * slope
+        let pdf_distance = self.code.distances(dir, self.t_max).map_or(0.0, |d| d.pdf_distance(t));
+        self.code.pdf(dir) * pdf_distance * EvenAngle::solid_angle(theta) * slope
     }
 }
 
 impl Sampler for JointSampler {
     fn draw(&self, stream: &mut Stream) -> Draw {
-        let dir = self.aimed.code.sample(stream.draw2());
-        let Some(distances) = self.aimed.code.distances(dir, self.t_max) else { return Draw::Null };
+        let dir = self.code.sample(stream.draw2());
+        let Some(distances) = self.code.distances(dir, self.t_max) else { return Draw::Null };
         let t = distances.sample(stream.draw());
-        let theta = self.aimed.axial.theta(dir);
+        let theta = EvenAngle::theta(AXIS, dir);
         let chart = self.chart(theta);
         let at = [theta / PI, chart.coordinate(t)];
         Draw::Point { piece: 0, at, density: self.joint(dir, theta, t, chart.slope(t)) }
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("theta and distance", [Axis::over(0.0, 1.0), Axis::over(0.0, 1.0)])]
+        let axes = [Coordinate::over(0.0, 1.0), Coordinate::over(0.0, 1.0)];
+        vec![Piece::plane("theta and distance", axes)]
     }
 
     fn density(&self, _piece: usize, [x, y]: [f64; 2]) -> f64 {
         let theta = PI * x;
-        let dir = self.aimed.axial.dir(theta, 0.3);
+        let dir = Frame::about(AXIS).to_world(EvenAngle::dir(theta, sin_cos_turns(0.3)));
         self.chart(theta).at(y).map_or(0.0, |(t, slope)| self.joint(dir, theta, t, slope))
     }
 

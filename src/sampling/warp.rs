@@ -1,19 +1,16 @@
 //! Maps from the unit square, each beside the density that it realises.
 
-use std::f64::consts::{FRAC_1_PI, PI};
+use std::f64::consts::PI;
 
 use crate::math::{DVec3, sin_cos_turns};
 
-/// A point of the unit disc, uniform per area: r = sqrt(u0), angle 2 pi u1.
+/// A point of the unit disc, uniform per area: r = sqrt(u0), angle 2 pi u1; density 1 / pi.
 #[inline]
 pub fn square_to_disc(u: [f64; 2]) -> [f64; 2] {
     let (sin, cos) = sin_cos_turns(u[1]);
     let r = u[0].sqrt();
     [r * cos, r * sin]
 }
-
-/// Density of [`square_to_disc`] per area.
-pub const PDF_AREA_DISC: f64 = FRAC_1_PI;
 
 /// A direction about +z with 1 - cos theta uniform in [0, `height`): the cap of solid angle
 /// 2 pi `height`. Height 2 is the whole sphere. Working with 1 - cos keeps small caps accurate:
@@ -37,12 +34,6 @@ pub fn pdf_cap(height: f64) -> f64 {
 pub fn square_to_cosine_hemisphere(u: [f64; 2]) -> DVec3 {
     let [x, y] = square_to_disc(u);
     DVec3::new(x, y, (1.0 - u[0]).sqrt())
-}
-
-/// Density of [`square_to_cosine_hemisphere`] per solid angle.
-#[inline]
-pub fn pdf_cosine_hemisphere(cos: f64) -> f64 {
-    cos.max(0.0) * FRAC_1_PI
 }
 
 /// Barycentric coordinates of a point of a triangle, uniform per area: density 1 / area. The first is
@@ -79,14 +70,14 @@ mod tests {
                 let [x, y] = square_to_disc(u);
                 DVec3::new(x, y, 0.0)
             };
-            assert!((jacobian(disc, u) * PDF_AREA_DISC - 1.0).abs() < 1e-6);
+            assert!((jacobian(disc, u) / PI - 1.0).abs() < 1e-6);
             assert!(disc(u).length() < 1.0);
             for height in [1e-3, 0.5, 2.0] {
                 let cap = |u| square_to_cap(height, u);
                 assert!((jacobian(cap, u) * pdf_cap(height) - 1.0).abs() < 1e-6, "{height} {u:?}");
             }
             let cosine = square_to_cosine_hemisphere;
-            assert!((jacobian(cosine, u) * pdf_cosine_hemisphere(cosine(u).z) - 1.0).abs() < 1e-6);
+            assert!((jacobian(cosine, u) * cosine(u).z / PI - 1.0).abs() < 1e-6);
             assert!((cosine(u).length() - 1.0).abs() < 1e-15);
         }
     }

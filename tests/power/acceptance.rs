@@ -17,7 +17,7 @@
 //! rate p_m = p(d_m), found by gaps floor(ln(1 - u) / ln(1 - p_m)), of which each is accepted with p_i / p_m.
 
 use scatterproof::math::{exp, ln_1p};
-use scatterproof::samplers::{Axis, Discrete, Draw, Null, Piece, Sampler};
+use scatterproof::samplers::{Coordinate, Discrete, Draw, Null, Piece, Sampler};
 use scatterproof::sampling::stream::Stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -168,7 +168,7 @@ impl Sampler for Acceptance {
 
     fn pieces(&self) -> Vec<Piece> {
         match self.view {
-            View::Distance | View::Tail => vec![Piece::line("distance", Axis::over(0.0, 1.0))],
+            View::Distance | View::Tail => vec![Piece::line("distance", Coordinate::over(0.0, 1.0))],
             View::Pair | View::Number => Vec::new(),
         }
     }

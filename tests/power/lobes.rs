@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use scatterproof::math::{DVec3, atan2, cos, sin, sin_cos_turns};
 use scatterproof::optics::microfacet::{MicrofacetKind, Microfacets};
 use scatterproof::optics::phase::HenyeyGreenstein;
-use scatterproof::samplers::{Axis, Draw, Piece, Sampler};
+use scatterproof::samplers::{Coordinate, Draw, Piece, Sampler};
 use scatterproof::sampling::discrete::Cumulative;
 use scatterproof::sampling::stream::Stream;
 
@@ -33,7 +33,7 @@ impl Sampler for Refraction {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("directions", [Axis::over(0.0, 1.0), Axis::turns()])]
+        vec![Piece::plane("directions", [Coordinate::over(0.0, 1.0), Coordinate::turns()])]
     }
 
     /// G1 D |wo.h| / |wo.z|, and dh / dwi = n_i^2 |wi.h| / (n_o wo.h + n_i wi.h)^2 (Walter et al. 2007, eq. 17).
@@ -77,7 +77,7 @@ impl Sampler for Plane {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("directions", [Axis::over(0.0, 1.0), Axis::turns()])]
+        vec![Piece::plane("directions", [Coordinate::over(0.0, 1.0), Coordinate::turns()])]
     }
 
     /// s^2 / (pi (r^2 + s^2)^2) per area, times d^2 / cos.
@@ -141,7 +141,7 @@ impl Sampler for Bounce {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        let (mut theta, mut azimuth) = (Axis::over(0.0, 1.0), Axis::turns());
+        let (mut theta, mut azimuth) = (Coordinate::over(0.0, 1.0), Coordinate::turns());
         theta.kinks.extend((1..ROWS).map(|k| k as f64 / ROWS as f64));
         azimuth.kinks.extend((0..2 * COLUMNS).map(|k| k as f64 / (2 * COLUMNS) as f64));
         vec![Piece::plane("directions", [theta, azimuth])]

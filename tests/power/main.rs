@@ -42,8 +42,9 @@ use acceptance::{Acceptance, AcceptanceOptions};
 use alone::{TwoBounce, TwoBounceOptions};
 use cloud::{Cloud, CloudOptions};
 use defects::{Defect, Family, Planted, planted};
-use scatterproof::experiment::estimators::{builtin, read};
-use scatterproof::experiment::registry::{Registry, RegistryEntry, SamplerEntry};
+use scatterproof::estimators::{EstimatorKind, Serves, read_options};
+use scatterproof::experiment::registry::Registry;
+use scatterproof::samplers::SamplerKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use subdivision::{FluxOptions, Photons, Subdivision};
@@ -56,51 +57,56 @@ struct NoOptions {}
 
 /// The library's registry, and the test's own estimators with what is planted in this process.
 fn registry() -> Registry {
-    let mut registry = builtin();
+    let mut registry = Registry::builtin();
     registry.samplers.extend(samplers::entries());
-    registry.samplers.push(SamplerEntry {
+    registry.samplers.push(SamplerKind {
         kind: "planted_acceptance",
         doc: "points accepted by distance, and the planted defect",
         options_schema: || schemars::schema_for!(AcceptanceOptions),
-        build: |options| Ok(Box::new(Acceptance::new(&read(options)?, planted()))),
+        build: |options| Ok(Box::new(Acceptance::new(&read_options(options)?, planted()))),
     });
-    registry.entries.extend([
-        RegistryEntry {
+    registry.estimators.extend([
+        EstimatorKind {
             kind: "tracer",
             doc: "the second path tracer, and the defect that is planted in it",
+            serves: Serves::ALL,
             options_schema: || schemars::schema_for!(NoOptions),
             build: |options, scene| {
-                let NoOptions {} = read(options)?;
+                let NoOptions {} = read_options(options)?;
                 Ok(Box::new(Tracer::new(scene, planted())))
             },
         },
-        RegistryEntry {
+        EstimatorKind {
             kind: "last_two",
             doc: "two bounces from one medium vertex by one technique, and the planted defect",
+            serves: Serves::ALL,
             options_schema: || schemars::schema_for!(TwoBounceOptions),
             build: |options, scene| {
-                Ok(Box::new(TwoBounce { scene, options: read(options)?, defect: planted() }))
+                Ok(Box::new(TwoBounce { scene, options: read_options(options)?, defect: planted() }))
             },
         },
-        RegistryEntry {
+        EstimatorKind {
             kind: "subdivision",
             doc: "paths with subdivision next-event estimation, and the planted defect",
+            serves: Serves::ALL,
             options_schema: || schemars::schema_for!(FluxOptions),
             build: |options, scene| {
-                Ok(Box::new(Subdivision { scene, options: read(options)?, defect: planted() }))
+                Ok(Box::new(Subdivision { scene, options: read_options(options)?, defect: planted() }))
             },
         },
-        RegistryEntry {
+        EstimatorKind {
             kind: "photons",
             doc: "an analog light tracer into the bins of a flux, without defects",
+            serves: Serves::ALL,
             options_schema: || schemars::schema_for!(FluxOptions),
-            build: |options, scene| Ok(Box::new(Photons { scene, options: read(options)? })),
+            build: |options, scene| Ok(Box::new(Photons { scene, options: read_options(options)? })),
         },
-        RegistryEntry {
+        EstimatorKind {
             kind: "planted_cloud",
             doc: "the second point-cloud method, and the planted defect",
+            serves: Serves::ALL,
             options_schema: || schemars::schema_for!(CloudOptions),
-            build: |options, scene| Ok(Box::new(Cloud::new(scene, read(options)?, planted()))),
+            build: |options, scene| Ok(Box::new(Cloud::new(scene, read_options(options)?, planted()))),
         },
     ]);
     registry

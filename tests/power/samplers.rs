@@ -4,11 +4,11 @@
 use std::f64::consts::{PI, SQRT_2, TAU};
 use std::sync::Mutex;
 
-use scatterproof::experiment::estimators::read;
-use scatterproof::experiment::registry::SamplerEntry;
 use scatterproof::math::{DVec3, Frame, atan, atan2, cos, exp, exp_m1, ln_1p, sin, sin_cos_turns, tan};
 use scatterproof::optics::phase::HenyeyGreenstein;
-use scatterproof::samplers::{Axis, Contrast, Discrete, Draw, Null, Piece, Sampler};
+use scatterproof::samplers::{
+    Contrast, Coordinate, Discrete, Draw, Null, Piece, Sampler, SamplerKind, read_options,
+};
 use scatterproof::sampling::stream::Stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,12 +23,12 @@ struct NoOptions {}
 
 macro_rules! entry {
     ($kind:literal, $doc:literal, $build:expr) => {
-        SamplerEntry {
+        SamplerKind {
             kind: $kind,
             doc: $doc,
             options_schema: || schemars::schema_for!(NoOptions),
             build: |options| {
-                let NoOptions {} = read(options)?;
+                let NoOptions {} = read_options(options)?;
                 Ok(Box::new($build))
             },
         }
@@ -36,7 +36,7 @@ macro_rules! entry {
 }
 
 /// Every sampler here, with what is planted in this process.
-pub fn entries() -> Vec<SamplerEntry> {
+pub fn entries() -> Vec<SamplerKind> {
     vec![
         entry!("planted_phase", "Henyey-Greenstein", Phase::new(planted())),
         entry!("planted_flight", "truncated flight", Flight { defect: planted() }),
@@ -89,7 +89,7 @@ impl Sampler for Phase {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("directions", [Axis::over(0.0, 1.0), Axis::turns()])]
+        vec![Piece::plane("directions", [Coordinate::over(0.0, 1.0), Coordinate::turns()])]
     }
 
     fn density(&self, _: usize, [x, turns]: [f64; 2]) -> f64 {
@@ -128,7 +128,7 @@ impl Sampler for Flight {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::line("distance", Axis::over(0.0, 1.0))]
+        vec![Piece::line("distance", Coordinate::over(0.0, 1.0))]
     }
 
     fn density(&self, _: usize, [x, _]: [f64; 2]) -> f64 {
@@ -166,7 +166,7 @@ impl Sampler for Equiangular {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::line("distance", Axis::over(0.0, 1.0))]
+        vec![Piece::line("distance", Coordinate::over(0.0, 1.0))]
     }
 
     fn density(&self, _: usize, [x, _]: [f64; 2]) -> f64 {
@@ -206,7 +206,7 @@ impl Sampler for Mixture {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("directions", [Axis::over(0.0, 1.0), Axis::turns()])]
+        vec![Piece::plane("directions", [Coordinate::over(0.0, 1.0), Coordinate::turns()])]
     }
 
     fn density(&self, _: usize, [mu, _]: [f64; 2]) -> f64 {
@@ -234,7 +234,7 @@ impl Sampler for Partly {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("directions", [Axis::over(0.0, 1.0), Axis::turns()])]
+        vec![Piece::plane("directions", [Coordinate::over(0.0, 1.0), Coordinate::turns()])]
     }
 
     fn density(&self, _: usize, [mu, _]: [f64; 2]) -> f64 {
@@ -269,7 +269,7 @@ impl Sampler for Rejection {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("disc", [Axis::over(0.0, 1.0), Axis::turns()])]
+        vec![Piece::plane("disc", [Coordinate::over(0.0, 1.0), Coordinate::turns()])]
     }
 
     /// 1/4 per area, area 2 pi r per (r, turns).
@@ -320,7 +320,7 @@ impl Sampler for Sphere {
     }
 
     fn pieces(&self) -> Vec<Piece> {
-        vec![Piece::plane("directions", [Axis::over(0.0, 1.0), Axis::turns()])]
+        vec![Piece::plane("directions", [Coordinate::over(0.0, 1.0), Coordinate::turns()])]
     }
 
     /// 1 / (4 pi) per solid angle, which is 2 pi * pi sin theta per chart.

@@ -6,25 +6,24 @@
 
 use std::sync::Arc;
 
-use scatterproof::error::{Error, Result};
-use scatterproof::estimators::{BandUse, Bias, Cost, Estimator, Scores, TransportClass};
-use scatterproof::experiment::estimators::read;
-use scatterproof::experiment::registry::{RegistryEntry, schemars, serde};
+use scatterproof::error::Result;
+use scatterproof::estimators::{
+    BandUse, Bias, BoundaryKind, Cost, Estimator, EstimatorKind, Scores, Serves, TransportClass,
+    read_options,
+};
+use scatterproof::experiment::registry::{schemars, serde};
 use scatterproof::geometry::{Ray, Side};
-use scatterproof::optics::boundary::Boundary;
 use scatterproof::sampling::distance::transmittance;
 use scatterproof::sampling::stream::{PassKey, Purpose};
 use scatterproof::scene::Scene;
 
-/// Under which name an experiment file asks for it, and with which options.
-pub const BALLISTIC: RegistryEntry = RegistryEntry {
+/// Under which name and with which options an experiment file asks for it, and which scenes it serves.
+pub const BALLISTIC: EstimatorKind = EstimatorKind {
     kind: "ballistic",
     doc: "light straight through a matched body; unbiased in the class surface, and scores no other",
+    serves: Serves { boundaries: &[BoundaryKind::Matched], ..Serves::FROM_OUTSIDE },
     options_schema: || schemars::schema_for!(BallisticOptions),
-    build: |options, scene| {
-        let options: BallisticOptions = read(options)?;
-        Ok(Box::new(Ballistic::new(options, scene)?))
-    },
+    build: |options, scene| Ok(Box::new(Ballistic::new(read_options(options)?, scene)?)),
 };
 
 /// Options of `ballistic`.
@@ -32,7 +31,6 @@ pub const BALLISTIC: RegistryEntry = RegistryEntry {
 #[serde(deny_unknown_fields, crate = "scatterproof::experiment::registry::serde")]
 struct BallisticOptions {
     /// Straight rays whose mean is one score; 1 without it.
-    #[serde(default)]
     #[schemars(range(min = 1, max = 1024))]
     rays: Option<u32>,
 }
@@ -44,12 +42,9 @@ struct Ballistic {
 }
 
 impl Ballistic {
-    /// For a scene whose boundary is matched.
+    /// For a scene that it serves.
     fn new(options: BallisticOptions, scene: Arc<Scene>) -> Result<Ballistic> {
-        if scene.boundary.iter().any(|b| *b != Boundary::Matched) {
-            let help = "use object.boundary.matched, or leave the estimator out";
-            return Err(Error::input_help("ballistic needs a matched boundary", help));
-        }
+        BALLISTIC.check(&scene)?;
         Ok(Ballistic { rays: options.rays.unwrap_or(1), scene })
     }
 

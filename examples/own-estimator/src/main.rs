@@ -4,10 +4,10 @@ mod ballistic;
 
 use std::process::ExitCode;
 
-use scatterproof::experiment::estimators::builtin;
+use scatterproof::experiment::Registry;
 
 fn main() -> ExitCode {
-    let mut registry = builtin();
-    registry.entries.push(ballistic::BALLISTIC);
+    let mut registry = Registry::builtin();
+    registry.estimators.push(ballistic::BALLISTIC);
     scatterproof::cli::main(&registry)
 }

@@ -9,7 +9,7 @@
 //! E[B_p / p] = 1, and over the points each term has mean int S E dA, whatever p > 0 is: unbiased with
 //! respect to the model, which knows no visibility inside the body. What p decides is variance: the
 //! second moment of a term is E[(S Phi)^2 / p], and where p falls faster than S^2 does, it grows with
-//! the size of the body ([`Acceptance`]).
+//! the size of the body ([`AcceptanceRule`]).
 //!
 //! The camera path's branch of refraction has probability T21, so the kernel leaves T21 out
 //! (`emergence.rs`). Light is sampled by strength with a shadow ray. Pixels of a pass share the points:
@@ -20,11 +20,17 @@ mod cloud;
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use self::cloud::Cloud;
 use super::bssrdf_single::{adds_single, score_single};
 use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
 use super::illumination::Illumination;
-use super::{Anomaly, BandUse, Cost, Estimator, HeavyTail, Scores, TransportClass};
+use super::{
+    Anomaly, BandUse, Bodies, Cost, Estimator, EstimatorKind, HeavyTail, Scores, Serves, TransportClass,
+    read_options,
+};
 use crate::error::{Error, Result};
 use crate::geometry::{BodySampler, FaceChoice};
 use crate::optics::bssrdf::{Entry, Model};
@@ -32,58 +38,70 @@ use crate::sampling::stream::PassKey;
 use crate::sampling::thinning::{Accepted, ThinningForm, ThinningRule, ThinningWork, scan};
 use crate::scene::Scene;
 
-/// How a point's probability of acceptance follows from its distance d.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Acceptance {
-    /// p = 1: every point is evaluated.
-    All,
-    /// e^(-sigma_tr d) of the band: bands accept by themselves.
-    Band,
-    /// e^(-m d) with the mean m of sigma_tr over the bands: the source's rule for RGB. In a band with
-    /// sigma_tr < m/2 the variance grows exponentially with the size of the body.
-    Mean,
-    /// e^(-m d) with the smallest sigma_tr: bounded in every band, and accepts the most.
-    Minimum,
-    /// The mean over the bands of e^(-sigma_tr d): bounded in every band, accepts fewer than the
-    /// smallest does.
-    MeanOfExponentials,
-    /// max(e^(-m d), least), m the mean.
-    Floor(f64),
-    /// In proportion to the mean over the bands of the kernel over its integral, as many as the mean of
-    /// exponentials accepts over a disc as wide as the body.
-    Kernel,
+pub use crate::sampling::thinning::Search;
+
+/// The probability p(d) with which a point at distance d is evaluated, and weighs 1/p.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum AcceptanceRule {
+    /// 1: every point is evaluated.
+    All {},
+    /// e^(-sigma_tr d) of each band by itself.
+    Band {},
+    /// e^(-m d), m the mean of sigma_tr over the bands: as published for RGB.
+    ///
+    /// In a band with sigma_tr < m/2 the variance grows exponentially with the size of the body.
+    Mean {},
+    /// e^(-m d), m the smallest sigma_tr: bounded in every band, and accepts the most.
+    Minimum {},
+    /// The mean over the bands of e^(-sigma_tr d): bounded in every band, accepts fewer than the smallest does.
+    MeanOfExponentials {},
+    /// max(e^(-m d), this), m the mean of sigma_tr.
+    Floor(#[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))] f64),
+    /// In proportion to the kernel.
+    ///
+    /// That is to the mean over the bands of the kernel over its integral; as many as the mean of exponentials
+    /// accepts over a disc as wide as the body.
+    Kernel {},
+}
+
+impl Default for AcceptanceRule {
+    fn default() -> Self {
+        AcceptanceRule::Kernel {}
+    }
 }
 
 /// ln of the growth of the variance beyond which a mean is not judged.
 const HEAVY: f64 = 3.0;
 
-/// How accepted points are found; both have the same law.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Search {
-    /// By a hierarchy over the points.
-    #[default]
-    Hierarchy,
-    /// By asking every point, as the source does.
-    Scan,
-}
-
-/// Options of the estimator.
-#[derive(Clone, Debug, PartialEq)]
+/// Options of `point_cloud`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct PointCloudOptions {
     /// The BSSRDF.
     pub model: Model,
-    /// Number of surface points per pass, M.
+    /// Points of the surface that a pass draws.
+    #[serde(default = "ten_thousand")]
+    #[schemars(range(min = 1, max = 1073741824))]
     pub samples: usize,
-    /// How points are drawn from the surface.
+    /// How points are drawn: faces (triangles) by area, or by index as published.
+    #[serde(default)]
     pub faces: FaceChoice,
-    /// How the probability of acceptance falls with distance.
-    pub acceptance: Acceptance,
-    /// How accepted points are found.
+    /// The probability p(d) with which a point at distance d is evaluated, and weighs 1/p.
+    #[serde(default)]
+    pub acceptance: AcceptanceRule,
+    /// How accepted points are found; both have the same law.
+    #[serde(default)]
     pub search: Search,
-    /// Whether single scattering is added; `None` where the model leaves it out.
+    /// Whether single scattering is added by sampling; without it where the model leaves it out.
     pub single: Option<bool>,
     /// Whether light that goes straight through the body is followed.
+    #[serde(default = "crate::estimators::kind::on")]
     pub straight: bool,
+}
+
+fn ten_thousand() -> usize {
+    10_000
 }
 
 /// The estimator, for one scene.
@@ -99,18 +117,25 @@ pub struct PointCloud {
 }
 
 impl PointCloud {
-    /// For a scene with a finite body and smooth or matched boundaries.
+    /// `point_cloud` in experiment files.
+    pub const KIND: EstimatorKind = EstimatorKind {
+        kind: "point_cloud",
+        doc: "a BSSRDF summed over points of the surface, accepted by distance; unbiased for the model",
+        serves: Serves { bodies: Bodies::Finite, ..Serves::BSSRDF },
+        options_schema: || schemars::schema_for!(PointCloudOptions),
+        build: |options, scene| Ok(Box::new(PointCloud::new(scene, read_options(options)?)?)),
+    };
+
+    /// For a scene.
     ///
     /// # Errors
-    /// A half-space or slab, a rough boundary, a medium that the model does not fit.
+    /// A scene that it does not serve; a medium that the model does not fit.
     pub fn new(scene: Arc<Scene>, options: PointCloudOptions) -> Result<PointCloud> {
+        PointCloud::KIND.check(&scene)?;
         let (Some(sampler), Some(bounds)) =
             (BodySampler::new(&scene.shape, options.faces), scene.shape.bounds())
         else {
-            return Err(Error::input_help(
-                "point_cloud draws points uniformly from the surface, which a half-space or slab has without end",
-                "use a finite body, or bssrdf_probe",
-            ));
+            return Err(Error::input("point_cloud needs a finite body"));
         };
         let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
         let rules = rules(&bssrdf, options.acceptance, 2.0 * bounds.radius);
@@ -123,22 +148,24 @@ impl PointCloud {
 /// The bands that accept together, and their rule; all of them refract alike.
 fn rules(
     bssrdf: &BssrdfScene,
-    acceptance: Acceptance,
+    acceptance: AcceptanceRule,
     diameter: f64,
 ) -> Vec<(Vec<usize>, ThinningRule)> {
     let sigmas: Vec<f64> = bssrdf.models.iter().map(|model| model.sigma_tr).collect();
     let mean = sigmas.iter().sum::<f64>() / sigmas.len() as f64;
     let common = match acceptance {
-        Acceptance::All => ThinningForm::All,
-        Acceptance::Mean => ThinningForm::Exponential { sigma: mean },
-        Acceptance::Minimum | Acceptance::Band => ThinningForm::Exponential {
+        AcceptanceRule::All {} => ThinningForm::All,
+        AcceptanceRule::Mean {} => ThinningForm::Exponential { sigma: mean },
+        AcceptanceRule::Minimum {} | AcceptanceRule::Band {} => ThinningForm::Exponential {
             sigma: sigmas.iter().fold(f64::INFINITY, |least, &s| least.min(s)),
         },
-        Acceptance::MeanOfExponentials => ThinningForm::MeanOfExponentials { sigmas: sigmas.clone() },
-        Acceptance::Floor(least) => ThinningForm::Floor { sigma: mean, least },
-        Acceptance::Kernel => in_proportion(bssrdf, &sigmas, diameter),
+        AcceptanceRule::MeanOfExponentials {} => {
+            ThinningForm::MeanOfExponentials { sigmas: sigmas.clone() }
+        }
+        AcceptanceRule::Floor(least) => ThinningForm::Floor { sigma: mean, least },
+        AcceptanceRule::Kernel {} => in_proportion(bssrdf, &sigmas, diameter),
     };
-    if acceptance == Acceptance::Band {
+    if acceptance == (AcceptanceRule::Band {}) {
         let own = |band: usize| {
             (vec![band], ThinningRule::new(ThinningForm::Exponential { sigma: sigmas[band] }))
         };
@@ -198,7 +225,7 @@ impl Estimator for PointCloud {
     /// > 2 s. A finite body cuts the tail off at its diameter D; the variance has then grown by about
     /// e^((m - 2 s) D).
     fn heavy_tails(&self) -> Vec<HeavyTail> {
-        if self.options.acceptance != Acceptance::Mean {
+        if self.options.acceptance != (AcceptanceRule::Mean {}) {
             return Vec::new(); // weights of all other rules are bounded by what the kernel loses, or by their floor
         }
         let diameter =

@@ -36,7 +36,7 @@ fn sky() -> Light {
     Light { name: "sky".into(), emission }
 }
 
-fn options(acceptance: Acceptance, search: Search) -> PointCloudOptions {
+fn options(acceptance: AcceptanceRule, search: Search) -> PointCloudOptions {
     let model = Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
     let faces = FaceChoice::Area;
     PointCloudOptions {
@@ -76,7 +76,7 @@ fn measure(name: &str, scene: &Arc<Scene>, options: PointCloudOptions, passes: u
 /// chord length d:
 ///   T21 L (1 - 2 C1(1/eta)) int_0^2R R(d) 2 pi d dd.
 fn expected(scene: &Scene, band: usize) -> f64 {
-    let options = options(Acceptance::All, Search::Scan);
+    let options = options(AcceptanceRule::All {}, Search::Scan);
     let model = options.model.of(band, 3, &scene.medium[band], ETA).expect("a model");
     let entering = 1.0 - integrate(|mu| 2.0 * mu * fresnel(mu, ETA).reflectance, 0.0, 1.0, 1e-12).value;
     let profile = integrate(|d| 2.0 * PI * d * model.falloff(d), 0.0, 2.0 * RADIUS, 1e-12).value;
@@ -90,14 +90,14 @@ fn expected(scene: &Scene, band: usize) -> f64 {
 fn every_rule_has_the_mean_of_quadrature() {
     let scene = scene(vec![sky()]);
     for (name, acceptance, search) in [
-        ("all", Acceptance::All, Search::Scan),
-        ("band", Acceptance::Band, Search::Hierarchy),
-        ("mean", Acceptance::Mean, Search::Hierarchy),
-        ("mean, scan", Acceptance::Mean, Search::Scan),
-        ("minimum", Acceptance::Minimum, Search::Hierarchy),
-        ("mean of exponentials", Acceptance::MeanOfExponentials, Search::Hierarchy),
-        ("floor", Acceptance::Floor(0.05), Search::Hierarchy),
-        ("kernel", Acceptance::Kernel, Search::Hierarchy),
+        ("all", AcceptanceRule::All {}, Search::Scan),
+        ("band", AcceptanceRule::Band {}, Search::Hierarchy),
+        ("mean", AcceptanceRule::Mean {}, Search::Hierarchy),
+        ("mean, scan", AcceptanceRule::Mean {}, Search::Scan),
+        ("minimum", AcceptanceRule::Minimum {}, Search::Hierarchy),
+        ("mean of exponentials", AcceptanceRule::MeanOfExponentials {}, Search::Hierarchy),
+        ("floor", AcceptanceRule::Floor(0.05), Search::Hierarchy),
+        ("kernel", AcceptanceRule::Kernel {}, Search::Hierarchy),
     ] {
         let found = measure(name, &scene, options(acceptance, search), 2000);
         for (band, (mean, error)) in found.into_iter().enumerate() {
@@ -122,8 +122,8 @@ fn lights_are_told_apart() {
     };
     let both = scene(vec![sun(DVec3::Z, 1.0), sun(-DVec3::Z, 4.0)]);
     let layout = Layout::new(&both);
-    let estimator =
-        PointCloud::new(both.clone(), options(Acceptance::All, Search::Scan)).expect("an estimator");
+    let estimator = PointCloud::new(both.clone(), options(AcceptanceRule::All {}, Search::Scan))
+        .expect("an estimator");
     let mut scores = Scores::new(layout.clone());
     let key = StreamKey::named("lights_are_told_apart");
     (0..200).for_each(|pass| estimator.pass(&[0, 1, 2], &key.pass(pass), &mut scores));
@@ -147,7 +147,7 @@ fn what_does_not_fit_is_refused() {
     let with = |change: &dyn Fn(&mut Scene)| {
         let mut scene = Arc::into_inner(scene(vec![sky()])).expect("alone");
         change(&mut scene);
-        let options = options(Acceptance::All, Search::Scan);
+        let options = options(AcceptanceRule::All {}, Search::Scan);
         PointCloud::new(Arc::new(scene), options).expect_err("refused").to_string()
     };
     assert!(with(&|scene| scene.shape = Arc::new(Shape::HalfSpace)).contains("finite body"));
@@ -159,7 +159,7 @@ fn what_does_not_fit_is_refused() {
 #[test]
 fn memory_is_foreseen() {
     let scene = scene(vec![sky()]);
-    let mut options = options(Acceptance::All, Search::Scan);
+    let mut options = options(AcceptanceRule::All {}, Search::Scan);
     options.samples = 200_000;
     let estimator = PointCloud::new(scene, options).expect("an estimator");
     let key = StreamKey::named("memory_is_foreseen").pass(0);

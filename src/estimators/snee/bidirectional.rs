@@ -17,8 +17,11 @@ use super::end::{End, Middle};
 use super::guide::Guide;
 use crate::error::{Error, Result};
 use crate::estimators::bands::{OneBand, WalkBands};
+use crate::estimators::path::PathOptions;
 use crate::estimators::walk::{CameraWalk, Field, Path, Rivals, Unrivalled, WalkExit};
-use crate::estimators::{Cost, Estimator, Roulette, Scores};
+use crate::estimators::{
+    Bodies, Cost, Estimator, EstimatorKind, Roulette, Scores, Serves, read_options,
+};
 use crate::geometry::{BoundingSphere, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
@@ -37,17 +40,26 @@ pub struct Bidirectional {
 }
 
 impl Bidirectional {
-    /// For a scene with a finite body.
+    /// `bidirectional` in experiment files.
+    pub const KIND: EstimatorKind = EstimatorKind {
+        kind: "bidirectional",
+        doc: "path tracing whose medium vertices connect to one light vertex inside the body; unbiased",
+        serves: Serves { bodies: Bodies::Finite, ..Serves::WITHOUT_ENTRIES },
+        options_schema: || schemars::schema_for!(PathOptions),
+        build: |options, scene| {
+            let PathOptions { roulette } = read_options(options)?;
+            Ok(Box::new(Bidirectional::new(scene, roulette)?))
+        },
+    };
+
+    /// For a scene.
     ///
     /// # Errors
-    /// A half-space or slab: no disc covers it.
+    /// A scene that it does not serve: light paths start from a disc that covers the body.
     pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Result<Bidirectional> {
-        let Some(bounds) = scene.shape.bounds() else {
-            return Err(Error::input_help(
-                "bidirectional starts light paths from a disc that covers the body; this body has no end",
-                "use a slab's or half-space's other estimators (`path`, `snee`), or a finite body",
-            ));
-        };
+        Bidirectional::KIND.check(&scene)?;
+        let bounds = scene.shape.bounds();
+        let bounds = bounds.ok_or_else(|| Error::input("bidirectional needs a finite body"))?;
         let guides = (0..scene.bands())
             .map(|band| match scene.boundary[band] {
                 Boundary::Matched => Vec::new(),

@@ -1,5 +1,8 @@
 //! The end of a path as connections see it.
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::guess::Guess;
 use super::guide::Guide;
 use crate::estimators::Cost;
@@ -12,11 +15,15 @@ use crate::optics::boundary::Boundary;
 /// With which probability a technique is called at a vertex: `most` e^(-decay sigma d), d being the
 /// distance to the boundary along the specular guess. It depends on the vertex alone, so that every
 /// density can name it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Call {
     /// Probability at the boundary.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub most: f64,
-    /// How fast it falls with the optical distance that light has to go.
+    /// How fast it falls per mean free path that light has to go.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
     pub decay: f64,
 }
 

@@ -12,6 +12,9 @@
 //! p_lobe(w_jk) with the same Dirac factor as BSDF sampling. It also covers what subdivision cannot:
 //! single scattering, and paths whose last vertex follows an internal reflection.
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::end::{Call, End, Leg};
 use super::guess::Guess;
 use super::guide::Guide;
@@ -28,15 +31,28 @@ use crate::sampling::distance::transmittance;
 use crate::sampling::lobe::PowerLobe;
 
 /// Options of the technique.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct LastVertex {
-    /// How often it is called.
-    pub call: Call,
+    /// Probability of a call at the boundary; 0 switches it off.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub most: f64,
+    /// How fast it falls per mean free path along the specular guess.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub decay: f64,
     /// Share of the wider lobe.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub wide_share: f64,
-    /// Least roughness of the wider lobe (rough boundary; at least twice the boundary's own), or its
-    /// width (smooth).
+    /// Least roughness of the wider lobe (at least twice the boundary's own); its width at a smooth boundary.
+    #[serde(default = "wide")]
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub wide: f64,
+}
+
+fn wide() -> f64 {
+    0.2
 }
 
 /// The lobe of directions w_jk about one guess.
@@ -54,6 +70,11 @@ const WIDER: f64 = 2.0;
 const NARROWEST: f64 = 1e-4;
 
 impl LastVertex {
+    /// How often it is called.
+    fn call(&self) -> Call {
+        Call { most: self.most, decay: self.decay }
+    }
+
     fn lobe(&self, boundary: &Boundary, guide: &Guide, guess: &Guess) -> Option<Lobe> {
         match *boundary {
             Boundary::Rough { eta, facets } => {
@@ -125,7 +146,7 @@ pub(super) fn density<B: WalkBands>(
         Lobe::Refraction { .. } => end.by_guide,
         Lobe::About { .. } => end.guide.choice,
     };
-    let q = technique.call.probability(setup.sigma, Some(&guess));
+    let q = technique.call().probability(setup.sigma, Some(&guess));
     let pdf = q * of_light * lobe.pdf(technique.wide_share, end.w_l, to_k.dir);
     if pdf == 0.0 {
         return 0.0;
@@ -153,7 +174,7 @@ pub(super) fn draw<'a, B: WalkBands>(
     technique: &LastVertex,
 ) -> Option<GuidedEnd<'a>> {
     let sigma = walk.rivals.setup.sigma;
-    let reach = technique.call.reach(sigma, walk.rivals.stream.draw())?;
+    let reach = technique.call().reach(sigma, walk.rivals.stream.draw())?;
     let x_j = walk.rivals.vertex(Slot::Latest);
     if walk.scene.shape.clearance(x_j.point) >= reach {
         return None;

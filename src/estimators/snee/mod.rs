@@ -19,6 +19,7 @@ mod end;
 mod guess;
 mod guide;
 mod last_vertex;
+mod options;
 mod probe;
 mod state;
 mod subdivision;
@@ -28,7 +29,7 @@ use std::sync::Arc;
 
 use super::bands::{MAX_SHARED, OneBand, SharedBands};
 use super::walk::{CameraWalk, Field, Path, Unrivalled, unscattered_notes};
-use super::{BandUse, Estimator, Roulette, Scores};
+use super::{BandUse, Estimator, EstimatorKind, Scores, Serves, read_options};
 use crate::error::{Error, Result};
 use crate::optics::boundary::Boundary;
 use crate::optics::joint::{JointDirections, JointTable};
@@ -41,65 +42,9 @@ use state::Connections;
 pub use bidirectional::Bidirectional;
 pub use end::Call;
 pub use last_vertex::LastVertex;
+pub use options::{EdgeTechnique, JointKind, SneeChoices, SneeOptions, SneePreset, Strategies};
 pub use probe::ProbeShares;
 pub use two_bounce::TwoBounce;
-
-/// Which techniques make the paths whose last two medium vertices follow each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Strategies {
-    /// The walk goes on, its exit by BSDF sampling.
-    pub bsdf: bool,
-    /// The walk goes on, its exit by light sampling.
-    pub light: bool,
-    /// Subdivision from the light's end.
-    pub top_to_bottom: bool,
-    /// Subdivision from the walk's end.
-    pub bottom_to_top: bool,
-}
-
-/// How directions are drawn bottom to top.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JointKind {
-    /// By a table of phase function times geometry.
-    Table,
-    /// By phase function and geometry in turn.
-    Mixture,
-}
-
-impl Strategies {
-    fn subdivides(&self) -> bool {
-        self.top_to_bottom || self.bottom_to_top
-    }
-}
-
-/// How the estimator is set up.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SneeOptions {
-    /// Russian roulette of the walk.
-    pub roulette: Roulette,
-    /// What takes part.
-    pub strategies: Strategies,
-    /// How often an edge is subdivided.
-    pub call: Call,
-    /// The same where nothing else finds the path: parallel light through a smooth boundary.
-    pub call_alone: Call,
-    /// Whether distances end at the boundary (one more ray for every density) or run on and may fail.
-    pub truncated: bool,
-    /// Directions of probes.
-    pub probe: ProbeShares,
-    /// Directions from x_i, bottom to top.
-    pub joint: JointKind,
-    /// The light-guided last vertex.
-    pub last_vertex: Option<LastVertex>,
-    /// Whether a smooth boundary's reflection of a light that is connected to is scored by its
-    /// expectation, wherever a walk meets the boundary from outside, instead of by the walks that take
-    /// it.
-    pub expected_reflection: bool,
-    /// Least concentration 4 pi int L^2 / (int L)^2 of a light that is connected to; 1 lets all pass.
-    pub least_concentration: f64,
-    /// Whether all bands share a walk.
-    pub share_bands: bool,
-}
 
 /// What connections need to know, for one band.
 #[derive(Debug)]
@@ -121,11 +66,29 @@ pub struct Snee {
 }
 
 impl Snee {
+    /// `snee` in experiment files.
+    pub const KIND: EstimatorKind = EstimatorKind {
+        kind: "snee",
+        doc: "path tracing with subdivision next-event estimation, as published or guided; unbiased",
+        serves: Serves::WITHOUT_ENTRIES,
+        options_schema: || schemars::schema_for!(SneeChoices),
+        build: |options, scene| {
+            let choices: SneeChoices = read_options(options)?;
+            Ok(Box::new(Snee::new(scene, choices.options()?)?))
+        },
+    };
+
     /// For a scene.
     ///
     /// # Errors
-    /// If bands are to share walks and differ in more than their media.
+    /// A scene that it does not serve; bands that are to share walks and differ in more than their media.
     pub fn new(scene: Arc<Scene>, options: SneeOptions) -> Result<Snee> {
+        Snee::KIND.check(&scene)?;
+        Snee::set_up(scene, options)
+    }
+
+    /// The same for any sensor.
+    fn set_up(scene: Arc<Scene>, options: SneeOptions) -> Result<Snee> {
         if options.share_bands {
             check_shared(&scene)?;
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::estimators::path::PathTracer;
-use crate::estimators::{Cost, Layout};
+use crate::estimators::{Cost, Layout, Roulette};
 use crate::geometry::{Ray, Shape};
 use crate::math::{DVec3, Frame};
 use crate::optics::medium::Medium;
@@ -27,11 +27,7 @@ fn guided() -> SneeOptions {
         truncated: false,
         probe: ProbeShares { uniform: 0.2, plane: 0.4, guided: 0.4 },
         joint: JointKind::Mixture,
-        last_vertex: Some(LastVertex {
-            call: Call { most: 1.0, decay: 0.5 },
-            wide_share: 0.25,
-            wide: 0.2,
-        }),
+        last_vertex: Some(LastVertex { most: 1.0, decay: 0.5, wide_share: 0.25, wide: 0.2 }),
         expected_reflection: true,
         least_concentration: 10.0,
         share_bands: false,
@@ -81,7 +77,8 @@ fn behind_the_gate_it_is_path() {
         for (concentration, is_open) in [(1.0, false), (9.9, false), (10.1, true)] {
             let light = cap(4.0 * std::f64::consts::PI / concentration, 1);
             let scene = scene(boundary, &[(10.0, 0.95, 0.3)], light);
-            let path = PathTracer::new(scene.clone(), Roulette::Below(0.25));
+            let path =
+                PathTracer::new(scene.clone(), Roulette::Below(0.25)).expect("a scene that it serves");
             let path = played(&scene, &path, "behind_the_gate_it_is_path");
             let snee = Snee::new(scene.clone(), guided()).expect("a scene for it");
             let snee = played(&scene, &snee, "behind_the_gate_it_is_path");
@@ -154,7 +151,8 @@ fn bodies_without_scattering_are_the_walks() {
     for media in [[(0.0, 0.0, 0.0)], [(3.0, 0.0, 0.0)]] {
         let scene = scene(ROUGH, &media, cap(0.1, 1));
         let snee = Snee::new(scene.clone(), guided()).expect("a scene for it");
-        let path = PathTracer::new(scene.clone(), Roulette::Below(0.25));
+        let path =
+            PathTracer::new(scene.clone(), Roulette::Below(0.25)).expect("a scene that it serves");
         let test = "bodies_without_scattering_are_the_walks";
         let [snee, path] = [played(&scene, &snee, test), played(&scene, &path, test)];
         assert_eq!(bits(&snee.observables), bits(&path.observables));

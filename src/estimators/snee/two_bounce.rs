@@ -9,35 +9,43 @@
 use std::sync::Arc;
 
 use super::state::Connections;
-use super::{Snee, SneeOptions};
+use super::{Snee, SneeChoices, SneeOptions};
 use crate::error::{Error, Result};
 use crate::estimators::bands::OneBand;
 use crate::estimators::walk::{CameraWalk, Path, Unrivalled};
-use crate::estimators::{Estimator, Scores};
+use crate::estimators::{Estimator, EstimatorKind, Scores, SensorKind, Serves, read_options};
 use crate::sampling::stream::{PassKey, Purpose};
-use crate::scene::{Scene, Sensor};
+use crate::scene::Scene;
 
 /// The estimator, for one scene.
 #[derive(Debug)]
 pub struct TwoBounce(Snee);
 
 impl TwoBounce {
-    /// For a scene whose sensor is a medium vertex.
+    /// `two_bounce` in experiment files.
+    pub const KIND: EstimatorKind = EstimatorKind {
+        kind: "two_bounce",
+        doc: "the last two segments alone, from a medium vertex, by snee's techniques; unbiased",
+        serves: Serves { sensors: &[SensorKind::Vertex], ..Serves::ALL },
+        options_schema: || schemars::schema_for!(SneeChoices),
+        build: |options, scene| {
+            let choices: SneeChoices = read_options(options)?;
+            Ok(Box::new(TwoBounce::new(scene, choices.options()?)?))
+        },
+    };
+
+    /// For a scene.
     ///
     /// # Errors
-    /// Another sensor; bands that share walks.
+    /// A scene that it does not serve; bands that share walks.
     pub fn new(scene: Arc<Scene>, options: SneeOptions) -> Result<TwoBounce> {
-        if !matches!(scene.sensor, Sensor::Vertex(_)) {
-            return Err(Error::input(
-                "two_bounce starts at a medium vertex: its sensor must be a `vertex`",
-            ));
-        }
+        TwoBounce::KIND.check(&scene)?;
         if options.share_bands {
             return Err(Error::input(
                 "two_bounce traces every band alone; leave out `bands = \"shared\"`",
             ));
         }
-        Ok(TwoBounce(Snee::new(scene, options)?))
+        Ok(TwoBounce(Snee::set_up(scene, options)?))
     }
 }
 

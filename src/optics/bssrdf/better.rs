@@ -1,14 +1,14 @@
 //! The better dipole: d'Eon 2012, "A better dipole" (with the diffusion constant of Grosjean 1956).
 //!
-//! Two changes to the classical dipole. The fluence phi and the vector flux E of a point source both leave through the
-//! boundary, each with its own Fresnel moment (d'Eon & Irving 2011): exitance = C_phi phi + C_E (-D dphi/dz). And the
-//! diffusion constant is D = (2 sigma_a + sigma_s') / (3 sigma_t'^2), for which phi is exact in its far field at
-//! alpha' -> 0 too. With s = sqrt(sigma_a / D), NOT sqrt(3 sigma_a sigma_t'), z_r = 1/sigma_t', z_v = z_r + 4 A D,
-//! A = (1 - C_E)/(2 C_phi):
+//! Two changes to the classical dipole. The fluence phi and the vector flux E of a point source both
+//! leave through the boundary, each with its own Fresnel moment (d'Eon & Irving 2011): exitance = C_phi
+//! phi + C_E (-D dphi/dz). And the diffusion constant is D = (2 sigma_a + sigma_s') / (3 sigma_t'^2),
+//! for which phi is exact in its far field at alpha' -> 0 too. With s = sqrt(sigma_a / D), NOT sqrt(3
+//! sigma_a sigma_t'), z_r = 1/sigma_t', z_v = z_r + 4 A D, A = (1 - C_E)/(2 C_phi):
 //!   R(r) = alpha'^2/(4 pi) { [C_E z_r (1 + s d_r)/d_r^2 + C_phi/D] e^(-s d_r)/d_r
 //!                          - [-C_E z_v (1 + s d_v)/d_v^2 + C_phi/D] e^(-s d_v)/d_v }.
-//! The factor is alpha' squared: once for the first scattering, which makes the source, once for the second, since the
-//! source's own once-scattered light is left out. Over the plane
+//! The factor is alpha' squared: once for the first scattering, which makes the source, once for the
+//! second, since the source's own once-scattered light is left out. Over the plane
 //!   (alpha'^2/2) { C_E (e^(-s z_r) + e^(-s z_v)) + C_phi/(D s) (e^(-s z_r) - e^(-s z_v)) },
 //! whose last term is C_phi (z_v - z_r)/D where s = 0.
 //!
@@ -16,7 +16,7 @@
 
 use std::f64::consts::PI;
 
-use super::moments::Moments;
+use super::moments::FresnelMoments;
 use super::reduced::Reduced;
 use crate::math::{cbrt, exp, exp_m1};
 use crate::sampling::radial::{Dipole, Radial};
@@ -36,7 +36,7 @@ pub struct Better {
 
 impl Better {
     /// For a medium that scatters.
-    pub fn new(reduced: &Reduced, moments: &Moments) -> Better {
+    pub fn new(reduced: &Reduced, moments: &FresnelMoments) -> Better {
         let Reduced { sigma_a, sigma_s, sigma_t, albedo } = *reduced;
         let diffusion = (2.0 * sigma_a + sigma_s) / (3.0 * sigma_t * sigma_t);
         let s = (sigma_a / diffusion).sqrt();
@@ -55,7 +55,8 @@ impl Better {
 
     /// R(r), 1/mm^2.
     ///
-    /// The fluences of the two sources nearly cancel far away. With delta = d_v - d_r = (z_v^2 - z_r^2)/(d_v + d_r),
+    /// The fluences of the two sources nearly cancel far away. With delta = d_v - d_r = (z_v^2 -
+    /// z_r^2)/(d_v + d_r),
     ///   e^(-s d_r)/d_r - e^(-s d_v)/d_v = e^(-s d_r) [delta/d_r + (1 - e^(-s delta))] / d_v,
     /// a sum of positive terms.
     #[inline]
@@ -73,11 +74,13 @@ impl Better {
 
     /// Ways to draw distances, with their shares: R almost exactly.
     ///
-    /// Since -d/dz (e^(-s d)/d) = z (1 + s d) e^(-s d)/d^3 =: q(z), the fluences' difference is int_z_r^z_v q dz, and R is
+    /// Since -d/dz (e^(-s d)/d) = z (1 + s d) e^(-s d)/d^3 =: q(z), the fluences' difference is
+    /// int_z_r^z_v q dz, and R is
     ///   flux (q(z_r) + q(z_v)) + fluence int_z_r^z_v q(z) dz:
-    /// sources of the classical kind at the two ends and all depths between. Two sources of one strength are a
-    /// [`Dipole`]; the integral becomes three of them, by Gauss's rule of two nodes (which weighs them alike) on three
-    /// parts of the range that widen by one factor. A source at z has the integral 2 pi e^(-s z) over the plane.
+    /// sources of the classical kind at the two ends and all depths between. Two sources of one strength
+    /// are a [`Dipole`]; the integral becomes three of them, by Gauss's rule of two nodes (which weighs
+    /// them alike) on three parts of the range that widen by one factor. A source at z has the integral
+    /// 2 pi e^(-s z) over the plane.
     pub fn techniques(&self) -> Vec<(f64, Radial)> {
         let Dipole { sigma_tr, z_real, z_virtual } = self.shape;
         let factor = cbrt(z_virtual / z_real);

@@ -1,16 +1,18 @@
-//! The dipole of Jensen, Marschner, Levoy & Hanrahan 2001, "A practical model for subsurface light transport", eq. 4.
+//! The dipole of Jensen, Marschner, Levoy & Hanrahan 2001, "A practical model for subsurface light
+//! transport", eq. 4.
 //!
 //!   R(r) = alpha'/(4 pi) [ z_r (1 + s d_r) e^(-s d_r)/d_r^3 + z_v (1 + s d_v) e^(-s d_v)/d_v^3 ],
-//! s = sqrt(3 sigma_a sigma_t'), z_r = 1/sigma_t', z_v = z_r (1 + 4A/3), d = sqrt(r^2 + z^2), A = (1 + 2C1)/(1 - 2C1).
-//! Both signs are plus with z_v > 0: the virtual source is negative, and so is its depth.
-//! Over the plane it is (alpha'/2) (1 + e^(-(4/3) A q)) e^(-q), q = sqrt(3 (1 - alpha')) = s z_r.
+//! s = sqrt(3 sigma_a sigma_t'), z_r = 1/sigma_t', z_v = z_r (1 + 4A/3), d = sqrt(r^2 + z^2), A = (1 +
+//! 2C1)/(1 - 2C1). Both signs are plus with z_v > 0: the virtual source is negative, and so is its
+//! depth. Over the plane it is (alpha'/2) (1 + e^(-(4/3) A q)) e^(-q), q = sqrt(3 (1 - alpha')) = s z_r.
 //!
-//! Reciprocal, never negative. The source's figures count all light, single scattering too, in the measured alpha', so
-//! that adding the single-scattering term counts it twice in part (see the module's table).
+//! Reciprocal, never negative. The source's figures count all light, single scattering too, in the
+//! measured alpha', so that adding the single-scattering term counts it twice in part (see the module's
+//! table).
 
 use std::f64::consts::PI;
 
-use super::moments::Moments;
+use super::moments::FresnelMoments;
 use super::reduced::Reduced;
 use crate::math::exp;
 use crate::sampling::radial::Dipole;
@@ -26,7 +28,7 @@ pub struct Classical {
 
 impl Classical {
     /// For a medium that scatters.
-    pub fn new(reduced: &Reduced, moments: &Moments) -> Classical {
+    pub fn new(reduced: &Reduced, moments: &FresnelMoments) -> Classical {
         let sigma_tr = reduced.sigma_tr();
         let z_real = 1.0 / reduced.sigma_t;
         let z_virtual = z_real * (1.0 + 4.0 / 3.0 * moments.mismatch());

@@ -1,41 +1,47 @@
-//! The directional dipole: Frisvad, Hachisuka & Kjeldsen 2014, "Directional dipole model for subsurface scattering",
-//! ACM TOG 34(1).
+//! The directional dipole: Frisvad, Hachisuka & Kjeldsen 2014, "Directional dipole model for subsurface
+//! scattering", ACM TOG 34(1).
 //!
-//! A ray that enters along w makes in an infinite medium the fluence (their eq. 8, from Menon et al. 2005)
-//!   phi(x, w) = Phi e^(-s r)/(4 pi D r) (1 + 3 D (1 + s r)/r^2 x.w),   D = 1/(3 sigma_t'),  s = sqrt(sigma_a/D),
-//! whose exitance, C_phi phi - C_E D n_o.grad phi (d'Eon & Irving 2011; the minus sign matters), over pi and over what
-//! T21 leaves of a diffuse exitance, 4 C_phi(1/eta) = 1 - 2 C1(1/eta), is (eq. 17)
+//! A ray that enters along w makes in an infinite medium the fluence (their eq. 8, from Menon et al.
+//! 2005)
+//!   phi(x, w) = Phi e^(-s r)/(4 pi D r) (1 + 3 D (1 + s r)/r^2 x.w),
+//!   D = 1/(3 sigma_t'),  s = sqrt(sigma_a/D),
+//! whose exitance, C_phi phi - C_E D n_o.grad phi (d'Eon & Irving 2011; the minus sign matters), over pi
+//! and over what T21 leaves of a diffuse exitance, 4 C_phi(1/eta) = 1 - 2 C1(1/eta), is (eq. 17)
 //!   S'(x, w, r) = 1/(4 C_phi(1/eta)) 1/(4 pi^2) e^(-s r)/r^3 { C_phi [ r^2/D + 3 (1 + s r) x.w ]
 //!       - C_E [ 3 D (1 + s r) w.n_o - ((1 + s r) + 3 D (3 (1 + s r) + (s r)^2)/r^2 x.w) x.n_o ] }.
 //! The boundary is met by a mirrored ray over an extrapolated plane:
 //!   S_d = S'(x, w12, d_r) - S'(x_v, w_v, d_v),   x = xo - xi,
-//!   n_i* = what of n_i is orthogonal to x, normalised (n_i itself on a plane): the modified tangent plane
+//!   n_i* = what of n_i is orthogonal to x, normalised (n_i itself on a plane): the modified tangent
+//!   plane
 //!   x_v = x - 2 A d_e n_i*,   w_v = w12 - 2 (w12.n_i*) n_i*,   d_v = |x_v|,
 //!   A = (1 - C_E)/(2 C_phi),   d_e = 2.131 D / sqrt(alpha')
-//! (the journal's d_e; the earlier technical report has 2.121 D/alpha'). The distance to the real source is corrected
-//! near it (eqs. 20-22): with mu0 = -n_o.w12 and cos b = -sqrt((r^2 - (x.w12)^2)/(r^2 + d_e^2)),
-//!   d_r^2 = r^2 + D mu0 (D mu0 - 2 d_e cos b)   for mu0 > 0, light that arrives from below the exit's tangent plane,
+//! (the journal's d_e; the earlier technical report has 2.121 D/alpha'). The distance to the real source
+//! is corrected near it (eqs. 20-22): with mu0 = -n_o.w12 and cos b = -sqrt((r^2 - (x.w12)^2)/(r^2 +
+//! d_e^2)),
+//!   d_r^2 = r^2 + D mu0 (D mu0 - 2 d_e cos b)   for mu0 > 0: light from below the exit's tangent plane,
 //!   d_r^2 = r^2 + 1/(3 sigma_t)^2               else,
-//! where sigma_t is the medium's own, unreduced, here and nowhere else; d_r jumps at mu0 = 0. The real source's kernel
-//! takes d_r for r and the uncorrected x in x.w and x.n_o, the virtual one's takes x_v and d_v throughout.
+//! where sigma_t is the medium's own, unreduced, here and nowhere else; d_r jumps at mu0 = 0. The real
+//! source's kernel takes d_r for r and the uncorrected x in x.w and x.n_o, the virtual one's takes x_v
+//! and d_v throughout.
 //!
-//! Not reciprocal: exchanging the ends changes it by some ten percent even on a plane, and by more elsewhere. S_d is
-//! negative where the mirrored ray outshines the real one or the exit faces away; what is used is max(0, S_d), per band.
-//! Not bounded in energy: along the normal, alpha' 0.999, eta 1.3, the exitance is 1.10 of the power that enters (exact:
-//! 0.87), and it does not vanish with alpha'. It has single scattering in it by construction. Light that goes straight
-//! through is counted apart with the delta-Eddington extinction sigma_a + sigma_s (1 - g^2).
+//! Not reciprocal: exchanging the ends changes it by some ten percent even on a plane, and by more
+//! elsewhere. S_d is negative where the mirrored ray outshines the real one or the exit faces away; what
+//! is used is max(0, S_d), per band. Not bounded in energy: along the normal, alpha' 0.999, eta 1.3, the
+//! exitance is 1.10 of the power that enters (exact: 0.87), and it does not vanish with alpha'. It has
+//! single scattering in it by construction. Light that goes straight through is counted apart with the
+//! delta-Eddington extinction sigma_a + sigma_s (1 - g^2).
 //!
-//! Degenerate ends, which the source leaves open. xo = xi: n_i* = n_i. xo straight below or above xi, so that nothing of
-//! n_i is orthogonal to x: n_i* turns against what of w12 is orthogonal to x, as the normal does that a ray enters by;
-//! failing that too (x, n_i and w12 in one line), it is orthogonal to x and n_o, and failing that the choice does not
-//! matter. Rotating the scene rotates the choice.
+//! Degenerate ends, which the source leaves open. xo = xi: n_i* = n_i. xo straight below or above xi, so
+//! that nothing of n_i is orthogonal to x: n_i* turns against what of w12 is orthogonal to x, as the
+//! normal does that a ray enters by; failing that too (x, n_i and w12 in one line), it is orthogonal to
+//! x and n_o, and failing that the choice does not matter. Rotating the scene rotates the choice.
 
 use std::f64::consts::PI;
 
 use super::classical::Classical;
-use super::moments::Moments;
+use super::ends::{Entry, Exit};
+use super::moments::FresnelMoments;
 use super::reduced::Reduced;
-use super::{Entry, Exit};
 use crate::math::{DVec3, Frame, exp};
 
 /// d_e over D / sqrt(alpha'): the extrapolation distance, journal version.
@@ -67,7 +73,7 @@ pub struct Directional {
 
 /// The directional dipole between two ends, before it is clamped.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parts {
+pub struct DirectionalTerms {
     /// The real source's kernel, 1/(mm^2 sr).
     pub real: f64,
     /// The virtual source's kernel, 1/(mm^2 sr); S_d = real - mirrored.
@@ -82,7 +88,7 @@ pub struct Parts {
 
 impl Directional {
     /// For a medium that scatters: its reduced coefficients and its own, unreduced sigma_t, 1/mm.
-    pub fn new(reduced: &Reduced, sigma_t: f64, moments: &Moments) -> Directional {
+    pub fn new(reduced: &Reduced, sigma_t: f64, moments: &FresnelMoments) -> Directional {
         let diffusion = 1.0 / (3.0 * reduced.sigma_t);
         let extrapolation = EXTRAPOLATION * diffusion / reduced.albedo.sqrt();
         let scale = 1.0 / (moments.passed() * 4.0 * PI * PI);
@@ -107,7 +113,7 @@ impl Directional {
 
     /// S_d's two sources.
     #[inline]
-    pub fn parts(&self, entry: &Entry, exit: &Exit) -> Parts {
+    pub fn parts(&self, entry: &Entry, exit: &Exit) -> DirectionalTerms {
         let x = exit.point - entry.point;
         let square = x.length_squared();
         let along = x.dot(entry.dir);
@@ -125,7 +131,7 @@ impl Directional {
         let x_v = x - self.mirror * normal;
         let w_v = entry.dir - 2.0 * entry.dir.dot(normal) * normal;
         let d_v = x_v.length();
-        Parts {
+        DirectionalTerms {
             real: self.source(along, x.dot(exit.normal), -mu0, d_r),
             mirrored: self.source(x_v.dot(w_v), x_v.dot(exit.normal), w_v.dot(exit.normal), d_v),
             d_r,

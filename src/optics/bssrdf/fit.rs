@@ -1,12 +1,13 @@
 //! Fits of a radial profile by a sum of Gaussians.
 //!
-//! What a picture sees of a profile is its area-weighted form r R(r): that is fitted, as d'Eon & Luebke 2007 (GPU Gems 3,
-//! chapter 14) do, by
+//! What a picture sees of a profile is its area-weighted form r R(r): that is fitted, as d'Eon & Luebke
+//! 2007 (GPU Gems 3, chapter 14) do, by
 //!   min over w >= 0 and v of int (r (R(r) - sum_i w_i G(v_i, r)))^2 dr,   sum_i w_i = int 2 pi r R dr.
-//! The standard deviations are a geometric sequence, so that only its two ends are left to search, on a grid that is
-//! refined; for each the weights are non-negative least squares (Lawson & Hanson 1974, chapter 23). The sum enters as one
-//! more equation with a large weight, and what is left of it is taken up by one factor on all weights. Nothing is random.
-//! Six Gaussians are within 2.1 % (L2) of both dipoles of every material of Jensen et al. 2001 in `optics::materials`.
+//! The standard deviations are a geometric sequence, so that only its two ends are left to search, on a
+//! grid that is refined; for each the weights are non-negative least squares (Lawson & Hanson 1974,
+//! chapter 23). The sum enters as one more equation with a large weight, and what is left of it is taken
+//! up by one factor on all weights. Nothing is random. Six Gaussians are within 2.1 % (L2) of both
+//! dipoles of every material of Jensen et al. 2001 in `optics::materials`.
 
 use std::f64::consts::PI;
 
@@ -15,7 +16,7 @@ use crate::math::exp;
 
 /// A fit and how far it is off.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
+pub struct GaussianFit {
     /// The sum, with the profile's integral.
     pub gaussians: Gaussians,
     /// How far it is off.
@@ -41,9 +42,9 @@ const DECADES: f64 = 3.0;
 /// Weight of the equation of the integral, relative to the profile's norm over it.
 const INTEGRAL: f64 = 30.0;
 
-/// Fits `terms` (1 to [`MOST_TERMS`]) Gaussians to a profile of integral `total` whose features lie within three decades
-/// of `length`, mm (a dipole's transport mean free path).
-pub fn fit(exitance: impl Fn(f64) -> f64, total: f64, length: f64, terms: usize) -> Fit {
+/// Fits `terms` (1 to [`MOST_TERMS`]) Gaussians to a profile of integral `total` whose features lie
+/// within three decades of `length`, mm (a dipole's transport mean free path).
+pub fn fit(exitance: impl Fn(f64) -> f64, total: f64, length: f64, terms: usize) -> GaussianFit {
     let target = Target::new(exitance, total, length);
     let terms = terms.clamp(1, MOST_TERMS);
     // ln of the ends over the length, in steps of a quarter of a decade; then closer about the best.
@@ -76,7 +77,7 @@ pub fn fit(exitance: impl Fn(f64) -> f64, total: f64, length: f64, terms: usize)
         step *= 0.5;
     }
     let found = best.map_or_else(Vec::new, |(_, _, terms)| terms);
-    Fit { error: target.error(&found), gaussians: Gaussians::new(found) }
+    GaussianFit { error: target.error(&found), gaussians: Gaussians::new(found) }
 }
 
 /// A geometric sequence of standard deviations, squared.

@@ -1,4 +1,5 @@
-//! Sums of Gaussians: R(r) = sum_i w_i e^(-r^2/(2 v_i)) / (2 pi v_i), whose integral over the plane is sum_i w_i.
+//! Sums of Gaussians: R(r) = sum_i w_i e^(-r^2/(2 v_i)) / (2 pi v_i), whose integral over the plane is
+//! sum_i w_i.
 //!
 //! Reciprocal, never negative. They hold what the profile that they were fitted to holds.
 
@@ -23,9 +24,10 @@ pub struct Gaussians {
     factors: Vec<(f64, f64)>,
 }
 
-/// The profile of skin of d'Eon & Luebke 2007, "Advanced techniques for realistic real-time skin rendering", GPU Gems 3,
-/// chapter 14: variance in mm^2, weights of red, green and blue, each column of which sums to 1 (it has the colour of
-/// white; skin's own comes as a reflectance on top). A fit to a multi-layer dipole of all light that emerges.
+/// The profile of skin of d'Eon & Luebke 2007, "Advanced techniques for realistic real-time skin
+/// rendering", GPU Gems 3, chapter 14: variance in mm^2, weights of red, green and blue, each column of
+/// which sums to 1 (it has the colour of white; skin's own comes as a reflectance on top). A fit to a
+/// multi-layer dipole of all light that emerges.
 pub const SKIN: [(f64, [f64; 3]); 6] = [
     (0.0064, [0.233, 0.455, 0.649]),
     (0.0484, [0.100, 0.336, 0.344]),
@@ -36,7 +38,8 @@ pub const SKIN: [(f64, [f64; 3]); 6] = [
 ];
 
 impl Gaussians {
-    /// Of terms with positive variances and weights that are not negative; those of weight 0 are left out.
+    /// Of terms with positive variances and weights that are not negative; those of weight 0 are left
+    /// out.
     pub fn new(terms: impl IntoIterator<Item = Term>) -> Gaussians {
         let terms: Vec<Term> = terms.into_iter().filter(|term| term.weight > 0.0).collect();
         let factor = |term: &Term| (term.weight / (2.0 * PI * term.variance), 0.5 / term.variance);

@@ -4,128 +4,137 @@
 //!   L(xo, wo) = int_A int_Omega S(xi, wi, xo, wo) L(xi, wi) |n_i . wi| dwi dA,
 //! and all models here have the Fresnel transmittances of a smooth boundary as factors,
 //!   S = T12(wi) K T21(wo).
-//! Code that refracts at both ends has the transmittances in its hands (a path that is refracted with probability
-//! T21 must not multiply by it again), so what is evaluated here is K, the *kernel*.
+//! Code that refracts at both ends has the transmittances in its hands (a path that is refracted with
+//! probability T21 must not multiply by it again), so what is evaluated here is K, the *kernel*.
 //!
-//! | model | reciprocal | can be negative | energy | leaves out |
-//! |---|---|---|---|---|
-//! | classical dipole | yes | no | loses 2 C1(1/eta) of the exitance on the way out unless normalised; at most the power that enters | nothing by its source's measure (its albedo counts all light), yet single scattering is added to it: see below |
-//! | better dipole | yes | no | normalised; up to a tenth above the truth with single scattering added | single scattering |
-//! | directional dipole | no | yes, and is clamped at 0 | not bounded: up to 1.1 of what enters at a high albedo, 0.1 at none | nothing; light that goes straight through has its own extinction |
-//! | normalized diffusion | yes | no | normalised; exactly the albedo that it is given | nothing |
-//! | Gaussians: skin | yes | no | normalised; exactly the reflectance that it is given | nothing |
-//! | Gaussians: a fit | yes | no | normalised; exactly its dipole's | what its dipole leaves out |
+//! Every model but the directional dipole is reciprocal and never negative.
 //!
-//! "Reciprocal" is of K with its ends exchanged, where the coefficients are the same everywhere. The normalised models
-//! have K = R / (pi (1 - 2 C1(1/eta))), so that their hemispherical exitance under T21 is R.
-//! The classical dipole's total is the whole diffuse reflectance within 0.03 of exact transport, so that single
-//! scattering on top of it is counted twice in part; its source adds it nonetheless, and `leaves_out_single` says so.
+//! - *Classical dipole.* Loses the part 2 C1(1/eta) of the exitance on the way out unless it is
+//!   normalized. By its source's measure it leaves nothing out (its albedo counts all light), yet single
+//!   scattering is added to it: see below.
+//! - *Better dipole.* Normalized; up to a tenth above the truth with single scattering added, which it
+//!   leaves out.
+//! - *Directional dipole.* Not reciprocal; can be negative and is clamped at 0; its energy is not
+//!   bounded: up to 1.1 of what enters at a high albedo, 0.1 at none. Leaves nothing out; light that
+//!   goes straight through has an extinction of its own.
+//! - *Normalized diffusion.* Normalized: returns exactly the albedo that it is given. Leaves nothing
+//!   out.
+//! - *Gaussians of skin.* Normalized: returns exactly the reflectance that it is given. Leaves nothing
+//!   out.
+//! - *Fitted Gaussians.* Normalized: return exactly their dipole's total, and leave out what it leaves
+//!   out.
+//!
+//! "Reciprocal" is of K with its ends exchanged, where the coefficients are the same everywhere. The
+//! normalised models have K = R / (pi (1 - 2 C1(1/eta))), so that their hemispherical exitance under T21
+//! is R. The classical dipole's total is the whole diffuse reflectance within 0.03 of exact transport,
+//! so that single scattering on top of it is counted twice in part; its source adds it nonetheless, and
+//! `leaves_out_single` says so.
 
 mod better;
 mod classical;
 mod directional;
+mod ends;
 mod fit;
 mod gaussians;
 mod moments;
 mod normalized;
 mod reduced;
-pub mod single;
 #[cfg(test)]
 mod tests;
 
 pub use better::Better;
 pub use classical::Classical;
-pub use directional::{Directional, Parts};
-pub use fit::{Fit, FitError, MOST_TERMS, fit};
+pub use directional::{Directional, DirectionalTerms};
+pub use ends::{Entry, Exit};
+pub use fit::{FitError, GaussianFit, MOST_TERMS, fit};
 pub use gaussians::{Gaussians, SKIN, Term};
-pub use moments::{MomentKind, Moments};
+pub use moments::{FresnelMoments, MomentKind};
 pub use normalized::{Normalized, Scaling};
 pub use reduced::Reduced;
 
-use crate::math::DVec3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::optics::medium::Medium;
 use crate::sampling::radial::Radial;
 
-/// Where light enters the body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Entry {
-    /// The point, mm.
-    pub point: DVec3,
-    /// Outward unit normal.
-    pub normal: DVec3,
-    /// Unit direction of travel inside, after refraction.
-    pub dir: DVec3,
-}
-
-/// Where light leaves the body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Exit {
-    /// The point, mm.
-    pub point: DVec3,
-    /// Outward unit normal.
-    pub normal: DVec3,
-}
-
 /// What a model does with the flux that arrives under the boundary on its way out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Outgoing {
     /// As published: radiance R / pi times T21(wo), which loses the part 2 C1(1/eta) of the exitance R.
     #[default]
     Plain,
     /// Divided by what T21 leaves of a diffuse exitance, 1 - 2 C1(1/eta), so that the exitance is R.
-    Normalised,
+    Normalized,
 }
 
-/// Which model, with what its source leaves open.
-#[derive(Clone, Debug, PartialEq)]
+/// A BSSRDF model; its coefficients are those of the object's medium and boundary.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Model {
-    /// Jensen, Marschner, Levoy & Hanrahan 2001.
+    /// The dipole of Jensen, Marschner, Levoy & Hanrahan 2001.
     Classical {
-        /// Whose Fresnel moments.
+        /// Where the Fresnel moments come from.
+        #[serde(default)]
         moments: MomentKind,
-        /// The way out.
+        /// What happens to the exitance on its way out.
+        #[serde(default)]
         outgoing: Outgoing,
     },
-    /// d'Eon 2012.
+    /// The better dipole of d'Eon 2012: multiple scattering only.
     Better {
-        /// Whose Fresnel moments.
+        /// Where the Fresnel moments come from.
+        #[serde(default)]
         moments: MomentKind,
     },
-    /// Frisvad, Hachisuka & Kjeldsen 2014.
+    /// The directional dipole of Frisvad, Hachisuka & Kjeldsen 2014: not reciprocal, clamped at 0.
     Directional {
-        /// Whose Fresnel moments.
+        /// Where the Fresnel moments come from.
+        #[serde(default)]
         moments: MomentKind,
     },
-    /// Christensen & Burley 2015.
+    /// Normalized diffusion of Christensen & Burley 2015: a fit of all light.
     Normalized {
-        /// Which fit.
+        /// Which of the published fits gives the shape.
+        #[serde(default)]
         scaling: Scaling,
-        /// Diffuse reflectance of light that has entered: one number for all bands or one per band, in (0, 1]; that of
-        /// the classical dipole (exact moments) without it.
+        /// Diffuse reflectance of light that has entered: one number, or one per band.
+        ///
+        /// Above 0 and at most 1. Without it that of the classical dipole with exact moments.
+        #[schemars(length(min = 1))]
         albedo: Option<Vec<f64>>,
     },
-    /// Skin, d'Eon & Luebke 2007, for the bands red, green and blue; of the medium it uses nothing.
+    /// Six Gaussians of skin, d'Eon & Luebke 2007, for bands red, green, blue; the medium is not used.
     Skin {
-        /// Diffuse reflectance per band, in (0, 1].
+        /// Diffuse reflectance of red, green and blue light that has entered, above 0 and at most 1.
         reflectance: [f64; 3],
     },
     /// A dipole's profile as a sum of Gaussians.
     Gaussians {
-        /// Which dipole's.
+        /// Whose profile is fitted.
         dipole: FittedDipole,
-        /// Whose Fresnel moments.
+        /// Where its Fresnel moments come from.
+        #[serde(default)]
         moments: MomentKind,
-        /// How many, 1 to [`MOST_TERMS`].
+        /// How many Gaussians.
+        #[serde(default = "six")]
+        #[schemars(range(min = 1, max = 12))]
         terms: usize,
     },
 }
 
+fn six() -> usize {
+    6
+}
+
 /// Profiles that are fitted by Gaussians.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum FittedDipole {
-    /// The classical one's.
+    /// The classical dipole's.
     Classical,
-    /// The better one's.
+    /// The better dipole's.
     Better,
 }
 
@@ -133,8 +142,9 @@ pub enum FittedDipole {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bssrdf {
     kernel: Kernel,
-    /// Effective transport coefficient, 1/mm: how fast the far field falls. Normalized diffusion and Gaussians have none
-    /// of their own: theirs is the classical dipole's, sqrt(3 sigma_a sigma_t') of the medium.
+    /// Effective transport coefficient, 1/mm: how fast the far field falls. Normalized diffusion and
+    /// Gaussians have none of their own: theirs is the classical dipole's, sqrt(3 sigma_a sigma_t') of
+    /// the medium.
     pub sigma_tr: f64,
     /// Extinction of what goes straight through, 1/mm.
     pub straight_sigma_t: f64,
@@ -147,14 +157,14 @@ pub struct Bssrdf {
 #[derive(Clone, Debug, PartialEq)]
 enum Kernel {
     /// `scale` times R(|xo - xi|).
-    Radial { profile: Profile, scale: f64 },
+    Radial { profile: RadialProfile, scale: f64 },
     /// Of more than the distance.
     Directional(Directional),
 }
 
 /// R(r), the exitance at distance r from a beam of power 1 that has entered a half-space; 1/mm^2.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Profile {
+pub enum RadialProfile {
     /// Classical dipole.
     Classical(Classical),
     /// Better dipole.
@@ -166,8 +176,8 @@ pub enum Profile {
 }
 
 impl Model {
-    /// The model for band `band` of `bands`, with that band's medium and index (inside over outside; 1 where the
-    /// boundary is matched).
+    /// The model for band `band` of `bands`, with that band's medium and index (inside over outside; 1
+    /// where the boundary is matched).
     ///
     /// # Errors
     /// What the medium lacks (scattering, absorption) or what does not fit the bands, in words.
@@ -185,11 +195,11 @@ impl Model {
             fit_error: None,
         };
         let normalised =
-            |profile, moments: &Moments| Kernel::radial(profile, Outgoing::Normalised, moments);
+            |profile, moments: &FresnelMoments| Kernel::radial(profile, Outgoing::Normalized, moments);
         match *self {
             Model::Classical { moments, outgoing } => {
                 let moments = moments.of_classical(eta);
-                let profile = Profile::Classical(Classical::new(&reduced, &moments));
+                let profile = RadialProfile::Classical(Classical::new(&reduced, &moments));
                 let kernel = Kernel::radial(profile, outgoing, &moments);
                 Ok(Bssrdf { leaves_out_single: true, ..bssrdf(kernel) })
             }
@@ -197,7 +207,7 @@ impl Model {
                 let moments = moments.of_flux(eta);
                 let better = Better::new(&reduced, &moments);
                 let sigma_tr = better.sigma_tr();
-                let kernel = normalised(Profile::Better(better), &moments);
+                let kernel = normalised(RadialProfile::Better(better), &moments);
                 Ok(Bssrdf { sigma_tr, leaves_out_single: true, ..bssrdf(kernel) })
             }
             Model::Directional { moments } => {
@@ -208,7 +218,7 @@ impl Model {
                 Ok(Bssrdf { straight_sigma_t, ..bssrdf(Kernel::Directional(directional)) })
             }
             Model::Normalized { scaling, ref albedo } => {
-                let moments = Moments::exact(eta);
+                let moments = FresnelMoments::exact(eta);
                 let albedo = match albedo {
                     Some(given) => one_of("albedo", given, band, bands)?,
                     None => Classical::new(&reduced, &moments).total(),
@@ -224,7 +234,7 @@ impl Model {
                         );
                     }
                 };
-                let profile = Profile::Normalized(Normalized::new(scaling, albedo, length));
+                let profile = RadialProfile::Normalized(Normalized::new(scaling, albedo, length));
                 Ok(bssrdf(normalised(profile, &moments)))
             }
             Model::Skin { reflectance } => {
@@ -234,8 +244,8 @@ impl Model {
                     ));
                 }
                 let reflectance = one_of("reflectance", &reflectance, band, bands)?;
-                let profile = Profile::Gaussians(Gaussians::skin(band, reflectance));
-                Ok(bssrdf(normalised(profile, &Moments::exact(eta))))
+                let profile = RadialProfile::Gaussians(Gaussians::skin(band, reflectance));
+                Ok(bssrdf(normalised(profile, &FresnelMoments::exact(eta))))
             }
             Model::Gaussians { dipole, moments, terms } => {
                 if !(1..=MOST_TERMS).contains(&terms) {
@@ -254,7 +264,7 @@ impl Model {
                         (fit(|r| better.exitance(r), better.total(), length, terms), moments)
                     }
                 };
-                let kernel = normalised(Profile::Gaussians(fitted.gaussians), &moments);
+                let kernel = normalised(RadialProfile::Gaussians(fitted.gaussians), &moments);
                 Ok(Bssrdf { leaves_out_single: true, fit_error: Some(fitted.error), ..bssrdf(kernel) })
             }
         }
@@ -282,18 +292,18 @@ fn one_of(name: &str, numbers: &[f64], band: usize, bands: usize) -> Result<f64,
 
 impl MomentKind {
     /// For the classical dipole.
-    fn of_classical(self, eta: f64) -> Moments {
+    fn of_classical(self, eta: f64) -> FresnelMoments {
         match self {
-            MomentKind::Exact => Moments::exact(eta),
-            MomentKind::Polynomial => Moments::egan_hilgeman(eta),
+            MomentKind::Exact => FresnelMoments::exact(eta),
+            MomentKind::Polynomial => FresnelMoments::egan_hilgeman(eta),
         }
     }
 
     /// For the better and the directional dipole.
-    fn of_flux(self, eta: f64) -> Moments {
+    fn of_flux(self, eta: f64) -> FresnelMoments {
         match self {
-            MomentKind::Exact => Moments::exact(eta),
-            MomentKind::Polynomial => Moments::deon_irving(eta),
+            MomentKind::Exact => FresnelMoments::exact(eta),
+            MomentKind::Polynomial => FresnelMoments::deon_irving(eta),
         }
     }
 }
@@ -305,7 +315,7 @@ impl std::fmt::Display for Model {
             Model::Classical { moments, outgoing } => {
                 let outgoing = match outgoing {
                     Outgoing::Plain => "as published on the way out",
-                    Outgoing::Normalised => "normalised on the way out",
+                    Outgoing::Normalized => "normalized on the way out",
                 };
                 write!(f, "the classical dipole ({moments}, {outgoing})")
             }
@@ -329,18 +339,18 @@ impl std::fmt::Display for Model {
 }
 
 impl Kernel {
-    fn radial(profile: Profile, outgoing: Outgoing, moments: &Moments) -> Kernel {
+    fn radial(profile: RadialProfile, outgoing: Outgoing, moments: &FresnelMoments) -> Kernel {
         let passed = match outgoing {
             Outgoing::Plain => 1.0,
-            Outgoing::Normalised => moments.passed(),
+            Outgoing::Normalized => moments.passed(),
         };
         Kernel::Radial { profile, scale: 1.0 / (std::f64::consts::PI * passed) }
     }
 }
 
 impl Bssrdf {
-    /// K: the BSSRDF without the Fresnel transmittances at its two ends, 1/(mm^2 sr). Normalized diffusion's is infinite
-    /// where the ends coincide.
+    /// K: the BSSRDF without the Fresnel transmittances at its two ends, 1/(mm^2 sr). Normalized
+    /// diffusion's is infinite where the ends coincide.
     #[inline]
     pub fn kernel(&self, entry: &Entry, exit: &Exit) -> f64 {
         match &self.kernel {
@@ -359,9 +369,10 @@ impl Bssrdf {
         }
     }
 
-    /// Ways to draw the distance between entry and exit on a plane, with their shares (which sum to 1), that together
-    /// follow the kernel: exactly those of the classical dipole, of normalized diffusion and of Gaussians, nearly those of
-    /// the better dipole; those of the directional dipole are of the classical shape.
+    /// Ways to draw the distance between entry and exit on a plane, with their shares (which sum to 1),
+    /// that together follow the kernel: exactly those of the classical dipole, of normalized diffusion
+    /// and of Gaussians, nearly those of the better dipole; those of the directional dipole are of the
+    /// classical shape.
     pub fn techniques(&self) -> Vec<(f64, Radial)> {
         match &self.kernel {
             Kernel::Radial { profile, .. } => profile.techniques(),
@@ -371,9 +382,9 @@ impl Bssrdf {
         }
     }
 
-    /// A non-increasing function of distance that the kernel follows, relative to its own largest value or not: what an
-    /// acceptance in proportion to the kernel uses; 1/mm^2. The directional dipole's is the classical one of its medium;
-    /// normalized diffusion's is infinite at 0.
+    /// A non-increasing function of distance that the kernel follows, relative to its own largest value
+    /// or not: what an acceptance in proportion to the kernel uses; 1/mm^2. The directional dipole's is
+    /// the classical one of its medium; normalized diffusion's is infinite at 0.
     pub fn falloff(&self, r: f64) -> f64 {
         match &self.kernel {
             Kernel::Radial { profile, .. } => profile.exitance(r),
@@ -382,36 +393,36 @@ impl Bssrdf {
     }
 }
 
-impl Profile {
+impl RadialProfile {
     /// R(r), 1/mm^2.
     #[inline]
     pub fn exitance(&self, r: f64) -> f64 {
         match self {
-            Profile::Classical(classical) => classical.exitance(r),
-            Profile::Better(better) => better.exitance(r),
-            Profile::Normalized(normalized) => normalized.exitance(r),
-            Profile::Gaussians(gaussians) => gaussians.exitance(r),
+            RadialProfile::Classical(classical) => classical.exitance(r),
+            RadialProfile::Better(better) => better.exitance(r),
+            RadialProfile::Normalized(normalized) => normalized.exitance(r),
+            RadialProfile::Gaussians(gaussians) => gaussians.exitance(r),
         }
     }
 
     /// R integrated over the plane.
     pub fn total(&self) -> f64 {
         match self {
-            Profile::Classical(classical) => classical.total(),
-            Profile::Better(better) => better.total(),
-            Profile::Normalized(normalized) => normalized.total(),
-            Profile::Gaussians(gaussians) => gaussians.total(),
+            RadialProfile::Classical(classical) => classical.total(),
+            RadialProfile::Better(better) => better.total(),
+            RadialProfile::Normalized(normalized) => normalized.total(),
+            RadialProfile::Gaussians(gaussians) => gaussians.total(),
         }
     }
 
     fn techniques(&self) -> Vec<(f64, Radial)> {
         match self {
-            Profile::Classical(classical) => vec![(1.0, Radial::Dipole(classical.shape()))],
-            Profile::Better(better) => better.techniques(),
-            Profile::Normalized(normalized) => {
+            RadialProfile::Classical(classical) => vec![(1.0, Radial::Dipole(classical.shape()))],
+            RadialProfile::Better(better) => better.techniques(),
+            RadialProfile::Normalized(normalized) => {
                 vec![(1.0, Radial::NormalizedDiffusion { d: normalized.d() })]
             }
-            Profile::Gaussians(gaussians) => {
+            RadialProfile::Gaussians(gaussians) => {
                 let total = gaussians.total();
                 let radial = |term: &Term| {
                     (

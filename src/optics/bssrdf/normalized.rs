@@ -1,9 +1,10 @@
-//! Normalized diffusion: Christensen & Burley 2015, "Approximate reflectance profiles for efficient subsurface
-//! scattering" (Pixar technical memo 15-04); a fit to Monte Carlo results of all light that emerges.
+//! Normalized diffusion: Christensen & Burley 2015, "Approximate reflectance profiles for efficient
+//! subsurface scattering" (Pixar technical memo 15-04); a fit to Monte Carlo results of all light that
+//! emerges.
 //!
 //!   R(r) = A s (e^(-s r/l) + e^(-s r/(3l))) / (8 pi l r),
 //! whose integral over the plane is A, the surface's albedo, for any shape s:
-//!   s = 1.85 - A + 7 |A - 0.8|^3     light along the normal (searchlight), l = mean free path 1/sigma_t' (eq. 6)
+//!   s = 1.85 - A + 7 |A - 0.8|^3     searchlight along the normal, l = mean free path 1/sigma_t' (eq. 6)
 //!   s = 1.9 - A + 3.5 (A - 0.8)^2    diffuse light, the same l (eq. 7)
 //!   s = 3.5 + 100 (A - 0.33)^4       l = diffuse mean free path 1/sigma_tr (eq. 8)
 //!
@@ -11,17 +12,21 @@
 
 use std::f64::consts::PI;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::math::exp;
 
 /// Which fit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Scaling {
     /// A beam along the normal; lengths in mean free paths.
     #[default]
     Searchlight,
     /// Diffuse light; lengths in mean free paths.
     Diffuse,
-    /// Lengths in diffuse mean free paths.
+    /// Lengths in diffuse mean free paths, for media that absorb.
     DiffuseMeanFreePath,
 }
 

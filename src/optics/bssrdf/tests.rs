@@ -4,36 +4,38 @@ mod albedos;
 mod directional;
 mod fits;
 mod identities;
+mod options;
 mod profiles;
+mod single;
 
 /// A table: lines that start with # are comments, the first other line names the columns.
-struct Table {
+struct OracleTable {
     names: Vec<&'static str>,
     rows: Vec<Vec<&'static str>>,
 }
 
 #[derive(Clone, Copy)]
-struct Row<'a> {
-    table: &'a Table,
+struct OracleRow<'a> {
+    table: &'a OracleTable,
     fields: &'a [&'static str],
 }
 
-impl Table {
-    fn of(text: &'static str) -> Table {
+impl OracleTable {
+    fn of(text: &'static str) -> OracleTable {
         let mut lines = text.lines().filter(|line| !line.starts_with('#'));
         let split = |line: &'static str| line.split(',').collect::<Vec<&str>>();
         let names = split(lines.next().unwrap());
         let rows: Vec<Vec<&str>> = lines.map(split).collect();
         assert!(!rows.is_empty() && rows.iter().all(|row| row.len() == names.len()));
-        Table { names, rows }
+        OracleTable { names, rows }
     }
 
-    fn rows(&self) -> impl Iterator<Item = Row<'_>> {
-        self.rows.iter().map(|fields| Row { table: self, fields })
+    fn rows(&self) -> impl Iterator<Item = OracleRow<'_>> {
+        self.rows.iter().map(|fields| OracleRow { table: self, fields })
     }
 }
 
-impl Row<'_> {
+impl OracleRow<'_> {
     fn text(&self, name: &str) -> &'static str {
         self.fields[self.table.names.iter().position(|n| *n == name).unwrap()]
     }

@@ -8,7 +8,7 @@
 //! integrated.
 
 use super::quadrature::{Area, Mass, Quadrature, wrap};
-use crate::samplers::Axis;
+use crate::samplers::Coordinate;
 
 /// Least number of draws that a bin expects.
 pub const LEAST: f64 = 25.0;
@@ -55,7 +55,7 @@ enum Map {
 
 #[derive(Clone, Debug)]
 struct Plane {
-    axes: [Axis; 2],
+    axes: [Coordinate; 2],
     low: [f64; 2],
     grid: [usize; 2],
     /// The grid's boxes, the second coordinate fastest, then quarters of boxes.
@@ -507,7 +507,7 @@ fn cut(order: &[usize], masses: &[Mass], parts: usize) -> Vec<Vec<usize>> {
 }
 
 /// The centre of an area, wrapped into the chart.
-pub fn centre(area: &Area, axes: &[Axis; 2]) -> [f64; 2] {
+pub fn centre(area: &Area, axes: &[Coordinate; 2]) -> [f64; 2] {
     [0, 1].map(|k| wrap(&axes[k], 0.5 * (area.low[k] + area.high[k])))
 }
 
@@ -527,8 +527,8 @@ mod tests {
         }
 
         fn pieces(&self) -> Vec<Piece> {
-            let axes = [Axis::over(0.0, 1.0), Axis::over(-1.0, 1.0)];
-            vec![Piece::plane("plane", axes), Piece::line("line", Axis::over(0.0, 2.0))]
+            let axes = [Coordinate::over(0.0, 1.0), Coordinate::over(-1.0, 1.0)];
+            vec![Piece::plane("plane", axes), Piece::line("line", Coordinate::over(0.0, 2.0))]
         }
 
         /// 0.72 in [0, 0.01] x [-1, -0.98], 0.08 in the rest of the plane, 0.2 on the line.

@@ -10,7 +10,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use crate::math::gauss_kronrod;
-use crate::samplers::{Axis, Contrast, Piece, Sampler};
+use crate::samplers::{Contrast, Coordinate, Piece, Sampler};
 
 /// Densities are taken to be exact to this relative error: what a draw's own density may differ by.
 pub const ROUNDING: f64 = 1e-9;
@@ -224,13 +224,13 @@ impl<'a> Quadrature<'a> {
 }
 
 /// The point of the range that a coordinate beyond it stands for.
-pub fn wrap(axis: &Axis, x: f64) -> f64 {
+pub fn wrap(axis: &Coordinate, x: f64) -> f64 {
     let [low, high] = axis.range;
     if !axis.periodic || (low..=high).contains(&x) { x } else { low + (x - low).rem_euclid(high - low) }
 }
 
 /// The ends of a stretch and the kinks within it; where it reaches beyond a periodic range, the seam is one.
-fn cuts(axis: &Axis, low: f64, high: f64) -> Vec<f64> {
+fn cuts(axis: &Coordinate, low: f64, high: f64) -> Vec<f64> {
     let [from, to] = axis.range;
     let mut cuts = vec![low, high];
     for kink in axis.kinks.iter().copied().chain([from, to]) {
@@ -261,8 +261,8 @@ mod tests {
         }
 
         fn pieces(&self) -> Vec<Piece> {
-            let x = Axis { range: [0.0, 1.0], kinks: vec![0.3], periodic: false };
-            vec![Piece::plane("plane", [x, Axis::turns()])]
+            let x = Coordinate { range: [0.0, 1.0], kinks: vec![0.3], periodic: false };
+            vec![Piece::plane("plane", [x, Coordinate::turns()])]
         }
 
         fn density(&self, _: usize, [x, y]: [f64; 2]) -> f64 {
@@ -301,7 +301,7 @@ mod tests {
                 Draw::Null
             }
             fn pieces(&self) -> Vec<Piece> {
-                vec![Piece::line("line", Axis::over(0.0, 1.0))]
+                vec![Piece::line("line", Coordinate::over(0.0, 1.0))]
             }
             fn density(&self, _: usize, [x, _]: [f64; 2]) -> f64 {
                 if x < 1.0 / 3.0 { 1.0 } else { f64::from(u8::from(x < 0.9)) * 2.0 }

@@ -17,6 +17,9 @@ pub use tree::PointTree;
 #[cfg(test)]
 mod tests;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::stream::Stream;
 use crate::math::exp;
 
@@ -188,6 +191,17 @@ fn reach(form: &ThinningForm, least: f64) -> f64 {
 
 fn square(x: f64) -> f64 {
     x * x
+}
+
+/// How accepted points are found; both ways have the same law.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Search {
+    /// By a hierarchy over the points.
+    #[default]
+    Hierarchy,
+    /// By asking every point.
+    Scan,
 }
 
 /// An accepted point.

@@ -1,9 +1,13 @@
-//! Total diffuse reflectance: tables, closed forms against quadrature, published reflectances, single scattering.
+//! Total diffuse reflectance: tables, closed forms against quadrature, published reflectances, single
+//! scattering.
 
 use std::f64::consts::PI;
 
-use super::super::{Better, Classical, Directional, Entry, Exit, Moments, Profile, Reduced, single};
-use super::{Row, Table};
+use super::super::{
+    Better, Classical, Directional, Entry, Exit, FresnelMoments, RadialProfile, Reduced,
+};
+use super::single;
+use super::{OracleRow, OracleTable};
 use crate::math::{DVec3, integrate};
 use crate::optics::fresnel::fresnel;
 use crate::optics::materials::{self, MATERIALS};
@@ -17,7 +21,7 @@ fn over_plane(f: impl Fn(f64) -> f64, length: f64, far: f64) -> f64 {
 
 #[test]
 fn every_total_of_the_materials() {
-    let table = Table::of(include_str!("../tables/dipole_albedo.csv"));
+    let table = OracleTable::of(include_str!("../tables/dipole_albedo.csv"));
     for row in table.rows() {
         let material = materials::find(row.text("material")).unwrap();
         let band = ["R", "G", "B"].iter().position(|band| *band == row.text("band")).unwrap();
@@ -25,12 +29,12 @@ fn every_total_of_the_materials() {
         let eta = row.number("eta");
         row.has("alpha_prime", reduced.albedo, 12);
         let classical = |moments| Classical::new(&reduced, &moments).total();
-        row.has("classical_polyEH", classical(Moments::egan_hilgeman(eta)), 12);
-        row.has("classical_exactA", classical(Moments::exact(eta)), 12);
-        row.has("better", Better::new(&reduced, &Moments::deon_irving(eta)).total(), 12);
+        row.has("classical_polyEH", classical(FresnelMoments::egan_hilgeman(eta)), 12);
+        row.has("classical_exactA", classical(FresnelMoments::exact(eta)), 12);
+        row.has("better", Better::new(&reduced, &FresnelMoments::deon_irving(eta)).total(), 12);
         // What was measured: two digits, read off a figure.
         let published = row.number("Rd_published");
-        let off = (classical(Moments::egan_hilgeman(eta)) - published).abs();
+        let off = (classical(FresnelMoments::egan_hilgeman(eta)) - published).abs();
         if (material.name, band) == ("chicken1", 2) {
             assert!(off > 0.02 && off < 0.03, "the one row that does not follow: {off}");
         } else {
@@ -39,18 +43,18 @@ fn every_total_of_the_materials() {
     }
 }
 
-fn isotropic(row: &Row) -> (f64, f64, Reduced) {
+fn isotropic(row: &OracleRow) -> (f64, f64, Reduced) {
     let albedo = row.number("alpha");
     (row.number("eta"), albedo, Reduced::new(1.0 - albedo, albedo))
 }
 
 #[test]
 fn every_model_of_the_table_of_exact_albedos() {
-    let table = Table::of(include_str!("../tables/model_albedo_vs_exact.csv"));
+    let table = OracleTable::of(include_str!("../tables/model_albedo_vs_exact.csv"));
     for row in table.rows() {
         let (eta, albedo, reduced) = isotropic(&row);
-        let classical = Classical::new(&reduced, &Moments::egan_hilgeman(eta)).total();
-        let better = Better::new(&reduced, &Moments::deon_irving(eta)).total();
+        let classical = Classical::new(&reduced, &FresnelMoments::egan_hilgeman(eta)).total();
+        let better = Better::new(&reduced, &FresnelMoments::deon_irving(eta)).total();
         let once = single::albedo_normal(albedo, eta);
         row.is_within("classical", classical, 0.5e-8);
         row.is_within("better", better, 0.5e-8);
@@ -59,13 +63,14 @@ fn every_model_of_the_table_of_exact_albedos() {
     }
 }
 
-/// Along the normal of a plane the directional dipole is a function of distance: 4 C_phi(1/eta) pi int S_d dA.
+/// Along the normal of a plane the directional dipole is a function of distance: 4 C_phi(1/eta) pi int
+/// S_d dA.
 #[test]
 fn every_total_of_the_directional_dipole() {
-    let table = Table::of(include_str!("../tables/model_albedo_vs_exact.csv"));
+    let table = OracleTable::of(include_str!("../tables/model_albedo_vs_exact.csv"));
     for row in table.rows() {
         let (eta, _, reduced) = isotropic(&row);
-        let moments = Moments::deon_irving(eta);
+        let moments = FresnelMoments::deon_irving(eta);
         let directional = Directional::new(&reduced, 1.0, &moments);
         let entry = Entry { point: DVec3::ZERO, normal: DVec3::Z, dir: -DVec3::Z };
         let exit = |r: f64| Exit { point: DVec3::new(r, 0.0, 0.0), normal: DVec3::Z };
@@ -81,11 +86,11 @@ fn every_total_of_the_directional_dipole() {
     }
 }
 
-fn profiles(reduced: &Reduced, eta: f64) -> [Profile; 2] {
-    let moments = Moments::exact(eta);
+fn profiles(reduced: &Reduced, eta: f64) -> [RadialProfile; 2] {
+    let moments = FresnelMoments::exact(eta);
     [
-        Profile::Classical(Classical::new(reduced, &moments)),
-        Profile::Better(Better::new(reduced, &moments)),
+        RadialProfile::Classical(Classical::new(reduced, &moments)),
+        RadialProfile::Better(Better::new(reduced, &moments)),
     ]
 }
 
@@ -126,7 +131,7 @@ fn media_that_do_not_absorb() {
 }
 
 /// The better dipole as its paper prints it, with a given s.
-fn better_as_printed(reduced: &Reduced, moments: &Moments, s: f64, r: f64) -> f64 {
+fn better_as_printed(reduced: &Reduced, moments: &FresnelMoments, s: f64, r: f64) -> f64 {
     let t = reduced.sigma_t;
     let d = (2.0 * reduced.sigma_a + reduced.sigma_s) / (3.0 * t * t);
     let (c_e, c_phi) = (moments.c_e(), moments.c_phi());
@@ -139,13 +144,13 @@ fn better_as_printed(reduced: &Reduced, moments: &Moments, s: f64, r: f64) -> f6
     reduced.albedo * reduced.albedo / (4.0 * PI) * (source(z_r, 1.0) - source(z_v, -1.0))
 }
 
-/// An error that a public implementation makes, Grosjean's D with the classical s, is seen by the closed form; the
-/// paper's own formula is not.
+/// An error that a public implementation makes, Grosjean's D with the classical s, is seen by the closed
+/// form; the paper's own formula is not.
 #[test]
 fn the_closed_form_tells_the_right_s_from_the_classical_one() {
     for material in &MATERIALS {
         let reduced = Reduced::new(material.sigma_a[0], material.reduced_sigma_s[0]);
-        let moments = Moments::exact(material.eta);
+        let moments = FresnelMoments::exact(material.eta);
         let better = Better::new(&reduced, &moments);
         let far = 40.0 / reduced.sigma_tr() + 40.0 / reduced.sigma_t;
         let plane = |s| {
@@ -153,7 +158,8 @@ fn the_closed_form_tells_the_right_s_from_the_classical_one() {
             over_plane(profile, 1.0 / reduced.sigma_t, far)
         };
         assert!((plane(better.sigma_tr()) - better.total()).abs() < 1e-10, "{}", material.name);
-        // They differ by the factor sqrt(1 + sigma_a/sigma_t'), so that the loss of light differs in proportion.
+        // They differ by the factor sqrt(1 + sigma_a/sigma_t'), so that the loss of light differs in
+        // proportion.
         let off = (plane(reduced.sigma_tr()) / better.total() - 1.0).abs();
         assert!(off > 1e-3 * (1.0 - reduced.albedo), "{}: {off}", material.name);
         assert!(off > 1e-8, "{}: {off}", material.name);
@@ -175,8 +181,8 @@ fn single_scattering_of_all_directions() {
     }
 }
 
-/// Inside, without the factor 1/eta^2: alpha T12 int T21 p mu' / (mu_i' + mu') dw' over the hemisphere; a forward phase
-/// function and an oblique beam, both integrals over both angles.
+/// Inside, without the factor 1/eta^2: alpha T12 int T21 p mu' / (mu_i' + mu') dw' over the hemisphere;
+/// a forward phase function and an oblique beam, both integrals over both angles.
 #[test]
 fn single_scattering_seen_from_inside() {
     let (medium, eta) = (Medium::new(0.2, 0.8, 0.6), 1.4);

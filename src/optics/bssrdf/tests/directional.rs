@@ -1,7 +1,7 @@
 //! The directional dipole between every pair of ends of a table, and its degenerate ends.
 
-use super::super::{Directional, Entry, Exit, Moments, Parts, Reduced};
-use super::{Row, Table, half_unit};
+use super::super::{Directional, DirectionalTerms, Entry, Exit, FresnelMoments, Reduced};
+use super::{OracleRow, OracleTable, half_unit};
 use crate::math::{DVec3, Frame};
 use crate::optics::fresnel::fresnel;
 
@@ -24,10 +24,10 @@ fn refract(w: DVec3, normal: DVec3, eta: f64) -> (DVec3, f64) {
     ((normal * cos - w) / eta - normal * surface.cos_t, 1.0 - surface.reflectance)
 }
 
-fn model(row: &Row) -> Directional {
+fn model(row: &OracleRow) -> Directional {
     let (sigma_a, sigma_s, g) = (row.number("sigma_a"), row.number("sigma_s"), row.number("g"));
     let reduced = Reduced::new(sigma_a, sigma_s * (1.0 - g));
-    Directional::new(&reduced, sigma_a + sigma_s, &Moments::deon_irving(row.number("eta")))
+    Directional::new(&reduced, sigma_a + sigma_s, &FresnelMoments::deon_irving(row.number("eta")))
 }
 
 /// The columns that the ends give.
@@ -36,7 +36,7 @@ fn columns(model: &Directional, ends: &Ends, eta: f64) -> [(&'static str, f64); 
     let [(dir, t12), (back, t21)] = [refract(wi, ni, eta), refract(wo, no, eta)];
     let entry = Entry { point: xi, normal: ni, dir };
     let exit = Exit { point: xo, normal: no };
-    let Parts { real, mirrored, d_r, d_v, mu0 } = model.parts(&entry, &exit);
+    let DirectionalTerms { real, mirrored, d_r, d_v, mu0 } = model.parts(&entry, &exit);
     let reverse =
         model.parts(&Entry { point: xo, normal: no, dir: back }, &Exit { point: xi, normal: ni });
     [
@@ -53,11 +53,12 @@ fn columns(model: &Directional, ends: &Ends, eta: f64) -> [(&'static str, f64); 
     ]
 }
 
-/// To the 12 digits printed, where the ends, which have 12 digits themselves, determine as many: to half a unit of the
-/// last digit and what half a unit in the last digit of every coordinate moves the value by.
+/// To the 12 digits printed, where the ends, which have 12 digits themselves, determine as many: to half
+/// a unit of the last digit and what half a unit in the last digit of every coordinate moves the value
+/// by.
 #[test]
 fn every_value_of_the_table() {
-    let table = Table::of(include_str!("../tables/directional_dipole.csv"));
+    let table = OracleTable::of(include_str!("../tables/directional_dipole.csv"));
     let (mut negative, mut not_reciprocal) = (0, 0);
     for row in table.rows() {
         let (model, eta) = (model(&row), row.number("eta"));
@@ -91,7 +92,7 @@ fn every_value_of_the_table() {
 
 fn typical() -> Directional {
     let reduced = Reduced::new(0.032, 0.74);
-    Directional::new(&reduced, reduced.sigma_t, &Moments::exact(1.3))
+    Directional::new(&reduced, reduced.sigma_t, &FresnelMoments::exact(1.3))
 }
 
 /// A turn that is about no axis in particular.
@@ -101,7 +102,8 @@ fn turn(v: DVec3) -> DVec3 {
     Frame::about(DVec3::new(-0.6, 0.64, -0.48)).to_world(DVec3::new(w.y, -w.x, w.z))
 }
 
-/// Ends with the same point; with the exit straight below: on a slab, on a sphere with the ray along the line or not.
+/// Ends with the same point; with the exit straight below: on a slab, on a sphere with the ray along the
+/// line or not.
 #[test]
 fn degenerate_ends_are_finite_and_turn_with_the_scene() {
     let oblique = DVec3::new(0.48, -0.36, -0.8);
@@ -146,13 +148,13 @@ fn ordinary_ends_turn_with_the_scene() {
     assert!((plain.mirrored / turned.mirrored - 1.0).abs() < 1e-12);
 }
 
-/// The exitance of the fluence phi of the source, C_phi phi - C_E D n.grad phi, by differences: S' is that over
-/// pi 4 C_phi(1/eta) per power, for an exit that looks away so that nothing is corrected but the distance, which the
-/// table has; here the virtual source, which uses its own distance throughout.
+/// The exitance of the fluence phi of the source, C_phi phi - C_E D n.grad phi, by differences: S' is
+/// that over pi 4 C_phi(1/eta) per power, for an exit that looks away so that nothing is corrected but
+/// the distance, which the table has; here the virtual source, which uses its own distance throughout.
 #[test]
 fn the_kernel_is_the_exitance_of_the_rays_fluence() {
     let reduced = Reduced::new(0.032, 0.74);
-    let moments = Moments::exact(1.3);
+    let moments = FresnelMoments::exact(1.3);
     let model = Directional::new(&reduced, reduced.sigma_t, &moments);
     let entry = Entry { point: DVec3::ZERO, normal: DVec3::Z, dir: DVec3::new(0.48, -0.36, -0.8) };
     let d = 1.0 / (3.0 * reduced.sigma_t);

@@ -1,6 +1,6 @@
 //! Fits by Gaussians.
 
-use super::super::{Better, Classical, Fit, Gaussians, Moments, Reduced, Term, fit};
+use super::super::{Better, Classical, FresnelMoments, GaussianFit, Gaussians, Reduced, Term, fit};
 use crate::optics::materials::MATERIALS;
 
 /// More Gaussians fit better, the integral is kept, and six are as close as the module says.
@@ -9,7 +9,7 @@ fn fits_of_dipoles() {
     for material in &MATERIALS {
         for band in 0..3 {
             let reduced = Reduced::new(material.sigma_a[band], material.reduced_sigma_s[band]);
-            let moments = Moments::exact(material.eta);
+            let moments = FresnelMoments::exact(material.eta);
             let classical = Classical::new(&reduced, &moments);
             let better = Better::new(&reduced, &moments);
             let length = 1.0 / reduced.sigma_t;
@@ -32,7 +32,7 @@ fn fits_of_dipoles() {
     }
 }
 
-fn literal_error(fit: &Fit, exitance: impl Fn(f64) -> f64, far: f64) -> (f64, f64) {
+fn literal_error(fit: &GaussianFit, exitance: impl Fn(f64) -> f64, far: f64) -> (f64, f64) {
     let (mut most, mut peak, mut off, mut all) = (0.0f64, 0.0f64, 0.0, 0.0);
     let n = 200_000;
     for i in 0..n {
@@ -50,7 +50,7 @@ fn literal_error(fit: &Fit, exitance: impl Fn(f64) -> f64, far: f64) -> (f64, f6
 #[test]
 fn stated_errors_are_the_errors() {
     let reduced = Reduced::new(0.032, 0.74);
-    let classical = Classical::new(&reduced, &Moments::exact(1.3));
+    let classical = Classical::new(&reduced, &FresnelMoments::exact(1.3));
     let fitted = fit(|r| classical.exitance(r), classical.total(), 1.0 / reduced.sigma_t, 4);
     let (max, l2) = literal_error(&fitted, |r| classical.exitance(r), 150.0);
     assert!((fitted.error.max / max - 1.0).abs() < 0.02, "{:?} {max}", fitted.error);

@@ -1,4 +1,5 @@
-//! What holds for every model: scaling, limits, the far field, reciprocity, sampling, the way out, refusals.
+//! What holds for every model: scaling, limits, the far field, reciprocity, sampling, the way out,
+//! refusals.
 
 use std::f64::consts::PI;
 
@@ -10,7 +11,7 @@ use crate::sampling::radial::Radial;
 
 const EXACT: MomentKind = MomentKind::Exact;
 const PLAIN: Model = Model::Classical { moments: EXACT, outgoing: Outgoing::Plain };
-const CLASSICAL: Model = Model::Classical { moments: EXACT, outgoing: Outgoing::Normalised };
+const CLASSICAL: Model = Model::Classical { moments: EXACT, outgoing: Outgoing::Normalized };
 const BETTER: Model = Model::Better { moments: EXACT };
 const DIRECTIONAL: Model = Model::Directional { moments: EXACT };
 const SEARCHLIGHT: Model = Model::Normalized { scaling: Scaling::Searchlight, albedo: None };
@@ -54,7 +55,8 @@ fn ends(scale: f64) -> (Entry, Exit) {
     (entry, Exit { point: scale * DVec3::new(1.1, -0.4, 0.5), normal })
 }
 
-/// K(r; k sigma) = k^2 K(k r; sigma). A fit solves equations that amplify rounding errors, most where it is small.
+/// K(r; k sigma) = k^2 K(k r; sigma). A fit solves equations that amplify rounding errors, most where it
+/// is small.
 #[test]
 fn lengths_scale() {
     let k = 3.7;
@@ -82,7 +84,8 @@ fn lengths_scale() {
     }
 }
 
-/// From both sides, eta -> 1 leads to the matched boundary; the polynomials would miss it by their own error.
+/// From both sides, eta -> 1 leads to the matched boundary; the polynomials would miss it by their own
+/// error.
 #[test]
 fn boundaries_become_matched() {
     for medium in media() {
@@ -101,8 +104,8 @@ fn boundaries_become_matched() {
     assert_eq!(at(&of(&polynomial, &media()[0], 1.0), 1.0), at(&of(&BETTER, &media()[0], 1.0), 1.0));
 }
 
-/// d ln(R r^2)/dr -> -s for the dipoles. The next terms are 1/(s r)^2 of it, from (1 + s r)/r^3, and at most
-/// (z/r)^2 (1/2 + 3/(s r)), from d = r + z^2/(2r) - ...
+/// d ln(R r^2)/dr -> -s for the dipoles. The next terms are 1/(s r)^2 of it, from (1 + s r)/r^3, and at
+/// most (z/r)^2 (1/2 + 3/(s r)), from d = r + z^2/(2r) - ...
 #[test]
 fn far_fields_fall_with_sigma_tr() {
     for medium in media() {
@@ -142,7 +145,8 @@ fn reciprocity() {
     }
 }
 
-/// The hemispherical exitance under T21: R for the normalised, less by 2 C1(1/eta) for the plain classical dipole.
+/// The hemispherical exitance under T21: R for the normalised, less by 2 C1(1/eta) for the plain
+/// classical dipole.
 #[test]
 fn the_way_out() {
     for eta in [0.8, 1.0, 1.3, 1.5] {
@@ -161,8 +165,8 @@ fn the_way_out() {
     }
 }
 
-/// Kernel over density, on a plane: constant where the techniques follow the kernel exactly, within a hundredth for the
-/// better dipole's.
+/// Kernel over density, on a plane: constant where the techniques follow the kernel exactly, within a
+/// hundredth for the better dipole's.
 #[test]
 fn techniques_follow_the_kernel() {
     for (medium, eta) in

@@ -1,21 +1,21 @@
 //! Radial profiles, their sampling, and Fresnel moments.
 
 use super::super::moments::{deon_irving_first, deon_irving_second, egan_hilgeman_first};
-use super::super::{Better, Classical, Gaussians, Moments, Normalized, Reduced, SKIN, Scaling};
-use super::{Row, Table, half_unit};
+use super::super::{Better, Classical, FresnelMoments, Gaussians, Normalized, Reduced, SKIN, Scaling};
+use super::{OracleRow, OracleTable, half_unit};
 use crate::optics::materials;
 use crate::sampling::radial::{Dipole, Radial};
 
-fn reduced(row: &Row) -> Reduced {
+fn reduced(row: &OracleRow) -> Reduced {
     Reduced::new(row.number("sigma_a"), row.number("sigma_s_prime"))
 }
 
 #[test]
 fn every_fresnel_moment_of_the_table() {
-    let table = Table::of(include_str!("../tables/fresnel_moments.csv"));
+    let table = OracleTable::of(include_str!("../tables/fresnel_moments.csv"));
     for row in table.rows() {
         let eta = row.number("eta");
-        let [inside, outside] = [eta, 1.0 / eta].map(Moments::exact);
+        let [inside, outside] = [eta, 1.0 / eta].map(FresnelMoments::exact);
         for (name, value) in [
             ("Fdr_int", inside.c1),
             ("Fdr_ext", inside.c1_external),
@@ -44,7 +44,7 @@ fn every_fresnel_moment_of_the_table() {
             row.has("poly_C1_ext", deon_irving_first(1.0), 12);
             row.has("poly_C2_ext", deon_irving_second(1.0), 12);
         }
-        let [hilgeman, irving] = [Moments::egan_hilgeman(eta), Moments::deon_irving(eta)];
+        let [hilgeman, irving] = [FresnelMoments::egan_hilgeman(eta), FresnelMoments::deon_irving(eta)];
         if eta == 1.0 {
             assert_eq!([hilgeman.c1, irving.c1, irving.c2], [0.0; 3]);
         } else {
@@ -60,7 +60,7 @@ fn every_fresnel_moment_of_the_table() {
 #[test]
 fn moments_from_both_sides_belong_together() {
     for eta in [0.4, 0.75, 0.999, 1.000_001, 1.01, 1.3, 1.5, 2.4, 5.0] {
-        let moments = Moments::exact(eta);
+        let moments = FresnelMoments::exact(eta);
         let other = (1.0 - moments.c1_external) / (eta * eta);
         assert!((1.0 - moments.c1 - other).abs() < 1e-13, "{eta}: {moments:?}");
     }
@@ -69,22 +69,22 @@ fn moments_from_both_sides_belong_together() {
 /// 1e-9 relative is asked; what is printed is reached.
 #[test]
 fn every_value_of_the_dipole_profiles() {
-    let table = Table::of(include_str!("../tables/dipole_profiles.csv"));
+    let table = OracleTable::of(include_str!("../tables/dipole_profiles.csv"));
     for row in table.rows() {
         let (reduced, eta, r) = (reduced(&row), row.number("eta"), row.number("r_mm"));
         let classical = |moments| Classical::new(&reduced, &moments).exitance(r);
-        row.has("Rd_classical_polyEH", classical(Moments::egan_hilgeman(eta)), 12);
-        row.has("Rd_classical_exactA", classical(Moments::exact(eta)), 12);
-        row.has("Rd_better", Better::new(&reduced, &Moments::deon_irving(eta)).exitance(r), 12);
+        row.has("Rd_classical_polyEH", classical(FresnelMoments::egan_hilgeman(eta)), 12);
+        row.has("Rd_classical_exactA", classical(FresnelMoments::exact(eta)), 12);
+        row.has("Rd_better", Better::new(&reduced, &FresnelMoments::deon_irving(eta)).exitance(r), 12);
     }
 }
 
 /// The materials of the library are those of the tables, as far as the tables go.
 #[test]
 fn tables_and_materials_agree() {
-    let table = Table::of(include_str!("../tables/dipole_profiles.csv"));
-    let albedos = Table::of(include_str!("../tables/dipole_albedo.csv"));
-    let of = |row: &Row| {
+    let table = OracleTable::of(include_str!("../tables/dipole_profiles.csv"));
+    let albedos = OracleTable::of(include_str!("../tables/dipole_albedo.csv"));
+    let of = |row: &OracleRow| {
         let material = materials::find(row.text("material")).unwrap();
         (material, ["R", "G", "B"].iter().position(|band| *band == row.text("band")).unwrap())
     };
@@ -102,12 +102,12 @@ fn tables_and_materials_agree() {
 
 #[test]
 fn every_value_of_the_dipoles_radial_sampling() {
-    let table = Table::of(include_str!("../tables/dipole_radial_sampling.csv"));
+    let table = OracleTable::of(include_str!("../tables/dipole_radial_sampling.csv"));
     for row in table.rows() {
         let material = materials::find(row.text("material")).unwrap();
         let band = ["R", "G", "B"].iter().position(|band| *band == row.text("band")).unwrap();
         let reduced = Reduced::new(material.sigma_a[band], material.reduced_sigma_s[band]);
-        let shape = Classical::new(&reduced, &Moments::egan_hilgeman(material.eta)).shape();
+        let shape = Classical::new(&reduced, &FresnelMoments::egan_hilgeman(material.eta)).shape();
         let s = shape.sigma_tr;
         let weights = [shape.z_real, shape.z_virtual].map(|z| (-s * z).exp());
         let w_real = weights[0] / (weights[0] + weights[1]);
@@ -135,7 +135,7 @@ fn every_value_of_the_dipoles_radial_sampling() {
 
 #[test]
 fn every_value_of_normalized_diffusion() {
-    let table = Table::of(include_str!("../tables/normalized_diffusion.csv"));
+    let table = OracleTable::of(include_str!("../tables/normalized_diffusion.csv"));
     for row in table.rows() {
         let (albedo, r) = (row.number("A"), row.number("r_mm"));
         row.has("s_searchlight", Scaling::Searchlight.shape(albedo), 12);
@@ -151,7 +151,7 @@ fn every_value_of_normalized_diffusion() {
 
 #[test]
 fn the_gaussians_of_skin_are_the_published_ones() {
-    let table = Table::of(include_str!("../tables/skin_gaussians.csv"));
+    let table = OracleTable::of(include_str!("../tables/skin_gaussians.csv"));
     assert_eq!(table.rows.len(), SKIN.len());
     for (row, (variance, weights)) in table.rows().zip(SKIN) {
         assert_eq!(row.number("variance_mm2"), variance);

@@ -1,12 +1,10 @@
-//! The catalogue as `experiments/verify/samplers.toml` lists it: what can be said of every sampler without
-//! statistics.
+//! The catalogue as `experiments/verify/samplers.toml` lists it: what can be said of every sampler
+//! without statistics.
 
 use serde_json::{Map, Value};
 
 use super::*;
 use crate::math::integrate;
-use crate::results::json::hash_bytes;
-use crate::samplers::{Axis, Draw, Null, Piece};
 use crate::sampling::stream::{Purpose, Stream, StreamKey};
 
 /// Every sampler of the file, by name.
@@ -20,21 +18,20 @@ fn catalogue() -> Vec<(String, Box<dyn Sampler>)> {
 fn build(table: &Map<String, Value>) -> (String, Box<dyn Sampler>) {
     let name = table["name"].as_str().expect("a name").to_string();
     let (kind, options) = table.iter().find(|(key, _)| *key != "name").expect("a kind");
-    let entries = builtin();
-    let entry = entries.iter().find(|entry| entry.kind == kind).unwrap_or_else(|| panic!("{kind}"));
+    let entry = KINDS.iter().find(|entry| entry.kind == kind).unwrap_or_else(|| panic!("{kind}"));
     let sampler = (entry.build)(options).unwrap_or_else(|error| panic!("{name}: {error}"));
     (name, sampler)
 }
 
 /// The stream of a name.
 fn stream(name: &str) -> Stream {
-    StreamKey::new(hash_bytes(name.as_bytes())).pass(0).stream(0, Purpose::Walk)
+    StreamKey::named(name).pass(0).stream(0, Purpose::Walk)
 }
 
 #[test]
 fn every_kind_is_in_the_file_and_every_name_once() {
     let text = include_str!("../../experiments/verify/samplers.toml");
-    for entry in builtin() {
+    for entry in KINDS {
         assert!(text.contains(&format!(" {}", entry.kind)), "{} is not in the file", entry.kind);
     }
     let mut names: Vec<String> = catalogue().into_iter().map(|(name, _)| name).collect();
@@ -45,8 +42,8 @@ fn every_kind_is_in_the_file_and_every_name_once() {
     assert_eq!(names.len(), count);
 }
 
-/// D5 and D10: a sample says of itself what is said of its place, lies inside its chart, is exact where it
-/// is discrete, and takes as many numbers as every other.
+/// D5 and D10: a sample says of itself what is said of its place, lies inside its chart, is exact where
+/// it is discrete, and takes as many numbers as every other.
 #[test]
 fn samples_agree_with_their_density() {
     for (name, sampler) in catalogue() {
@@ -66,7 +63,7 @@ fn samples_agree_with_their_density() {
                 }
                 Draw::Point { piece, at, density } => {
                     let Piece { axes, .. } = &pieces[piece];
-                    for (x, Axis { range: [from, to], .. }) in at.into_iter().zip(axes) {
+                    for (x, Coordinate { range: [from, to], .. }) in at.into_iter().zip(axes) {
                         assert!(*from <= x && x <= *to, "{name}: {} at {at:?}", pieces[piece].name);
                     }
                     let again = sampler.density(piece, at);
@@ -83,7 +80,7 @@ fn samples_agree_with_their_density() {
 
 /// The integral of a function over a piece, split at its kinks.
 fn over(piece: &Piece, f: &dyn Fn([f64; 2]) -> f64, tolerance: f64) -> f64 {
-    let split = |axis: &Axis| {
+    let split = |axis: &Coordinate| {
         let [from, to] = axis.range;
         let mut ends = vec![from, to];
         ends.extend(&axis.kinks);

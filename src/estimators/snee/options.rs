@@ -1,0 +1,303 @@
+//! Options of `snee` and `two_bounce`, and the two presets that an experiment file starts from.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::end::Call;
+use super::last_vertex::LastVertex;
+use super::probe::ProbeShares;
+use crate::error::{Error, Result};
+use crate::estimators::Roulette;
+
+/// How the estimator is set up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SneeOptions {
+    /// Russian roulette of the walk.
+    pub roulette: Roulette,
+    /// What takes part.
+    pub strategies: Strategies,
+    /// How often an edge is subdivided.
+    pub call: Call,
+    /// The same where nothing else finds the path: parallel light through a smooth boundary.
+    pub call_alone: Call,
+    /// Whether distances end at the boundary (one more ray for every density) or run on and may fail.
+    pub truncated: bool,
+    /// Directions of probes.
+    pub probe: ProbeShares,
+    /// Directions from x_i, bottom to top.
+    pub joint: JointKind,
+    /// The light-guided last vertex.
+    pub last_vertex: Option<LastVertex>,
+    /// Whether a smooth boundary's reflection of a light that is connected to is scored by its
+    /// expectation, wherever a walk meets the boundary from outside, instead of by the walks that take
+    /// it.
+    pub expected_reflection: bool,
+    /// Least concentration 4 pi int L^2 / (int L)^2 of a light that is connected to; with 1 none is
+    /// skipped.
+    pub least_concentration: f64,
+    /// Whether all bands share a walk.
+    pub share_bands: bool,
+}
+
+/// Which techniques make the paths whose last two medium vertices follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Strategies {
+    /// The walk goes on, its exit by BSDF sampling.
+    pub bsdf: bool,
+    /// The walk goes on, its exit by light sampling.
+    pub light: bool,
+    /// Subdivision from the light's end.
+    pub top_to_bottom: bool,
+    /// Subdivision from the walk's end.
+    pub bottom_to_top: bool,
+}
+
+impl Strategies {
+    /// Whether edges are subdivided.
+    pub(super) fn subdivides(&self) -> bool {
+        self.top_to_bottom || self.bottom_to_top
+    }
+}
+
+/// How directions are drawn from the walk's end of an edge, bottom to top.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum JointKind {
+    /// Phase function times geometry, tabulated (exact where g is 0).
+    Table,
+    /// Phase function and geometry in turn, half each.
+    Mixture,
+}
+
+/// Options of `snee` and `two_bounce` in an experiment file: a preset, and what differs from it.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SneeChoices {
+    /// What the other options start from.
+    #[serde(default)]
+    pub preset: SneePreset,
+    /// When a path is ended by chance.
+    #[serde(default)]
+    pub roulette: Roulette,
+    /// What makes the paths whose last two medium vertices follow each other.
+    ///
+    /// All other paths are always the walk's own (and the light-guided last vertex's).
+    pub strategies: Option<Vec<EdgeTechnique>>,
+    /// How often an edge is subdivided.
+    pub call: Option<Call>,
+    /// The same where nothing else finds the path: parallel light through a smooth boundary.
+    pub call_alone: Option<Call>,
+    /// Where sampled distances end.
+    pub distances: Option<DistanceEnd>,
+    /// How points of the boundary are probed.
+    pub probe: Option<ProbeLobes>,
+    /// How directions are drawn from the walk's end of an edge.
+    pub joint: Option<JointKind>,
+    /// The light-guided last vertex; `most = 0` switches it off.
+    pub last_vertex: Option<LastVertex>,
+    /// Whether a smooth boundary's reflection of a concentrated light is scored by its expectation.
+    pub expected_reflection: Option<bool>,
+    /// Lights of a smaller concentration are skipped: sampled by path tracing only.
+    ///
+    /// The concentration is 4 pi int L^2 / (int L)^2; 1 skips none.
+    #[schemars(range(min = 1.0))]
+    pub least_concentration: Option<f64>,
+    /// Whether bands have walks of their own.
+    #[serde(default)]
+    pub bands: BandWalks,
+}
+
+/// A set of options with a name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SneePreset {
+    /// As published: all strategies, uniform probes, truncated distances, a call at every vertex.
+    Paper,
+    /// Tuned: probes and a last vertex that are guided by the light, calls whose probability falls with
+    /// depth; lights that are not concentrated are skipped.
+    #[default]
+    Guided,
+}
+
+/// A technique.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EdgeTechnique {
+    /// The walk, its exit by BSDF sampling.
+    Bsdf,
+    /// The walk, its exit by light sampling.
+    Light,
+    /// Subdivision from the light's end.
+    TopToBottom,
+    /// Subdivision from the walk's end.
+    BottomToTop,
+}
+
+/// Where sampled distances end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DistanceEnd {
+    /// At the boundary, which takes a ray for every density.
+    Truncated,
+    /// Nowhere; samples outside the body count as 0.
+    Unbounded,
+}
+
+/// The least share of uniform directions among probes.
+const LEAST_UNIFORM: f64 = 1e-3;
+
+/// Shares of the lobes of probes; what is left to 1 is uniform in direction, at least 0.001.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeLobes {
+    /// By area of the tangent plane at the specular guess.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub plane: f64,
+    /// About the specular guess.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub guided: f64,
+}
+
+/// Who shares a walk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BandWalks {
+    /// Every band has its own.
+    #[default]
+    Alone,
+    /// One walk scores all bands, which may differ in their media alone.
+    Shared,
+}
+
+impl SneePreset {
+    /// Its options.
+    pub fn options(self) -> SneeOptions {
+        let all = Strategies { bsdf: true, light: true, top_to_bottom: true, bottom_to_top: true };
+        match self {
+            SneePreset::Paper => SneeOptions {
+                roulette: Roulette::default(),
+                strategies: all,
+                call: Call { most: 1.0, decay: 0.0 },
+                call_alone: Call { most: 1.0, decay: 0.0 },
+                truncated: true,
+                probe: ProbeShares { uniform: 1.0, plane: 0.0, guided: 0.0 },
+                joint: JointKind::Table,
+                last_vertex: None,
+                expected_reflection: false,
+                least_concentration: 1.0,
+                share_bands: false,
+            },
+            SneePreset::Guided => SneeOptions {
+                roulette: Roulette::default(),
+                strategies: Strategies { bottom_to_top: false, ..all },
+                call: Call { most: 0.15, decay: 0.75 },
+                call_alone: Call { most: 1.0, decay: 0.25 },
+                truncated: false,
+                probe: ProbeShares { uniform: 0.2, plane: 0.4, guided: 0.4 },
+                joint: JointKind::Table,
+                last_vertex: Some(LastVertex { most: 1.0, decay: 0.75, wide_share: 0.25, wide: 0.2 }),
+                expected_reflection: true,
+                least_concentration: 10.0,
+                share_bands: false,
+            },
+        }
+    }
+}
+
+impl SneeChoices {
+    /// The preset with what differs from it.
+    ///
+    /// # Errors
+    /// No technique, one that loses lights, or shares of probes that leave nothing to uniform
+    /// directions.
+    pub fn options(&self) -> Result<SneeOptions> {
+        let preset = self.preset.options();
+        let mut options = SneeOptions {
+            roulette: self.roulette,
+            call: self.call.unwrap_or(preset.call),
+            call_alone: self.call_alone.or(self.call).unwrap_or(preset.call_alone),
+            joint: self.joint.unwrap_or(preset.joint),
+            last_vertex: self.last_vertex.or(preset.last_vertex).filter(|last| last.most > 0.0),
+            expected_reflection: self.expected_reflection.unwrap_or(preset.expected_reflection),
+            least_concentration: self.least_concentration.unwrap_or(preset.least_concentration),
+            share_bands: self.bands == BandWalks::Shared,
+            ..preset
+        };
+        if let Some(strategies) = &self.strategies {
+            let has = |technique| strategies.contains(&technique);
+            options.strategies = Strategies {
+                bsdf: has(EdgeTechnique::Bsdf),
+                light: has(EdgeTechnique::Light),
+                top_to_bottom: has(EdgeTechnique::TopToBottom),
+                bottom_to_top: has(EdgeTechnique::BottomToTop),
+            };
+        }
+        if let Some(distances) = self.distances {
+            options.truncated = distances == DistanceEnd::Truncated;
+        }
+        if let Some(ProbeLobes { plane, guided }) = self.probe {
+            let uniform = 1.0 - plane - guided;
+            if uniform < LEAST_UNIFORM {
+                return Err(Error::input_help(
+                    format!(
+                        "snee: the shares of `probe` are {plane} and {guided}, which leaves less than \
+                         {LEAST_UNIFORM} to uniform directions"
+                    ),
+                    "let them sum to less, or parts of the boundary are never probed, or with huge weights",
+                ));
+            }
+            options.probe = ProbeShares { uniform, plane, guided };
+        }
+        let Strategies { bsdf, light, .. } = options.strategies;
+        if !(bsdf || light || options.strategies.subdivides() || options.last_vertex.is_some()) {
+            return Err(Error::input(
+                "snee: nothing takes part; name one of bsdf, light, top_to_bottom, bottom_to_top in `strategies`",
+            ));
+        }
+        if !(bsdf && light) && options.least_concentration > 1.0 {
+            return Err(Error::input_help(
+                "snee: `strategies` leaves out bsdf or light; without both, lights below `least_concentration` \
+                 are never sampled",
+                "set `least_concentration = 1`, or name both",
+            ));
+        }
+        Ok(options)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(text: &str) -> SneeChoices {
+        toml::from_str(text).expect("words")
+    }
+
+    #[test]
+    fn options_differ_from_the_preset_where_they_are_named() {
+        let paper = words("preset = \"paper\"").options().expect("a preset");
+        assert_eq!(paper, SneePreset::Paper.options());
+        let fewer = words("preset = \"paper\"\ncall = { most = 0.3 }\nlast_vertex = { most = 0.5 }");
+        let fewer = fewer.options().expect("options");
+        assert_eq!((fewer.call.most, fewer.call_alone.most), (0.3, 0.3));
+        assert_eq!(fewer.last_vertex.map(|last| last.most), Some(0.5));
+        assert!(fewer.truncated && fewer.strategies.bottom_to_top);
+        let guided = words("last_vertex = { most = 0 }").options().expect("options");
+        assert_eq!(SneeOptions { last_vertex: None, ..SneePreset::Guided.options() }, guided);
+    }
+
+    #[test]
+    fn what_samples_nothing_is_refused() {
+        let message = |text| words(text).options().expect_err("nothing").to_string();
+        let probe = message("probe = { plane = 0.7, guided = 0.3 }");
+        assert!(probe.contains("0.7 and 0.3") && probe.contains("uniform"), "{probe}");
+        let none = message("preset = \"paper\"\nstrategies = []");
+        assert!(none.contains("nothing takes part"), "{none}");
+        let gated = message("strategies = [\"top_to_bottom\"]");
+        assert!(gated.contains("never sampled"), "{gated}");
+        let last_alone = words("strategies = []\nleast_concentration = 1").options();
+        assert!(last_alone.is_ok(), "the last vertex is left");
+    }
+}
