@@ -40,7 +40,7 @@ fn words_and_types() {
     bad(
         "name = \"x\"",
         "name = \"../x\"",
-        &["`../x` has a wrong form", "x.toml:1:8", "letters, digits"],
+        &["`../x` cannot name a folder", "x.toml:1:8", "letters, digits"],
     );
 }
 

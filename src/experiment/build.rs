@@ -29,7 +29,7 @@ pub struct Builder<'a> {
 impl<'a> Builder<'a> {
     /// For an experiment.
     pub fn new(experiment: &'a Experiment) -> Builder<'a> {
-        let bands = bands(&experiment.file.bands);
+        let bands = experiment.file.bands.as_ref().map(bands).unwrap_or_default();
         Builder { experiment, bands, shapes: BTreeMap::new(), maps: BTreeMap::new() }
     }
 
@@ -51,7 +51,7 @@ impl<'a> Builder<'a> {
     pub fn scene(&mut self, cell: &CellSpec) -> Result<Scene> {
         let shape = self.shape(&cell.object.shape)?;
         let boundary = self.boundary(&cell.object.boundary)?;
-        let medium = cell.object.medium.per_band(&self.experiment.file.bands.list());
+        let medium = cell.object.medium.per_band(&self.experiment.file.band_list());
         let medium = medium.ok_or_else(|| Error::input("the medium has no coefficients"))?;
         let medium = medium.iter().map(|m| Medium::new(m.sigma_a, m.sigma_s, m.g)).collect();
         let lights = cell.light.iter().enumerate();
@@ -80,7 +80,7 @@ impl<'a> Builder<'a> {
     }
 
     fn boundary(&self, words: &schema::Boundary) -> Result<Vec<Boundary>> {
-        let bands = self.experiment.file.bands.list();
+        let bands = self.experiment.file.band_list();
         let eta = |eta: &schema::Eta| eta.per_band(&bands).map_err(Error::input);
         Ok(match words {
             schema::Boundary::Matched {} => vec![Boundary::Matched; bands.len()],

@@ -1,6 +1,6 @@
 //! What the entries of a file mean: values per band, unit directions, coefficients.
 
-use super::schema::{Bands, Coefficients, Direction, Eta, EtaFormula, Medium, Spectrum};
+use super::schema::{Bands, Coefficients, Direction, Eta, EtaFormula, ExperimentFile, Medium, Spectrum};
 use crate::math::{DVec3, cos, sin};
 use crate::optics::colour::{self, BandColours};
 use crate::optics::dispersion::{self, Dispersion};
@@ -25,6 +25,13 @@ pub struct BandMedium {
     pub sigma_s: f64,
     /// Mean cosine of the phase function.
     pub g: f64,
+}
+
+impl ExperimentFile {
+    /// The bands in order; none without a scene.
+    pub fn band_list(&self) -> Vec<Band> {
+        self.bands.as_ref().map(Bands::list).unwrap_or_default()
+    }
 }
 
 impl Bands {

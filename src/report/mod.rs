@@ -101,6 +101,7 @@ pub fn write(folder: &RecordFolder) -> Result<Material> {
 /// The same with verdicts at hand: those of this record, from a family of several.
 pub fn write_judged(folder: &RecordFolder, stored: Stored, verdicts: Vec<Verdict>) -> Result<Material> {
     let (timing, provenance) = (folder.read_timing()?, folder.read_provenance()?);
+    folder.clear_pictures()?;
     let rows = measurements(&stored, timing.as_ref());
     let figures = write_figures(folder, &stored)?;
     let viewers = viewer::viewers(&stored, &figures)?;
@@ -197,24 +198,35 @@ fn write_figures(folder: &RecordFolder, stored: &Stored) -> Result<Vec<Figure>> 
     let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
     let mut figures = Vec::new();
     for (index, cell) in stored.record.cells.iter().enumerate() {
-        for run in &cell.runs {
+        for (number, run) in cell.runs.iter().enumerate() {
             if let Some(picture) = Picture::of(stored, run) {
-                figures.push(write_figure(folder, stored, (index, cell), run, &picture, stops)?);
+                let stem = stem(index, number, &run.estimator);
+                figures.push(write_figure(folder, stored, cell, (run, stem), &picture, stops)?);
             }
         }
     }
     Ok(figures)
 }
 
+/// Path of a run's picture without extension: the name that people know it by, where that is plain, and
+/// otherwise its number and what is plain of the name.
+fn stem(cell: usize, run: usize, estimator: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+    if estimator.chars().all(is_plain) {
+        return format!("images/{cell:03}-{estimator}");
+    }
+    let words: Vec<&str> = estimator.split(|c| !is_plain(c)).filter(|word| !word.is_empty()).collect();
+    format!("images/{cell:03}-{run:03}.{}", words.join("-"))
+}
+
 fn write_figure(
     folder: &RecordFolder,
     stored: &Stored,
-    (index, cell): (usize, &Cell),
-    run: &EstimatorRun,
+    cell: &Cell,
+    (run, stem): (&EstimatorRun, String),
     picture: &Picture,
     stops: f64,
 ) -> Result<Figure> {
-    let stem = format!("images/{index:03}-{}", run.estimator);
     let path = |extension: &str| folder.root().join(format!("{stem}.{extension}"));
     atomic::create_folder(&folder.root().join("images"), "create the image folder")?;
     let attributes = [
@@ -281,5 +293,25 @@ mod tests {
 
         write(&folder).expect("a report");
         assert_eq!((read("report.md"), read("report.html")), (markdown, html));
+    }
+
+    #[test]
+    fn pictures_of_an_earlier_record_go_and_names_are_no_paths() {
+        let temp = tempfile::tempdir().expect("a folder");
+        let folder = RecordFolder::new(temp.path().join("sample"));
+        let stored = sample::stored(0.5);
+        folder.write(stored.record.clone(), stored.arrays.clone()).expect("a record");
+        write(&folder).expect("a report");
+        folder.write_view("images/of-mine.png", b"").expect("a file");
+        let mut renamed = stored;
+        renamed.record.cells[0].runs[0].estimator = "../mean, as published".into();
+        folder.write(renamed.record, renamed.arrays).expect("a record");
+        write(&folder).expect("a report");
+        let names = std::fs::read_dir(folder.root().join("images")).expect("a folder").flatten();
+        let mut names: Vec<_> = names.map(|entry| entry.file_name()).collect();
+        names.sort();
+        let runs = ["000-000.mean-as-published.exr", "000-000.mean-as-published.png"];
+        assert_eq!(names[..2], runs);
+        assert_eq!(names[2..], ["000-snee.exr", "000-snee.png", "of-mine.png"]);
     }
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::sampler::SamplerRun;
 
 /// Version of this layout; a reader refuses others.
-pub const SCHEMA_VERSION: u32 = 3;
+pub const SCHEMA_VERSION: u32 = 4;
 
 /// `record.json`: everything but the arrays, which stand in `.npy` files beside it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -102,13 +102,13 @@ pub struct EstimatorRun {
     /// Its kind, as `path`.
     pub kind: String,
     /// What it promises of its mean.
-    pub bias: Bias,
+    pub bias: StatedBias,
     /// The model whose integral it estimates; none where it is light transport itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
     /// Where its mean is known beforehand to be far from normal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub heavy_tails: Vec<HeavyTail>,
+    pub heavy_tails: Vec<StatedTail>,
     /// What a reader must know (a transport that it cannot sample).
     pub notes: Vec<String>,
     /// Number of independent passes.
@@ -132,19 +132,19 @@ pub struct EstimatorRun {
 /// Scores whose sample mean has no valid interval.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct HeavyTail {
+pub struct StatedTail {
     /// Index into [`Record::bands`].
     pub band: usize,
     /// In this class, and in `all`.
     pub class: String,
-    /// Because.
+    /// Why.
     pub reason: String,
 }
 
 /// What an estimator promises of its mean.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Bias {
+pub enum StatedBias {
     /// The expectation is the integral.
     Unbiased,
     /// The expectation tends to the integral as passes grow.

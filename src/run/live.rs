@@ -10,8 +10,7 @@ use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::job::{Block, Finished, Job};
-use super::keys::Stage;
+use super::job::{Block, Finished, Job, Passes};
 use super::tev::{Address, Connection, Frame};
 use crate::results::image::Picture;
 use crate::results::npy::Array;
@@ -140,13 +139,13 @@ impl Shared {
 }
 
 /// Width, height and channels of an image that a viewer has.
-type Shape = (usize, usize, Vec<String>);
+type Format = (usize, usize, Vec<String>);
 
 /// Sends an image; first has it created, where the viewer has none of its name and shape.
 fn send(
     connection: &mut Connection,
     frame: &Frame,
-    created: &mut BTreeMap<String, Shape>,
+    created: &mut BTreeMap<String, Format>,
 ) -> io::Result<()> {
     let channels = frame.channels.iter().map(|(name, _)| name.clone()).collect();
     let shape = (frame.width, frame.height, channels);
@@ -207,11 +206,11 @@ impl Show<'_> {
 
     /// All jobs are played: sends the images of those that are `owed`. What there is to say, where some were
     /// not sent.
-    pub fn close(&self, owed: &[usize], finished: &[Finished]) -> Option<String> {
+    pub fn close(&self, owed: &[(usize, &Finished)]) -> Option<String> {
         let until = Instant::now() + LAST_WAIT;
         let mut sent = 0;
-        for &job in owed {
-            if !self.live.wait(until, false) || !self.done(job, &finished[job]) {
+        for &(job, finished) in owed {
+            if !self.live.wait(until, false) || !self.done(job, finished) {
                 break;
             }
             sent += 1;
@@ -251,7 +250,7 @@ impl Show<'_> {
 
 /// Columns and rows of a job's image, where its record has one.
 fn image_size(job: &Job) -> Option<(usize, usize)> {
-    job.layout.image().filter(|_| job.stage == Stage::Main)
+    job.passes().and_then(Passes::image_size)
 }
 
 #[cfg(test)]

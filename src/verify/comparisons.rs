@@ -12,7 +12,7 @@ use super::trial::{Evidence, trial};
 use super::weights;
 use crate::results::csv_text::{self, number};
 use crate::results::record::{
-    Against, Bias, Cell, Comparison, CostMeasure, EstimatorRun, Observable, Quantity,
+    Against, Cell, Comparison, CostMeasure, EstimatorRun, Observable, Quantity, StatedBias,
 };
 use crate::results::store::Stored;
 use crate::stats::tree::total;
@@ -211,8 +211,8 @@ fn row(stored: &Stored, subject: &Subject, level: f64) -> Row {
 /// A biased estimator's variance is not its error.
 fn bias_objection(runs: &[&EstimatorRun]) -> Option<String> {
     runs.iter().find_map(|run| match &run.bias {
-        Bias::Biased(why) => Some(format!("{} is biased: {why}", run.estimator)),
-        Bias::Unbiased | Bias::Consistent => None,
+        StatedBias::Biased(why) => Some(format!("{} is biased: {why}", run.estimator)),
+        StatedBias::Unbiased | StatedBias::Consistent => None,
     })
 }
 

@@ -4,7 +4,7 @@ use super::efficiency::{self, Shown};
 use super::levels::SHARED_ERROR;
 use super::verdict::{Outcome, Verdict};
 use crate::results::record::{
-    Against, Bias, Comparison, EstimatorRun, HeavyTail, Observable, Quantity, Record,
+    Against, Comparison, EstimatorRun, Observable, Quantity, Record, StatedBias, StatedTail,
 };
 use crate::results::store::Stored;
 use crate::stats::goodness::{Goodness, Proportion};
@@ -191,7 +191,7 @@ impl<'a> Arm<'a> {
     fn known_tail(&self, quantity: &Quantity) -> Option<String> {
         let class = &quantity.observable.class;
         let concerns =
-            |tail: &&HeavyTail| tail.band == quantity.band && (class == "all" || *class == tail.class);
+            |tail: &&StatedTail| tail.band == quantity.band && (class == "all" || *class == tail.class);
         let tail = self.run.heavy_tails.iter().find(concerns)?;
         Some(format!("heavy tail, known beforehand: {}: {}", self.run.estimator, tail.reason))
     }
@@ -341,8 +341,8 @@ fn bias_objection(claim: &Claim, arms: &[&Arm]) -> Option<String> {
         return None;
     }
     arms.iter().find_map(|arm| match &arm.run.bias {
-        Bias::Biased(why) => Some(format!("{} is biased: {why}", arm.run.estimator)),
-        Bias::Unbiased | Bias::Consistent => None,
+        StatedBias::Biased(why) => Some(format!("{} is biased: {why}", arm.run.estimator)),
+        StatedBias::Unbiased | StatedBias::Consistent => None,
     })
 }
 
