@@ -23,12 +23,12 @@ pub struct Args {
     reading: Reading,
     #[command(flatten)]
     working: Working,
-    /// Play as many passes as the record in DIR/NAME has, instead of what the budget pays for: a record whose budget is in
-    /// seconds comes again bit for bit.
+    /// Play as many passes as the record in DIR/NAME has, instead of what the budget pays for: a record
+    /// whose budget is in seconds comes again bit for bit.
     #[arg(long, value_name = "DIR")]
     passes_of: Option<PathBuf>,
-    /// Show images in tev, a viewer that is running, while they are made; it listens at 127.0.0.1:14158 unless
-    /// told otherwise. Results do not depend on it.
+    /// Show images in tev, a viewer that is running, while they are made; it listens at 127.0.0.1:14158
+    /// unless told otherwise. Results do not depend on it.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = Address::USUAL)]
     tev: Option<Address>,
 }

@@ -208,8 +208,8 @@ pub fn inputs(experiment: &Experiment) -> BTreeMap<String, String> {
 }
 
 /// The bands of an experiment and the colours they show as.
-pub fn bands(words: &schema::Bands) -> Vec<Band> {
-    let band = |(band, display_rgb): (resolve::Band, [f64; 3])| Band {
+pub fn bands(words: &schema::BandsEntry) -> Vec<Band> {
+    let band = |(band, display_rgb): (resolve::BandInterval, [f64; 3])| Band {
         name: band.name,
         range_nm: band.range_nm,
         display_rgb,

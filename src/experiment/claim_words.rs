@@ -41,8 +41,8 @@ pub struct ClaimEntry {
     pub sampler: Option<SamplerClaim>,
 }
 
-/// Samplers draw from the densities that they claim: counts by bin, consecutive draws, directed contrasts,
-/// discrete outcomes, and the identities between draws and densities.
+/// Samplers draw from the densities that they claim: counts by bin, consecutive draws, directed
+/// contrasts, discrete outcomes, and the identities between draws and densities.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SamplerClaim {
@@ -110,8 +110,8 @@ pub struct Equals {
     pub only: BTreeMap<String, String>,
 }
 
-/// Estimators differ in every cell, or cells that differ only `across` one axis do, and the test finds it:
-/// a negative control.
+/// Estimators differ in every cell, or cells that differ only `across` one axis do, and the test finds
+/// it: a negative control.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Differs {

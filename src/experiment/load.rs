@@ -7,11 +7,11 @@ use serde::de::DeserializeOwned;
 use super::document::{self, Node, Value};
 use super::picture::PictureEntry;
 use super::registry::Registry;
-use super::rules::{self, At, CELL_KEYS, Findings, Known, Parts};
-use super::schema::{Bands, ClaimEntry, ExperimentFile};
+use super::rules::{self, At, CELL_KEYS, ExperimentParts, Findings, Known};
+use super::schema::{BandsEntry, ClaimEntry, ExperimentFile};
 use super::schema_json::json_schema;
-use super::sweep::{self, Point, SweepAxis};
-use super::validate::Walk;
+use super::sweep::{self, AxisPoint, SweepAxis};
+use super::validate::SchemaWalk;
 use super::validate::grammar::Grammar;
 use super::{Axis, CellSpec, Experiment, LoadOptions, origins, overrides, resolved};
 use crate::error::{Diagnostic, Error, Place, Result};
@@ -74,7 +74,7 @@ struct Loader<'a> {
 impl Loader<'_> {
     fn experiment(self, overridden: &[(String, Place)]) -> Result<Experiment> {
         let parts = rules::parts(At::new(&self.root, &self.findings), &self.root);
-        let mut walk = Walk::new(&self.grammar, false);
+        let mut walk = SchemaWalk::new(&self.grammar, false);
         walk.root(&self.root, &CELL_KEYS, &parts.required());
         walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
         let axes = sweep::axes(&self.root, self.path, overridden, &self.findings);
@@ -104,16 +104,16 @@ impl Loader<'_> {
     }
 
     /// The bands where nothing is wrong with them: otherwise their number may be absurd.
-    fn bands(&self) -> Option<Bands> {
+    fn bands(&self) -> Option<BandsEntry> {
         self.root.get("bands")?;
-        let mut walk = Walk::new(&self.grammar, false);
+        let mut walk = SchemaWalk::new(&self.grammar, false);
         walk.entry(&self.root, "bands");
         let is_sound = walk.into_findings().is_empty();
         self.root.get("bands").filter(|_| is_sound).and_then(typed)
     }
 
     /// Rules of what all cells share.
-    fn shared_rules(&self, parts: Parts, axes: Option<&[SweepAxis]>) {
+    fn shared_rules(&self, parts: ExperimentParts, axes: Option<&[SweepAxis]>) {
         let at = At::new(&self.root, &self.findings);
         if let Some(name) = self.root.get("name").and_then(Node::as_str) {
             rules::experiment_name(at.to("name"), name);
@@ -154,8 +154,8 @@ impl Loader<'_> {
     }
 
     /// The walk and the rules of object, sensor and lights in one cell.
-    fn cell_rules(&self, tree: &Node, bands: Option<&Bands>, lenient: bool) {
-        let mut walk = Walk::new(&self.grammar, lenient);
+    fn cell_rules(&self, tree: &Node, bands: Option<&BandsEntry>, lenient: bool) {
+        let mut walk = SchemaWalk::new(&self.grammar, lenient);
         CELL_KEYS.iter().for_each(|key| walk.entry(tree, key));
         walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
         let at = At::new(tree, &self.findings);
@@ -173,7 +173,7 @@ impl Loader<'_> {
     }
 
     /// Object, sensor and lights of the cell at `points`.
-    fn cell_tree(&self, points: &[&Point]) -> Node {
+    fn cell_tree(&self, points: &[&AxisPoint]) -> Node {
         let mut tree = Node { value: Value::Table(Default::default()), ..self.bare_root() };
         if let (Value::Table(entries), Value::Table(all)) = (&mut tree.value, &self.root.value) {
             let kept = all.iter().filter(|(key, _)| CELL_KEYS.contains(&key.as_str()));
@@ -225,7 +225,7 @@ fn typed<T: DeserializeOwned>(node: &Node) -> Option<T> {
     serde_json::from_value(node.to_json()).ok()
 }
 
-fn cell(tree: &Node, axes: &[SweepAxis], points: &[&Point]) -> Option<CellSpec> {
+fn cell(tree: &Node, axes: &[SweepAxis], points: &[&AxisPoint]) -> Option<CellSpec> {
     let labels: Vec<&str> = points.iter().map(|point| point.label.as_str()).collect();
     let mut csv_row = std::collections::BTreeMap::new();
     for (name, column) in points.iter().flat_map(|point| &point.columns) {

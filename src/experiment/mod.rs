@@ -82,6 +82,9 @@ pub mod sweep;
 /// Rows from a CSV file.
 mod sweep_csv;
 
+/// Axes and points as types.
+mod sweep_point;
+
 /// The walk along the schema.
 pub mod validate;
 
@@ -101,7 +104,8 @@ pub struct Experiment {
     /// Name, seed, bands, estimators, pairing, budget, claims and display of all cells; object, sensor
     /// and lights of the first. Sweeps stand in it as rows, CSV files read; settings are applied.
     pub file: ExperimentFile,
-    /// The cells, the last axis fastest. Without a sweep there is one, labelled `base`; without a scene, none.
+    /// The cells, the last axis fastest. Without a sweep there is one, labelled `base`; without a scene,
+    /// none.
     pub cells: Vec<CellSpec>,
     /// The axes of the sweep.
     pub axes: Vec<Axis>,

@@ -35,7 +35,7 @@ pub struct ExperimentFile {
     pub fresh: Option<String>,
     /// The wavelength bands; each is rendered by itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bands: Option<Bands>,
+    pub bands: Option<BandsEntry>,
     /// The body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<Object>,
@@ -55,7 +55,7 @@ pub struct ExperimentFile {
     pub sweep: Vec<Sweep>,
     /// Cells that share random streams.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pair: Option<Pair>,
+    pub pair: Option<PairEntry>,
     /// How much work.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<Budget>,
@@ -85,7 +85,7 @@ pub struct ExperimentFile {
 /// The wavelength bands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Bands {
+pub enum BandsEntry {
     /// Three bands R, G, B without wavelengths.
     Rgb {},
     /// Equal bins over a range of wavelengths.
@@ -480,8 +480,8 @@ pub enum Sensor {
     },
     /// Radiant exitance of a `half_space` or `slab` by how far from the exit its light came in.
     ///
-    /// Of the top face, W/mm^2; the distance is taken along the face. Observables `ring_i`, and `all` of every ring and
-    /// beyond.
+    /// Of the top face, W/mm^2; the distance is taken along the face. Observables `ring_i`, and `all` of
+    /// every ring and beyond.
     Rings {
         /// Edges of the rings, mm, increasing from 0 or more.
         #[schemars(length(min = 2, max = 1025))]
@@ -586,7 +586,8 @@ pub struct EstimatorEntry {
 }
 
 /// One sampler: a unique `name` and exactly one kind with its options, as
-/// `henyey_greenstein = { g = 0.9 }`. The kinds are those that the program registers (`scatterproof list`).
+/// `henyey_greenstein = { g = 0.9 }`. The kinds are those that the program registers (`scatterproof
+/// list`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SamplerEntry {
     /// Name in tables and claims, unique.
@@ -673,7 +674,7 @@ pub struct SweepCsv {
 /// Cells that differ only in these keys are played on the same random streams.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Pair {
+pub struct PairEntry {
     /// Dotted keys left out of the streams' key, as `object.shape`.
     #[schemars(length(min = 1))]
     pub over: Vec<String>,

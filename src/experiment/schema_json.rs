@@ -1,5 +1,5 @@
-//! The complete JSON Schemas of experiment files, estimators and samplers included: what editors complete
-//! from, what `scatterproof schema` prints, and what validation walks.
+//! The complete JSON Schemas of experiment files, estimators and samplers included: what editors
+//! complete from, what `scatterproof schema` prints, and what validation walks.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -7,8 +7,8 @@ use super::registry::Registry;
 use super::rules::{SAMPLER_KEYS, SCENE_KEYS};
 use super::schema::ExperimentFile;
 
-/// The JSON Schema (2020-12) of an experiment file whose estimators and samplers are those of `registry`, as
-/// validation walks it.
+/// The JSON Schema (2020-12) of an experiment file whose estimators and samplers are those of
+/// `registry`, as validation walks it.
 pub fn json_schema(registry: &Registry) -> Json {
     let mut schema = schemars::schema_for!(ExperimentFile).to_value();
     schema["title"] = json!("scatterproof experiment");
@@ -19,7 +19,8 @@ pub fn json_schema(registry: &Registry) -> Json {
     schema
 }
 
-/// The same for editors, which keys belong together included: a scene with estimators, or samplers, or both.
+/// The same for editors, which keys belong together included: a scene with estimators, or samplers, or
+/// both.
 pub fn editor_schema(registry: &Registry) -> Json {
     let mut schema = json_schema(registry);
     let parts = [&SCENE_KEYS[..], &SAMPLER_KEYS];
@@ -30,8 +31,8 @@ pub fn editor_schema(registry: &Registry) -> Json {
 }
 
 /// Completes the definition `name` of one entry: its name and exactly one registered kind, of which a
-/// line of documentation and the schema of the options are given. What the options define stands at the root
-/// under names that begin with `prefix` and the kind.
+/// line of documentation and the schema of the options are given. What the options define stands at the
+/// root under names that begin with `prefix` and the kind.
 fn inject(name: &str, prefix: &str, kinds: Vec<(&'static str, &'static str, Json)>, schema: &mut Json) {
     let mut entry = schema["$defs"][name].clone();
     let required = kinds.iter().map(|(kind, ..)| json!({ "required": [kind] })).collect::<Vec<_>>();

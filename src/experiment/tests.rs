@@ -13,20 +13,20 @@ use crate::error::Error;
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[allow(dead_code)]
-struct Options {
+struct TestOptions {
     /// The longest path.
     #[serde(default)]
     #[schemars(range(min = 1))]
     max_bounces: Option<u32>,
     /// How it samples.
     #[serde(default)]
-    strategy: Option<Strategy>,
+    strategy: Option<TestStrategy>,
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[allow(dead_code)]
-enum Strategy {
+enum TestStrategy {
     /// All of them.
     All,
     /// None of them.
@@ -36,7 +36,7 @@ enum Strategy {
 /// The registry of the tests: `path` and `snee`.
 pub fn registry() -> Registry {
     let entry = |kind, doc| {
-        let options_schema = || schemars::schema_for!(Options);
+        let options_schema = || schemars::schema_for!(TestOptions);
         let build = |_: &_, _| Err(crate::error::Error::input("never built"));
         RegistryEntry { kind, doc, options_schema, build }
     };

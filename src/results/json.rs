@@ -6,7 +6,8 @@ use serde::Serialize;
 /// that reads back as the same f64. Numbers that are not finite become `null`.
 ///
 /// # Panics
-/// On a type that has no JSON (a map whose keys are no texts): a mistake in the program, and no input makes it.
+/// On a type that has no JSON (a map whose keys are no texts): a mistake in the program, and no input
+/// makes it.
 pub fn canonical(value: &impl Serialize) -> String {
     // serde_json::Value keeps its keys in a BTreeMap, so the detour sorts structs and maps alike.
     let value =

@@ -105,6 +105,14 @@ impl Stored {
         (band < bands).then(|| (0..batches).map(row).collect())
     }
 
+    /// The bins that stand at `path`.
+    pub fn bins(&self, path: &str) -> Option<Bins<'_>> {
+        let array = self.arrays.get(path)?;
+        let n = array.data.len() / 3;
+        let row = |i: usize| &array.data[i * n..(i + 1) * n];
+        (array.shape.first() == Some(&3)).then(|| Bins { observed: row(0), mass: row(1), bound: row(2) })
+    }
+
     /// What does not fit together, as a sentence.
     fn defect(&self) -> Option<String> {
         let bands = self.record.bands.len();
@@ -128,8 +136,33 @@ impl Stored {
                 return Some(format!("the spread of {} has shape {shape:?}", run.estimator));
             }
         }
-        super::sampler::defect(&self.record, &self.arrays)
+        sampler_defect(&self.record, &self.arrays)
     }
+}
+
+/// Bins of a run: one row each of what was counted, masses, bounds.
+#[derive(Clone, Copy, Debug)]
+pub struct Bins<'a> {
+    /// Draws, or pairs.
+    pub observed: &'a [f64],
+    /// Masses, which sum to 1 where the density is one.
+    pub mass: &'a [f64],
+    /// Bounds of the errors of the masses.
+    pub bound: &'a [f64],
+}
+
+/// What does not fit together in the record of a sampler, as a sentence.
+fn sampler_defect(record: &Record, arrays: &Arrays) -> Option<String> {
+    record.samplers.iter().find_map(|run| {
+        let paths = [Some(&run.coarse), run.fine.as_ref(), run.serial.as_ref()];
+        let wrong = |array: Option<&Array>| match array.map(|a| &a.shape[..]) {
+            Some([3, n]) => *n == 0,
+            Some([3, a, b]) => a != b || *a == 0,
+            _ => true,
+        };
+        let bad = paths.into_iter().flatten().find(|path| wrong(arrays.get(*path)))?;
+        Some(format!("bins of {} have no usable array at {bad}", run.sampler))
+    })
 }
 
 /// The folder of one experiment's results.
@@ -265,13 +298,14 @@ impl RecordFolder {
         atomic::write(&path, bytes, "write results")
     }
 
-    /// Removes a folder of views beside the record, so that none of an earlier record stays among those of this one.
+    /// Removes a folder of views beside the record, so that none of an earlier record stays among those
+    /// of this one.
     pub fn clear_views(&self, name: &str) -> Result<()> {
         remove_folder(&self.root.join(name), "remove the views of an earlier record")
     }
 
-    /// Removes the pictures of an earlier record from `images/`: what begins with the number of a cell or `split-`,
-    /// as every picture of a report does.
+    /// Removes the pictures of an earlier record from `images/`: what begins with the number of a cell
+    /// or `split-`, as every picture of a report does.
     pub fn clear_pictures(&self) -> Result<()> {
         let folder = self.root.join("images");
         let Ok(entries) = fs::read_dir(&folder) else { return Ok(()) };

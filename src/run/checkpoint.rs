@@ -1,10 +1,10 @@
 //! States of jobs on disk, so that a run goes on where it was stopped and nothing is computed twice.
 //!
-//! One file a job, named by its identity: a header in JSON, the numbers as little-endian f64, and a blake3 of
-//! both. A file that does not fit (another job, truncated, damaged) is as good as none. A state holds what a
-//! larger budget goes on from and which claims stood before the first pass: of an estimator at most
-//! 128 batches of 40 bytes per observable and band, and an image of 16 bytes per pixel and band for each bit
-//! that is set in the number of passes; of a sampler its counts.
+//! One file a job, named by its identity: a header in JSON, the numbers as little-endian f64, and a
+//! blake3 of both. A file that does not fit (another job, truncated, damaged) is as good as none. A
+//! state holds what a larger budget goes on from and which claims stood before the first pass: of an
+//! estimator at most 128 batches of 40 bytes per observable and band, and an image of 16 bytes per pixel
+//! and band for each bit that is set in the number of passes; of a sampler its counts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -80,8 +80,8 @@ pub fn prepare(root: &Path) -> Result<()> {
     atomic::sweep(&folder(root))
 }
 
-/// The record is complete: no larger budget goes on from the states of jobs other than these. Of those remains
-/// what stood before their first pass, because their passes were seen.
+/// The record is complete: no larger budget goes on from the states of jobs other than these. Of those
+/// remains what stood before their first pass, because their passes were seen.
 pub fn reduce_others<'a>(root: &Path, identities: impl Iterator<Item = &'a str>) -> Result<()> {
     let kept: Vec<String> = identities.map(name).collect();
     let folder = folder(root);
@@ -131,8 +131,8 @@ fn read<T: DeserializeOwned>(path: &Path) -> Option<(Header<T>, Vec<f64>)> {
     Some((header, numbers))
 }
 
-/// What stood before the first passes or draws of a job's state, whether or not the job can go on from it:
-/// they were seen.
+/// What stood before the first passes or draws of a job's state, whether or not the job can go on from
+/// it: they were seen.
 pub fn start(path: &Path, identity: &str) -> Option<Start> {
     load::<IgnoredAny>(path, identity).map(|(header, _)| header.start)
 }

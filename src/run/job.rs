@@ -1,4 +1,5 @@
-//! Units of work: an estimator in a cell, or a sampler; and the passes of an estimator with what they leave.
+//! Units of work: an estimator in a cell, or a sampler; and the passes of an estimator with what they
+//! leave.
 
 use std::time::Instant;
 
@@ -16,7 +17,8 @@ use crate::stats::tree::{Counter, Merge};
 pub struct Job {
     /// What people call it: cell and estimator, or the sampler.
     pub label: String,
-    /// Hash of all that its result depends on except the number of passes, hex: its state is kept under it.
+    /// Hash of all that its result depends on except the number of passes, hex: its state is kept under
+    /// it.
     pub identity: String,
     /// What is to be done.
     pub task: Task,
@@ -98,9 +100,9 @@ pub struct Block {
     pub moments: Counter<Vec<Moments>>,
     /// Moments of `[pixel][band]`.
     pub pixels: Counter<ImageMoments>,
-    /// Moments of `[band]` over pairs of passes, kept by batch: the variance of a pixel as passes 2i and 2i + 1
-    /// show it ([`spread`]). Pairs are counted from pass 0, so that this too is the same for every cut into
-    /// blocks; empty without an image.
+    /// Moments of `[band]` over pairs of passes, kept by batch: the variance of a pixel as passes 2i and
+    /// 2i + 1 show it ([`spread`]). Pairs are counted from pass 0, so that this too is the same for
+    /// every cut into blocks; empty without an image.
     pub spread: Counter<Vec<Moments>>,
     /// Number of bands; 0 where no pass was run.
     pub bands: usize,
@@ -209,8 +211,8 @@ impl Block {
         self.work.nodes().iter().map(|node| node.value.cpu_seconds).sum()
     }
 
-    /// Pairs the image of the pass that comes next with that of the pass before it, where these two are a pair
-    /// and this block holds the first of them: its node has then merged with none.
+    /// Pairs the image of the pass that comes next with that of the pass before it, where these two are
+    /// a pair and this block holds the first of them: its node has then merged with none.
     fn pair_with(&mut self, next: &[f64]) {
         let is_second = !self.next_pass().is_multiple_of(2);
         if is_second && let Some(first) = self.pixels.nodes().last() {
@@ -295,8 +297,8 @@ impl Passes {
         self.layout.image().filter(|_| self.stage == Stage::Main)
     }
 
-    /// Runs passes `start..end`; only the run itself keeps an image. `stop` is asked between passes; a stopped
-    /// block is dropped whole.
+    /// Runs passes `start..end`; only the run itself keeps an image. `stop` is asked between passes; a
+    /// stopped block is dropped whole.
     pub fn run(
         &self,
         stage: Stage,

@@ -1,4 +1,5 @@
-//! From an experiment to jobs: every cell's scene, every estimator on it, every sampler, the streams of all.
+//! From an experiment to jobs: every cell's scene, every estimator on it, every sampler, the streams of
+//! all.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -249,8 +250,8 @@ pub fn build_all(experiment: &Experiment, registry: &Registry) -> Result<()> {
     experiment.file.sampler.iter().try_for_each(|words| build_sampler(words, registry).map(|_| ()))
 }
 
-/// What claims compare by CPU time: estimators that run side by side, and baselines that run twice, because
-/// the same estimator against itself shows what the machine adds.
+/// What claims compare by CPU time: estimators that run side by side, and baselines that run twice,
+/// because the same estimator against itself shows what the machine adds.
 struct Duels<'a> {
     /// Where, candidate, baseline.
     duels: Vec<(&'a BTreeMap<String, String>, &'a str, &'a str)>,

@@ -1,9 +1,9 @@
 //! Images on show while they are made: what is sent to a viewer, and when.
 //!
-//! The collector makes an image of what it has in order, from a copy: nothing here reaches a record. It does
-//! so at most twice a second, only where the one before is on its way, and for a twentieth of its time. A
-//! thread of its own sends, and one image waits at most: a viewer that is slow or hangs stalls nothing. A
-//! job's last image that finds the place taken is sent when all jobs are played.
+//! The collector makes an image of what it has in order, from a copy: nothing here reaches a record. It
+//! does so at most twice a second, only where the one before is on its way, and for a twentieth of its
+//! time. A thread of its own sends, and one image waits at most: a viewer that is slow or hangs stalls
+//! nothing. A job's last image that finds the place taken is sent when all jobs are played.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -92,7 +92,8 @@ impl Live {
         true
     }
 
-    /// Waits until no image waits, and none is under way where `all` are meant; false where that lasts too long.
+    /// Waits until no image waits, and none is under way where `all` are meant; false where that lasts
+    /// too long.
     fn wait(&self, until: Instant, all: bool) -> bool {
         let left = until.saturating_duration_since(Instant::now());
         let is_busy =
@@ -204,8 +205,8 @@ impl Show<'_> {
             .is_none_or(|size| self.live.offer(|| self.frame(job, size, &finished.image)))
     }
 
-    /// All jobs are played: sends the images of those that are `owed`. What there is to say, where some were
-    /// not sent.
+    /// All jobs are played: sends the images of those that are `owed`. What there is to say, where some
+    /// were not sent.
     pub fn close(&self, owed: &[(usize, &Finished)]) -> Option<String> {
         let until = Instant::now() + LAST_WAIT;
         let mut sent = 0;
@@ -226,8 +227,9 @@ impl Show<'_> {
         ))
     }
 
-    /// An image with the channels of the run's OpenEXR file. Their names end with the band, as tev reads a name
-    /// that begins with a digit (a bin of wavelengths) wrongly, and shows R, G, B of one head together.
+    /// An image with the channels of the run's OpenEXR file. Their names end with the band, as tev reads
+    /// a name that begins with a digit (a bin of wavelengths) wrongly, and shows R, G, B of one head
+    /// together.
     fn frame(&self, job: usize, (width, height): (usize, usize), image: &ImageMoments) -> Frame {
         let data = image.mean.iter().copied().chain(image.std_error()).collect();
         let pixels = Array::new(vec![2, height, width, self.bands.len()], data);

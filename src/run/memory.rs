@@ -21,9 +21,9 @@ impl MemoryEstimate {
     /// array beside it; and 128 batches of 5 moments per observable, likewise twice. A job under way
     /// holds one image per bit of its passes, and as much again while its state is written. Each thread
     /// holds the images of its block (sized by time: large images have blocks of a few passes) and one
-    /// more waits to be collected. Jobs that are timed side by side are under way together, and two batches
-    /// of each may wait for the turn of those before them. What an estimator needs for a pass it needs on each
-    /// thread.
+    /// more waits to be collected. Jobs that are timed side by side are under way together, and two
+    /// batches of each may wait for the turn of those before them. What an estimator needs for a pass it
+    /// needs on each thread.
     pub fn new(jobs: &[Job], shapes: usize, threads: usize, passes: Option<u64>) -> MemoryEstimate {
         let jobs: Vec<&Passes> = jobs.iter().filter_map(Job::passes).collect();
         let image = |job: &Passes| 16 * job.layout.pixels() * job.layout.bands();

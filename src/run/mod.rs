@@ -1,7 +1,7 @@
 //! Runs experiments: jobs from cells and estimators and from samplers, threads, checkpoints, the record.
 //!
-//! experiment -> jobs (scene + estimator + streams, or sampler + stream) -> blocks of passes, in any order, on any
-//! threads -> moments in the order of passes -> record, timing, provenance.
+//! experiment -> jobs (scene + estimator + streams, or sampler + stream) -> blocks of passes, in any
+//! order, on any threads -> moments in the order of passes -> record, timing, provenance.
 
 pub mod checkpoint;
 pub mod chi_square;
@@ -53,9 +53,9 @@ pub struct Options {
     pub block_passes: Option<u64>,
     /// No progress bar.
     pub quiet: bool,
-    /// Folder that holds a results folder per experiment, whose records say how many passes are run; without it the
-    /// budget does. A budget in seconds gives another number of passes each time that it is measured anew: this is
-    /// how such a record is reproduced bit for bit.
+    /// Folder that holds a results folder per experiment, whose records say how many passes are run;
+    /// without it the budget does. A budget in seconds gives another number of passes each time that it
+    /// is measured anew: this is how such a record is reproduced bit for bit.
     pub passes_of: Option<PathBuf>,
     /// A viewer that shows images while they are made.
     pub live: Option<Arc<Live>>,
@@ -188,8 +188,8 @@ fn replays(
     })
 }
 
-/// Whether the folder holds a record of exactly this experiment, its claims and pictures included, by this
-/// build.
+/// Whether the folder holds a record of exactly this experiment, its claims and pictures included, by
+/// this build.
 pub fn has_record(experiment: &Experiment, out: &Path) -> bool {
     let folder = RecordFolder::new(out.join(&experiment.file.name));
     let same_build =

@@ -9,8 +9,8 @@ use crate::stats::tree::batch_level;
 /// Passes of a block: coprime to every batch and unlike any size that a run would choose.
 const BLOCK: u64 = 7;
 
-/// Runs the first `passes` of a finished job again, rounded up to whole batches; nothing where `stop` was
-/// raised. The blocks are run last to first and joined in their order.
+/// Runs the first `passes` of a finished job again, rounded up to whole batches; nothing where `stop`
+/// was raised. The blocks are run last to first and joined in their order.
 pub fn replay(
     job: &Passes,
     finished: &Finished,

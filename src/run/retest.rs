@@ -23,8 +23,8 @@ pub struct SecondLook<'a> {
     pub factor: u64,
 }
 
-/// Measures again what `look` says, and writes the record into `retest/` beside the first. What an earlier
-/// call has measured is not measured again.
+/// Measures again what `look` says, and writes the record into `retest/` beside the first. What an
+/// earlier call has measured is not measured again.
 ///
 /// # Errors
 /// As [`super::run`].

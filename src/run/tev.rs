@@ -1,9 +1,10 @@
-//! What tev, a viewer of images, is told over TCP: the packets as bytes, and a connection that takes them.
+//! What tev, a viewer of images, is told over TCP: the packets as bytes, and a connection that takes
+//! them.
 //!
 //! The form is that of tev's own source (github.com/Tom94/tev: `IpcPacket` in `include/tev/Ipc.h` at
 //! 029022e, `src/Ipc.cpp` at 61253bf, `src/main.cpp` at 009e7c1). A packet
-//! is its own length in bytes (u32, these four included), a type (i8) and that type's fields. Integers are
-//! little-endian, truth is one byte, a text ends with a zero byte, pixels are f32.
+//! is its own length in bytes (u32, these four included), a type (i8) and that type's fields. Integers
+//! are little-endian, truth is one byte, a text ends with a zero byte, pixels are f32.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -190,7 +191,8 @@ impl Connection {
         })
     }
 
-    /// What is written after the viewer has gone is lost without a word, at first; that it has gone can be read.
+    /// What is written after the viewer has gone is lost without a word, at first; that it has gone can
+    /// be read.
     ///
     /// # Errors
     /// It has gone.

@@ -1,13 +1,14 @@
-//! Threads that run blocks of passes and draw from samplers, and the one place where results are put in order.
+//! Threads that run blocks of passes and draw from samplers, and the one place where results are put in
+//! order.
 //!
 //! Workers take the next run of passes from a shared source; the collector (the calling thread) appends
 //! finished blocks in the order of their passes, whatever the order in which they arrive. Blocks are
 //! sized by the time they take; the fixed tree over passes makes results independent of that size.
 //!
-//! Jobs that are timed side by side run by quadruples: one worker runs two batches of every arm in the order
-//! A B .. B A, so that whatever drifts steadily (clock rate, temperature, other load) adds the
-//! same to each arm. A worker's first quadruple of a group warms it up, and one of which an earlier process
-//! had played a part is not in that order: neither counts as timed (`Work::settled`).
+//! Jobs that are timed side by side run by quadruples: one worker runs two batches of every arm in the
+//! order A B .. B A, so that whatever drifts steadily (clock rate, temperature, other load) adds the
+//! same to each arm. A worker's first quadruple of a group warms it up, and one of which an earlier
+//! process had played a part is not in that order: neither counts as timed (`Work::settled`).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -142,8 +143,8 @@ struct Pool<'a> {
     queue: Mutex<Queue>,
 }
 
-/// Does every job and returns what came out in the order of the jobs. Where the run is interrupted, all states
-/// are saved first.
+/// Does every job and returns what came out in the order of the jobs. Where the run is interrupted, all
+/// states are saved first.
 pub fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed>> {
     let queue = Mutex::new(Queue { next_group: 0, active: None });
     let samplers = jobs.iter().filter(|job| job.draws().is_some()).count();
@@ -179,8 +180,8 @@ fn groups(jobs: &[Job]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Two batches of every arm in the order A B .. B A, without what is done already; and whether nothing of it
-/// was.
+/// Two batches of every arm in the order A B .. B A, without what is done already; and whether nothing
+/// of it was.
 fn quadruple(lanes: &[Lane], number: u64) -> (Vec<Span>, bool) {
     let span = |lane: &Lane, batch: u64| {
         let keep_level = batch_level(lane.passes);
@@ -262,8 +263,8 @@ impl Pool<'_> {
         sender.send(Message::Sampled { job: index, start, sampled, is_new }).ok()
     }
 
-    /// The claims that stood before the first pass or draw: those of an earlier state, whether or not the job
-    /// goes on from it.
+    /// The claims that stood before the first pass or draw: those of an earlier state, whether or not
+    /// the job goes on from it.
     fn claims(&self, earlier: Option<&Start>) -> Vec<String> {
         earlier.map_or_else(|| self.settings.claims.to_vec(), |start| start.claims.clone())
     }

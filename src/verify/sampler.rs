@@ -17,8 +17,8 @@
 use super::trial::{Claim, Evidence, Fit, Item, Trial};
 use super::verdict::Verdict;
 use crate::results::record::Record;
-use crate::results::sampler::{Bins, ContrastRun, Delta, NullMass, OWN_DENSITY, SamplerRun};
-use crate::results::store::Stored;
+use crate::results::sampler::{ContrastRun, Delta, NullMass, OWN_DENSITY, SamplerRun};
+use crate::results::store::{Bins, Stored};
 use crate::stats::goodness::{Bin, contrast, pearson, proportion};
 use crate::stats::hypothesis::Test;
 use crate::stats::moments::Moments;

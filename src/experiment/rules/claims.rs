@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{At, Parts};
+use super::{At, ExperimentParts};
 use crate::experiment::schema::{
     Budget, CONTROL, ClaimEntry, CostMeasure, Duel, Equals, Expect, SamplerClaim,
 };
@@ -12,7 +12,7 @@ use crate::experiment::sweep::SweepAxis;
 /// The names that claims may use.
 pub struct Known<'a> {
     /// What the experiment is made of.
-    pub parts: Parts,
+    pub parts: ExperimentParts,
     /// Names of estimators.
     pub estimators: Vec<&'a str>,
     /// Names of samplers.

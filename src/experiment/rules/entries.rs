@@ -17,7 +17,8 @@ pub fn experiment_name(at: At, name: &str) {
     }
 }
 
-/// The names of a list's entries are unique and of printable signs; `what` they are, in words: `estimators`.
+/// The names of a list's entries are unique and of printable signs; `what` they are, in words:
+/// `estimators`.
 pub fn names(at: At, entries: &Node, what: &str) {
     let mut seen = Vec::new();
     for (i, entry) in entries.items().iter().enumerate() {
@@ -46,14 +47,14 @@ const MORE_OF_SCENES: [&str; 3] = ["sweep", "pair", "picture"];
 
 /// What an experiment is made of.
 #[derive(Clone, Copy, Debug)]
-pub struct Parts {
+pub struct ExperimentParts {
     /// A scene with estimators.
     pub scene: bool,
     /// Samplers.
     pub samplers: bool,
 }
 
-impl Parts {
+impl ExperimentParts {
     /// The keys that must be there, except those that a sweep may supply.
     pub fn required(self) -> Vec<&'static str> {
         let of_scene = SCENE_KEYS.into_iter().filter(|key| self.scene && !CELL_KEYS.contains(key));
@@ -62,9 +63,9 @@ impl Parts {
 }
 
 /// What the experiment `root` is made of: of something, and what says more of a scene needs one.
-pub fn parts(at: At, root: &Node) -> Parts {
+pub fn parts(at: At, root: &Node) -> ExperimentParts {
     let has = |keys: &[&str]| keys.iter().any(|key| root.get(key).is_some());
-    let parts = Parts { scene: has(&SCENE_KEYS), samplers: has(&SAMPLER_KEYS) };
+    let parts = ExperimentParts { scene: has(&SCENE_KEYS), samplers: has(&SAMPLER_KEYS) };
     let quoted = [suggest::quoted(&SCENE_KEYS), suggest::quoted(&SAMPLER_KEYS)];
     if !parts.scene && !parts.samplers {
         at.report_help(

@@ -3,7 +3,7 @@
 use super::*;
 use crate::experiment::schema_json::json_schema;
 use crate::experiment::validate::grammar::Grammar;
-use crate::experiment::validate::{Walk, unsupported_keywords};
+use crate::experiment::validate::{SchemaWalk, unsupported_keywords};
 
 #[test]
 fn unknown_keys_are_named_with_what_was_meant() {
@@ -170,13 +170,13 @@ fn the_schema_holds_the_registered_kinds() {
     assert_eq!(entry["properties"]["path"]["description"], "Path tracing.");
     assert_eq!(entry["additionalProperties"], false);
     let strategy = &entry["properties"]["snee"]["properties"]["strategy"]["anyOf"][0]["$ref"];
-    assert_eq!(strategy, "#/$defs/snee.Strategy");
-    assert!(schema["$defs"]["snee.Strategy"].is_object());
+    assert_eq!(strategy, "#/$defs/snee.TestStrategy");
+    assert!(schema["$defs"]["snee.TestStrategy"].is_object());
 
     let grammar = Grammar::new(schema);
     let findings = |text: &str| {
         let root = crate::experiment::document::parse("x.toml", text).expect("it is TOML");
-        let mut walk = Walk::new(&grammar, false);
+        let mut walk = SchemaWalk::new(&grammar, false);
         walk.root(&root, &[], &[]);
         walk.into_findings()
     };

@@ -14,8 +14,8 @@ pub mod grammar;
 
 use grammar::{Form, Grammar, Variant};
 
-/// The keywords of JSON Schema that the walk understands, and those that carry no rule for it: `pattern` is of
-/// names, of which the rules say more than a pattern can.
+/// The keywords of JSON Schema that the walk understands, and those that carry no rule for it: `pattern`
+/// is of names, of which the rules say more than a pattern can.
 const KEYWORDS: [&str; 24] = [
     "$defs",
     "$ref",
@@ -44,17 +44,17 @@ const KEYWORDS: [&str; 24] = [
 ];
 
 /// The findings of a walk.
-pub struct Walk<'a> {
+pub struct SchemaWalk<'a> {
     grammar: &'a Grammar,
     findings: Vec<Diagnostic>,
     /// Whether keys may be missing (where a sweep that is itself at fault might supply them).
     lenient: bool,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> SchemaWalk<'a> {
     /// A walk along `grammar`; `lenient` walks let required keys be missing.
-    pub fn new(grammar: &'a Grammar, lenient: bool) -> Walk<'a> {
-        Walk { grammar, findings: Vec::new(), lenient }
+    pub fn new(grammar: &'a Grammar, lenient: bool) -> SchemaWalk<'a> {
+        SchemaWalk { grammar, findings: Vec::new(), lenient }
     }
 
     /// Everything found so far.
@@ -243,8 +243,8 @@ impl<'a> Walk<'a> {
         if !number.is_finite() {
             return self.finite(node);
         }
-        type Rule = (&'static str, &'static str, fn(f64, f64) -> bool);
-        let rules: [Rule; 4] = [
+        type Bound = (&'static str, &'static str, fn(f64, f64) -> bool);
+        let rules: [Bound; 4] = [
             ("minimum", "at least", |x, bound| x >= bound),
             ("maximum", "at most", |x, bound| x <= bound),
             ("exclusiveMinimum", "greater than", |x, bound| x > bound),

@@ -1,4 +1,5 @@
-//! Chi-square tests of samplers: bins chosen by the density, their masses by quadrature, counts of draws.
+//! Chi-square tests of samplers: bins chosen by the density, their masses by quadrature, counts of
+//! draws.
 
 pub mod bins;
 pub mod count;
@@ -16,7 +17,7 @@ use crate::samplers::{Draw, Null, Sampler};
 use crate::sampling::stream::{Purpose, StreamKey};
 use crate::stats::moments::Moments;
 use bins::{Extra, Partition};
-use count::{Counting, Counts};
+use count::{Counting, DrawCounts};
 use quadrature::{Mass, Quadrature, ROUNDING};
 
 /// What one sampler gave.
@@ -162,7 +163,7 @@ struct Assembly<'a> {
     job: &'a Draws,
     partition: &'a Partition,
     masses: &'a [Mass],
-    counts: &'a Counts,
+    counts: &'a DrawCounts,
     total: Mass,
 }
 
