@@ -11,7 +11,7 @@ use scatterproof::experiment::schema::{SamplerClaim, SamplerEntry};
 use scatterproof::experiment::{Experiment, Registry};
 use scatterproof::results::store::{RecordFolder, Stored};
 use scatterproof::run::interrupt::Interrupt;
-use scatterproof::run::{Options, SecondLook, retest, run};
+use scatterproof::run::{Options, Remeasured, retest, run};
 use scatterproof::samplers::phase::HenyeyGreensteinSampler;
 use scatterproof::samplers::{Axis, Contrast, Discrete, Draw, Null, Piece, Sampler};
 use scatterproof::sampling::stream::Stream;
@@ -397,9 +397,9 @@ fn an_interrupted_run_goes_on() {
 }
 
 /// A sampler once more, four times as often.
-fn second_look<'a>(main: &'a Stored, name: &str) -> SecondLook<'a> {
+fn second_look<'a>(main: &'a Stored, name: &str) -> Remeasured<'a> {
     let (quantities, samplers) = (Vec::new(), vec![name.to_string()]);
-    SecondLook { main: &main.record, quantities, samplers, factor: 4 }
+    Remeasured { main: &main.record, quantities, samplers, factor: 4 }
 }
 
 #[test]

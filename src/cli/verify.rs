@@ -11,7 +11,7 @@ use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::{atomic, provenance};
 use crate::run::interrupt::Interrupt;
-use crate::run::{Options, SecondLook};
+use crate::run::{Options, Remeasured};
 use crate::verify::judge::{Case, Judgement, Looks, Measured, judge};
 use crate::verify::junit;
 use crate::verify::levels::{FAMILY_LEVEL, FIRST_LOOK, RETEST_FACTOR};
@@ -220,7 +220,7 @@ impl Court<'_> {
                 Measured::Sampler(name) => samplers.push(name.clone()),
             }
         }
-        let look = SecondLook { main, quantities, samplers, factor: RETEST_FACTOR };
+        let look = Remeasured { main, quantities, samplers, factor: RETEST_FACTOR };
         crate::run::retest(experiment, self.registry, &self.working, &self.interrupt, &look)
     }
 }

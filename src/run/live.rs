@@ -11,7 +11,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::job::{Block, Finished, Job, Passes};
-use super::tev::{Address, Connection, Frame};
+use super::tev::{Address, Connection, TevImage};
 use crate::results::image::Picture;
 use crate::results::npy::Array;
 use crate::results::record::Band;
@@ -41,7 +41,7 @@ struct Shared {
 /// What lies between the collector and the thread that sends.
 #[derive(Debug, Default)]
 struct Post {
-    waiting: Option<Frame>,
+    waiting: Option<TevImage>,
     is_sending: bool,
     /// Nothing can be sent any more, for this reason, which nobody has told yet.
     lost: Option<String>,
@@ -81,7 +81,7 @@ impl Live {
     }
 
     /// Puts an image where it is taken from, unless another one waits there.
-    fn offer(&self, frame: impl FnOnce() -> Frame) -> bool {
+    fn offer(&self, frame: impl FnOnce() -> TevImage) -> bool {
         let is_free = |post: &Post| post.waiting.is_none() && !post.is_closed;
         if !is_free(&self.shared.post()) {
             return false;
@@ -129,7 +129,7 @@ impl Shared {
         }
     }
 
-    fn take(&self) -> Option<Frame> {
+    fn take(&self) -> Option<TevImage> {
         let is_idle = |post: &mut Post| post.waiting.is_none() && !post.is_closed;
         let post = self.changed.wait_while(self.post(), is_idle);
         let mut post = post.unwrap_or_else(PoisonError::into_inner);
@@ -145,7 +145,7 @@ type Format = (usize, usize, Vec<String>);
 /// Sends an image; first has it created, where the viewer has none of its name and shape.
 fn send(
     connection: &mut Connection,
-    frame: &Frame,
+    frame: &TevImage,
     created: &mut BTreeMap<String, Format>,
 ) -> io::Result<()> {
     let channels = frame.channels.iter().map(|(name, _)| name.clone()).collect();
@@ -230,7 +230,7 @@ impl Show<'_> {
     /// An image with the channels of the run's OpenEXR file. Their names end with the band, as tev reads
     /// a name that begins with a digit (a bin of wavelengths) wrongly, and shows R, G, B of one head
     /// together.
-    fn frame(&self, job: usize, (width, height): (usize, usize), image: &ImageMoments) -> Frame {
+    fn frame(&self, job: usize, (width, height): (usize, usize), image: &ImageMoments) -> TevImage {
         let data = image.mean.iter().copied().chain(image.std_error()).collect();
         let pixels = Array::new(vec![2, height, width, self.bands.len()], data);
         let picture = Picture::new(self.bands, &pixels);
@@ -246,7 +246,7 @@ impl Show<'_> {
             channels.push((format!("std_error.{}", band.name), std_error));
         }
         let name = self.jobs[job].label.replacen(" / ", "/", 1);
-        Frame { name: format!("{}/{name}", self.experiment), width, height, channels }
+        TevImage { name: format!("{}/{name}", self.experiment), width, height, channels }
     }
 }
 
@@ -270,8 +270,8 @@ mod tests {
         assert_eq!([1999, 2000].map(|ms| pace(100).is_due(after(ms))), [false, true]);
     }
 
-    fn frame(name: &str) -> Frame {
-        Frame { name: name.into(), width: 1, height: 1, channels: vec![("R".into(), vec![0.5])] }
+    fn frame(name: &str) -> TevImage {
+        TevImage { name: name.into(), width: 1, height: 1, channels: vec![("R".into(), vec![0.5])] }
     }
 
     // No thread sends: the first image waits, the second is not even made.

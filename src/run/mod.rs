@@ -40,7 +40,7 @@ use workers::Completed;
 
 pub use jobs::{Plan, build_all, plan};
 pub use pilot::estimate_seconds;
-pub use retest::{SecondLook, retest};
+pub use retest::{Remeasured, retest};
 
 /// How to run; nothing here changes a result.
 #[derive(Clone, Debug)]

@@ -12,7 +12,7 @@ use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 
 /// What is measured again.
-pub struct SecondLook<'a> {
+pub struct Remeasured<'a> {
     /// The record of the first look.
     pub main: &'a Record,
     /// Quantities of estimators: all that their run measures.
@@ -33,7 +33,7 @@ pub fn retest(
     registry: &Registry,
     options: &Options,
     interrupt: &Interrupt,
-    look: &SecondLook,
+    look: &Remeasured,
 ) -> Result<Stored> {
     let mut plan = plan_stage(experiment, registry, Stage::Retest)?;
     plan.jobs.retain(|job| match &job.task {

@@ -63,7 +63,7 @@ impl fmt::Display for Address {
 
 /// An image as a viewer shows it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
+pub struct TevImage {
     /// Under which it is shown.
     pub name: String,
     /// Pixels per row.
@@ -74,7 +74,7 @@ pub struct Frame {
     pub channels: Vec<(String, Vec<f32>)>,
 }
 
-impl Frame {
+impl TevImage {
     /// Has the viewer show an empty image of this name, size and channels; `is_focus` selects it there.
     pub fn create(&self, is_focus: bool) -> Vec<u8> {
         let mut packet = Packet::new(CREATE_IMAGE, is_focus, &self.name);
@@ -212,10 +212,10 @@ impl Connection {
 mod tests {
     use super::*;
 
-    fn frame(width: usize, height: usize, channels: usize) -> Frame {
+    fn frame(width: usize, height: usize, channels: usize) -> TevImage {
         let values = |c: usize| (0..width * height).map(|i| (c * 1000 + i) as f32).collect();
         let channels = (0..channels).map(|c| (format!("c{c}"), values(c))).collect();
-        Frame { name: "a/b".into(), width, height, channels }
+        TevImage { name: "a/b".into(), width, height, channels }
     }
 
     // Written out by hand from tev's `setCreateImage`.

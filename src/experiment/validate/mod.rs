@@ -12,7 +12,7 @@ use crate::error::{Diagnostic, Place};
 /// A JSON Schema as the grammar of a file.
 pub mod grammar;
 
-use grammar::{Form, Grammar, Variant};
+use grammar::{Grammar, SchemaForm, Variant};
 
 /// The keywords of JSON Schema that the walk understands, and those that carry no rule for it: `pattern`
 /// is of names, of which the rules say more than a pattern can.
@@ -88,16 +88,18 @@ impl<'a> SchemaWalk<'a> {
     /// Checks `node`, which stands at the dotted `path`, along `schema`.
     pub fn node(&mut self, node: &Node, schema: &Json, path: &str) {
         match self.grammar.form(schema) {
-            Form::Anything => self.finite(node),
-            Form::Choice(alternatives) => {
+            SchemaForm::Anything => self.finite(node),
+            SchemaForm::Choice(alternatives) => {
                 match alternatives.iter().find(|a| self.accepts(a, &node.value)) {
                     Some(alternative) => self.node(node, alternative, path),
                     None => self.wrong_type(node, schema),
                 }
             }
-            Form::Variants(variants) => self.variants(node, schema, &variants, path),
-            Form::Plain(plain) if !self.accepts(plain, &node.value) => self.wrong_type(node, plain),
-            Form::Plain(plain) => match &node.value {
+            SchemaForm::Variants(variants) => self.variants(node, schema, &variants, path),
+            SchemaForm::Plain(plain) if !self.accepts(plain, &node.value) => {
+                self.wrong_type(node, plain)
+            }
+            SchemaForm::Plain(plain) => match &node.value {
                 Value::Table(entries) => self.table(node, entries, plain, path),
                 Value::Array(items) => self.array(node, items, plain, path),
                 Value::String(text) => self.string(node, text, plain),
@@ -127,9 +129,11 @@ impl<'a> SchemaWalk<'a> {
     /// The JSON types that a schema accepts.
     fn types<'b>(&'b self, schema: &'b Json) -> Vec<&'b str> {
         match self.grammar.form(schema) {
-            Form::Anything => vec!["boolean", "integer", "number", "string", "array", "object"],
-            Form::Choice(alternatives) => alternatives.iter().flat_map(|a| self.types(a)).collect(),
-            Form::Variants(variants) => {
+            SchemaForm::Anything => vec!["boolean", "integer", "number", "string", "array", "object"],
+            SchemaForm::Choice(alternatives) => {
+                alternatives.iter().flat_map(|a| self.types(a)).collect()
+            }
+            SchemaForm::Variants(variants) => {
                 let mut types = Vec::new();
                 if variants.iter().any(|v| v.content.is_none()) {
                     types.push("string");
@@ -139,7 +143,7 @@ impl<'a> SchemaWalk<'a> {
                 }
                 types
             }
-            Form::Plain(plain) => match &plain["type"] {
+            SchemaForm::Plain(plain) => match &plain["type"] {
                 Json::String(name) => vec![name],
                 list => grammar::strings(Some(list)),
             },
