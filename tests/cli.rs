@@ -40,7 +40,7 @@ fn words_and_types() {
     bad(
         "name = \"x\"",
         "name = \"../x\"",
-        &["`../x` has a wrong form", "x.toml:1:8", "letters, digits"],
+        &["`../x` cannot name a folder", "x.toml:1:8", "letters, digits"],
     );
 }
 
@@ -288,4 +288,41 @@ fn reproduce_refuses_what_is_not_published() {
         .complains("snee-matrix");
     work.shell(&format!("'{script}' --fast")).exits(2).complains("no option --fast");
     work.shell(&format!("'{script}' --help")).exits(0).says("whether the record is byte-identical");
+}
+
+/// A name is never a path: separators and control characters are refused, and a record's files are numbered.
+#[test]
+fn names_of_estimators_are_no_paths() {
+    for name in ["snee/guided", "a/../../../x", "a\\\\b", "a\\nb"] {
+        let named = format!("name = \"{name}\"");
+        bad("name = \"mis\"", &named, &["the name ", " contains ", "x.toml:16:8", "leave out"]);
+    }
+    let work = Work::with(&edit("name = \"mis\"", "name = \"mean, as (published)\""));
+    work.run("check x.toml").exits(0);
+    work.run("run x.toml -q --set budget.passes=2").exits(0);
+    assert!(work.path("results/x/record/cells/000/000.pixels.npy").exists());
+    assert!(work.path("results/x/images/000-000.mean-as-published.png").exists());
+    assert!(work.path("results/x/images/000-analog.png").exists());
+    // Under another name, no picture of the old one remains.
+    work.write("x.toml", &edit("name = \"mis\"", "name = \"two\""));
+    work.run("run x.toml -q --set budget.passes=2").exits(0);
+    assert!(!work.path("results/x/images/000-000.mean-as-published.png").exists());
+    assert!(work.path("results/x/images/000-two.exr").exists());
+}
+
+/// A scene and samplers in one file: one run, one record, one verdict.
+#[test]
+fn a_file_may_have_a_scene_and_samplers() {
+    let more = "[[sampler]]\nname = \"hg\"\nhenyey_greenstein = { g = 0.5 }\n[[claim]]\nsampler = {}\n\
+                [[claim]]\nagree = { estimators = [\"mis\", \"analog\"], detect = 0.9 }\n";
+    let text = edit("budget.passes = 100", "budget.passes = 128\nsamples = 20000") + more;
+    let work = Work::with(&text);
+    let words = "1 cell, 2 estimators, 3 bands, 1 sampler, 20000 draws each, 2 claims";
+    work.run("check x.toml").exits(0).says(words);
+    work.run("plan x.toml --dry").exits(0).says("2 measurements").says("1 sampler");
+    work.run("verify x.toml -q --verbose").says("chi2 coarse").says("agree");
+    assert!(work.path("results/x/record/cells/000/001.observables.npy").exists());
+    assert!(work.path("results/x/record/samplers/000.coarse.npy").exists());
+    let nothing = Work::with("name = \"x\"\n");
+    nothing.run("check x.toml").exits(2).complains("nothing is measured").complains("samplers take");
 }

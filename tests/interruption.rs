@@ -32,7 +32,12 @@ fn passes(work: &Work) -> Vec<u64> {
     };
     let mut states = work.files("results/x/state");
     states.retain(|name, _| name.ends_with(".state"));
-    let count = |bytes: Vec<u8>| header(bytes)["tally"]["passes"].as_u64().expect("a count");
+    let level = |node: &serde_json::Value| node[0].as_u64().expect("a level");
+    let count = |bytes: Vec<u8>| -> u64 {
+        let header = header(bytes);
+        let nodes = header["content"]["moments"].as_array().expect("nodes");
+        nodes.iter().map(|node| 1 << level(node)).sum()
+    };
     let mut passes: Vec<u64> = states.into_values().map(count).collect();
     passes.sort_unstable();
     passes

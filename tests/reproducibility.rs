@@ -31,14 +31,14 @@ fn json(files: &Files) -> Value {
     serde_json::from_slice(&files["record.json"]).expect("JSON")
 }
 
-/// Gate bytes by what was measured: hash of the cell's content and estimator.
+/// Bytes of the observables by what was measured: hash of the cell's content and estimator.
 fn observables(files: &Files) -> BTreeMap<(String, String), Vec<u8>> {
     let text = |value: &Value| value.as_str().expect("a text").to_string();
     let mut observables = BTreeMap::new();
     for cell in json(files)["cells"].as_array().expect("cells") {
         for run in cell["runs"].as_array().expect("runs") {
             let key = (text(&cell["content_hash"]), text(&run["estimator"]));
-            let before = observables.insert(key, files[&text(&run["observables"])].clone());
+            let before = observables.insert(key, files[&text(&run["moments"])].clone());
             assert!(before.is_none(), "two cells are the same");
         }
     }
@@ -116,7 +116,7 @@ fn what_names_the_streams_and_what_does_not() {
     let numbers = |old: &str, new: &str| arrays(&fresh(&replaced(&probe(), old, new)));
     for (old, new) in [("seed = 7", "seed = 8"), ("name = \"mis\"", "name = \"path\"")] {
         let other = numbers(old, new);
-        let mis = &arrays(&base)["cells/000/mis.observables.npy"];
+        let mis = &arrays(&base)["cells/000/000.observables.npy"];
         assert!(other.values().all(|bytes| bytes != mis), "{new} changes the numbers");
     }
     let claim = "seed = 7\ndescription = \"something\"\ndisplay.exposure_stops = 2\n\
@@ -127,7 +127,8 @@ fn what_names_the_streams_and_what_does_not() {
         let entries: Vec<&str> = tail.split("[[estimator]]").collect();
         format!("{head}[[estimator]]{}[[estimator]]{}", entries[1], entries[0])
     };
-    assert_eq!(arrays(&fresh(&reversed)), arrays(&fresh(IMAGE)), "the order of the estimators");
+    let (forward, backward) = (observables(&fresh(IMAGE)), observables(&fresh(&reversed)));
+    assert_eq!(forward, backward, "the order of the estimators");
 }
 
 /// The same boundary in two forms: cells that differ in their words alone.
@@ -144,11 +145,11 @@ fn boundaries(more: &str) -> String {
 fn paired_cells_share_their_streams() {
     for (more, is_paired) in [("", false), ("[pair]\nover = [\"object.boundary\"]\n", true)] {
         let files = fresh(&boundaries(more));
-        for name in ["mis", "analog"] {
+        for run in [0, 1] {
             for kind in ["observables", "pixels"] {
                 let [grey, bands] =
-                    [0, 1].map(|cell| &files[&format!("cells/{cell:03}/{name}.{kind}.npy")]);
-                assert_eq!(grey == bands, is_paired, "{name} {kind}");
+                    [0, 1].map(|cell| &files[&format!("cells/{cell:03}/{run:03}.{kind}.npy")]);
+                assert_eq!(grey == bands, is_paired, "{run} {kind}");
             }
         }
         assert_ne!(json(&files)["cells"][0]["content_hash"], json(&files)["cells"][1]["content_hash"]);
@@ -157,7 +158,7 @@ fn paired_cells_share_their_streams() {
     }
     // Paired over something else, they do not.
     let files = fresh(&boundaries("[pair]\nover = [\"object.shape\"]\n"));
-    assert_ne!(files["cells/000/mis.observables.npy"], files["cells/001/mis.observables.npy"]);
+    assert_ne!(files["cells/000/000.observables.npy"], files["cells/001/000.observables.npy"]);
 }
 
 /// The furnace of `init`, whose claim holds, in 64 passes of one estimator and without its claim.

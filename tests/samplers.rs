@@ -1,18 +1,16 @@
 //! Experiments on samplers, from the file to verdicts: what is right passes, and each planted defect is
 //! found by the test that is there for it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use scatterproof::experiment::Registry;
-use scatterproof::experiment::sampler_file::{
-    SamplerClaim, SamplerClaimEntry, SamplerEntry, SamplerExperiment, SamplerFile,
-};
+use scatterproof::experiment::schema::{SamplerClaim, SamplerEntry};
+use scatterproof::experiment::{Experiment, Registry};
 use scatterproof::results::store::{RecordFolder, Stored};
 use scatterproof::run::interrupt::Interrupt;
-use scatterproof::run::{Options, samplers};
+use scatterproof::run::{Options, Remeasured, retest, run};
 use scatterproof::samplers::SamplerKind;
 use scatterproof::samplers::phase::HenyeyGreensteinSampler;
 use scatterproof::samplers::{Contrast, Coordinate, Discrete, Draw, Null, Piece, Sampler};
@@ -177,31 +175,31 @@ fn registry() -> Registry {
     Registry { samplers: vec![phase, mixture], ..Registry::default() }
 }
 
-fn experiment(name: &str, samples: u64, entries: &[(&str, &str, Value)]) -> SamplerExperiment {
+fn experiment(name: &str, samples: u64, entries: &[(&str, &str, Value)]) -> Experiment {
     let entry = |(name, kind, options): &(&str, &str, Value)| SamplerEntry {
         name: name.to_string(),
         kind: BTreeMap::from([(kind.to_string(), options.clone())]),
     };
-    let claim = SamplerClaimEntry { name: None, expect: None, sampler: SamplerClaim::default() };
-    let file = SamplerFile {
-        name: name.into(),
-        description: None,
-        fresh: None,
-        samples,
-        sampler: entries.iter().map(entry).collect(),
-        claim: vec![claim],
-        setting: BTreeMap::new(),
-    };
-    SamplerExperiment { path: PathBuf::new(), file, settings: Vec::new(), origins: Vec::new() }
+    let sampler: Vec<SamplerEntry> = entries.iter().map(entry).collect();
+    let file =
+        json!({ "name": name, "samples": samples, "sampler": sampler, "claim": [{ "sampler": {} }] });
+    Experiment {
+        path: PathBuf::new(),
+        file: serde_json::from_value(file).expect("an experiment"),
+        cells: Vec::new(),
+        axes: Vec::new(),
+        settings: Vec::new(),
+        origins: Vec::new(),
+    }
 }
 
 fn options(out: &Path, threads: usize) -> Options {
     Options { threads, quiet: true, ..Options::new(out) }
 }
 
-fn ran(experiment: &SamplerExperiment) -> Stored {
+fn ran(experiment: &Experiment) -> Stored {
     let folder = tempfile::tempdir().expect("a folder");
-    let run = samplers::run(experiment, &registry(), &options(folder.path(), 1), &Interrupt::default());
+    let run = run(experiment, &registry(), &options(folder.path(), 1), &Interrupt::default());
     run.unwrap_or_else(|error| panic!("{error}")).1
 }
 
@@ -313,7 +311,7 @@ fn a_control_passes_where_it_differs_and_detect_may_ask_too_much() {
     wrong.file.claim[0].expect = Some(scatterproof::experiment::schema::Expect::Differs);
     assert_eq!(find(&judge_alone(&ran(&wrong)), "chi2 coarse").outcome, Outcome::Pass);
     let mut fine = experiment("fine", 10_000, &[("it", "phase", json!({ "g": 0.4 }))]);
-    fine.file.claim[0].sampler.detect = Some(1e-3);
+    fine.file.claim[0].sampler = Some(SamplerClaim { detect: Some(1e-3), ..SamplerClaim::default() });
     assert_eq!(red(&judge_alone(&ran(&fine))), ["chi2 coarse: underpowered"]);
 }
 
@@ -371,7 +369,7 @@ fn records_do_not_depend_on_threads_or_on_what_was_kept() {
     for threads in [1, 2, 7] {
         let folder = tempfile::tempdir().expect("a folder");
         let go = || {
-            samplers::run(&made, &registry(), &options(folder.path(), threads), &Interrupt::default())
+            run(&made, &registry(), &options(folder.path(), threads), &Interrupt::default())
                 .unwrap_or_else(|error| panic!("{error}"));
         };
         go();
@@ -394,11 +392,16 @@ fn an_interrupted_run_goes_on() {
     let made = experiment("stopped", 50_000, &[("hg", "phase", json!({ "g": 0.7 }))]);
     let interrupt = Interrupt::default();
     interrupt.raise();
-    let stopped = samplers::run(&made, &registry(), &options(folder.path(), 2), &interrupt);
+    let stopped = run(&made, &registry(), &options(folder.path(), 2), &interrupt);
     assert_eq!(stopped.err().map(|error| error.exit_code()), Some(130));
     assert!(!RecordFolder::new(folder.path().join("stopped")).exists());
-    samplers::run(&made, &registry(), &options(folder.path(), 2), &Interrupt::default())
-        .expect("a record");
+    run(&made, &registry(), &options(folder.path(), 2), &Interrupt::default()).expect("a record");
+}
+
+/// A sampler once more, four times as often.
+fn second_look<'a>(main: &'a Stored, name: &str) -> Remeasured<'a> {
+    let (quantities, samplers) = (Vec::new(), vec![name.to_string()]);
+    Remeasured { main: &main.record, quantities, samplers, factor: 4 }
 }
 
 #[test]
@@ -407,9 +410,9 @@ fn a_second_look_has_streams_of_its_own_and_more_draws() {
     let entries = [("hg", "phase", json!({ "g": 0.7 })), ("mix", "mixture", json!({}))];
     let made = experiment("twice", 20_000, &entries);
     let (options, interrupt) = (options(folder.path(), 2), Interrupt::default());
-    let (_, main) = samplers::run(&made, &registry(), &options, &interrupt).expect("a record");
-    let names = BTreeSet::from(["mix".to_string()]);
-    let again = samplers::retest(&made, &registry(), &options, &interrupt, &names, 4).expect("a record");
+    let (_, main) = run(&made, &registry(), &options, &interrupt).expect("a record");
+    let again = retest(&made, &registry(), &options, &interrupt, &second_look(&main, "mix"));
+    let again = again.expect("a record");
     let [run] = &again.record.samplers[..] else { panic!("one sampler") };
     assert_eq!(
         (run.sampler.as_str(), run.samples, again.record.stage.as_str()),
@@ -425,9 +428,8 @@ fn the_second_look_decides_what_the_first_cannot() {
         let made = experiment("looks", 20_000, &[("hg", "phase", json!({ "g": 0.7, "error": error }))]);
         let folder = tempfile::tempdir().expect("a folder");
         let (options, interrupt) = (options(folder.path(), 2), Interrupt::default());
-        let (_, main) = samplers::run(&made, &registry(), &options, &interrupt).expect("a record");
-        let names = BTreeSet::from(["hg".to_string()]);
-        let again = samplers::retest(&made, &registry(), &options, &interrupt, &names, 4);
+        let (_, main) = run(&made, &registry(), &options, &interrupt).expect("a record");
+        let again = retest(&made, &registry(), &options, &interrupt, &second_look(&main, "hg"));
         (main, again.expect("a record"))
     };
     let (_, sound) = look(0.0);
@@ -456,12 +458,12 @@ fn the_second_look_decides_what_the_first_cannot() {
 fn a_claim_that_comes_after_the_draws_is_no_evidence() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut made = experiment("late", 5_000, &[("hg", "phase", json!({ "g": 0.7 }))]);
-    let go = |made: &SamplerExperiment| {
-        let run = samplers::run(made, &registry(), &options(folder.path(), 1), &Interrupt::default());
+    let go = |made: &Experiment| {
+        let run = run(made, &registry(), &options(folder.path(), 1), &Interrupt::default());
         judge_alone(&run.expect("a record").1)
     };
     assert_eq!(red(&go(&made)), Vec::<String>::new());
-    made.file.claim[0].sampler.detect = Some(0.5);
+    made.file.claim[0].sampler = Some(SamplerClaim { detect: Some(0.5), ..SamplerClaim::default() });
     assert!(go(&made).iter().all(|v| matches!(v.outcome, Outcome::Invalid(_))));
 }
 
@@ -482,7 +484,11 @@ fn files_are_held_to_their_schema() {
         ("samples", "sampels", "x.toml:2:1", "did you mean `samples`?"),
         ("samples = 20000", "samples = 999", "x.toml:2:11", "must be at least 1000, is 999"),
         ("samples = 20000", "samples = 20000000000", "x.toml:2:11", "must be at most 10000000000"),
-        ("samples = 20000", "samples = 20000\nseed = 1", "x.toml:3:1", "unknown key `seed`"),
+        ("samples = 20000", "samples = 20000\nseeds = 1", "x.toml:3:1", "unknown key `seeds`"),
+        ("samples = 20000\n", "", "x.toml:1:1", "missing key `samples`"),
+        ("samples = 20000", "samples = 20000\npair.over = []", "x.toml:3:1", "says more of a scene"),
+        ("sampler = {", "equals = { value = 1, source = \"\" } #", "x.toml:8:1", "there are none"),
+        ("\"hg\"\nh", "\"h/g\"\nh", "x.toml:6:8", "the name \"h/g\" contains '/'"),
         ("henyey_greenstein", "henyey_grenstein", "x.toml:7:1", "did you mean `henyey_greenstein`?"),
         ("{ g = 0.5 }", "{ g = 2 }", "x.toml:7:27", "must be at most 0.9999, is 2"),
         ("{ g = 0.5 }", "{ gg = 2 }", "x.toml:7:23", "unknown key `gg`"),
@@ -517,6 +523,6 @@ fn every_command_knows_samplers() {
     assert!(page.contains("## Samplers") && page.contains("chi2 coarse"), "{page}");
     let schema = work.run("schema").exits(0).stdout();
     let schema: Value = serde_json::from_str(&schema).expect("JSON");
-    assert_eq!(schema["then"]["properties"]["sampler"]["items"]["$ref"], "#/$defs/sampler.SamplerEntry");
-    assert!(schema["$defs"]["sampler.SamplerEntry"]["properties"]["henyey_greenstein"].is_object());
+    let entry = &schema["$defs"]["SamplerEntry"]["properties"]["henyey_greenstein"];
+    assert!(entry.is_object() && schema["dependentRequired"]["sampler"].is_array());
 }

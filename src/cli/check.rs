@@ -3,10 +3,10 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::counted;
+use super::{Reading, counted};
 use crate::error::{Error, Result};
-use crate::experiment::build::Builder;
-use crate::experiment::{LoadOptions, Loaded, Registry, load_any};
+use crate::experiment::{Experiment, LoadOptions, Registry, load};
+use crate::run::build_all;
 
 /// Validate experiment files and report all errors.
 ///
@@ -16,12 +16,9 @@ pub struct Args {
     /// Experiment files.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Override a key, such as `budget.passes=64` or `object.shape.sphere.radius_mm=2`; repeatable.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub sets: Vec<String>,
-    /// Apply the overrides of `[setting.NAME]`.
-    #[arg(long, value_name = "NAME")]
-    pub setting: Option<String>,
+    /// How the files are read.
+    #[command(flatten)]
+    pub reading: Reading,
 }
 
 /// Checks every file; prints one line for each valid one.
@@ -31,13 +28,13 @@ pub struct Args {
 pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
     let mut findings = Vec::new();
     for path in &args.files {
-        let options = LoadOptions { sets: args.sets.clone(), setting: args.setting.clone() };
+        let options = args.reading.options();
         let load_setting = |setting: &String| {
-            load_any(path, &LoadOptions { setting: Some(setting.clone()), ..options.clone() }, registry)
+            load(path, &LoadOptions { setting: Some(setting.clone()), ..options.clone() }, registry)
         };
-        let checked = load_any(path, &options, registry).and_then(|experiment| {
-            build(&experiment, registry)?;
-            let others: &[String] = if args.setting.is_some() { &[] } else { experiment.settings() };
+        let checked = load(path, &options, registry).and_then(|experiment| {
+            build_all(&experiment, registry)?;
+            let others: &[String] = if options.setting.is_some() { &[] } else { &experiment.settings };
             others.iter().try_for_each(|setting| load_setting(setting).map(|_| ()))?;
             Ok(experiment)
         });
@@ -53,38 +50,20 @@ pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> 
     if findings.is_empty() { Ok(()) } else { Err(Error::Input(findings)) }
 }
 
-/// Meshes, maps and the sensor's place show only when they are built.
-fn build(experiment: &Loaded, registry: &Registry) -> Result<()> {
-    match experiment {
-        Loaded::Scene(experiment) => {
-            let mut builder = Builder::new(experiment);
-            experiment.cells.iter().try_for_each(|cell| builder.scene(cell).map(|_| ()))
-        }
-        Loaded::Samplers(experiment) => crate::run::samplers::build_all(experiment, registry),
-    }
-}
-
-fn summary(experiment: &Loaded) -> String {
-    let experiment = match experiment {
-        Loaded::Scene(experiment) => experiment,
-        Loaded::Samplers(experiment) => {
-            let file = &experiment.file;
-            return [
-                counted(file.sampler.len(), "sampler"),
-                format!("{} draws each", file.samples),
-                counted(file.claim.len(), "claim"),
-            ]
-            .join(", ");
-        }
-    };
+fn summary(experiment: &Experiment) -> String {
     let file = &experiment.file;
-    [
-        counted(experiment.cells.len(), "cell"),
-        counted(file.estimator.len(), "estimator"),
-        counted(file.bands.list().len(), "band"),
-        counted(file.claim.len(), "claim"),
-    ]
-    .join(", ")
+    let mut parts = Vec::new();
+    if !experiment.cells.is_empty() {
+        parts.push(counted(experiment.cells.len(), "cell"));
+        parts.push(counted(file.estimator.len(), "estimator"));
+        parts.push(counted(file.band_list().len(), "band"));
+    }
+    if let Some(samples) = file.samples {
+        parts.push(counted(file.sampler.len(), "sampler"));
+        parts.push(format!("{samples} draws each"));
+    }
+    parts.push(counted(file.claim.len(), "claim"));
+    parts.join(", ")
 }
 
 #[cfg(test)]
@@ -99,7 +78,8 @@ mod tests {
             std::fs::write(&path, text).expect("the file is written");
             path
         });
-        let args = Args { files: files.collect(), sets: Vec::new(), setting: None };
+        let reading = Reading { set: Vec::new(), setting: None };
+        let args = Args { files: files.collect(), reading };
         let mut out = Vec::new();
         let result = run(&args, &registry(), &mut out);
         (String::from_utf8(out).expect("it is text"), result)

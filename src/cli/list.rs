@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::experiment::Registry;
 use crate::experiment::registry::option_docs;
 use crate::experiment::schema_json::json_schema;
-use crate::experiment::validate::grammar::{Form, Grammar, doc, keys};
+use crate::experiment::validate::grammar::{Grammar, SchemaForm, doc, keys};
 use crate::optics::{dispersion, materials};
 
 /// List what an experiment file may use: estimators, materials, shapes and more.
@@ -127,11 +127,11 @@ fn schema_names(registry: &Registry, path: &[&str]) -> Vec<(String, String)> {
     let Some(schema) = grammar.at(path) else { return Vec::new() };
     let pair = |name: &str, doc: &str| (name.to_string(), doc.to_string());
     match grammar.form(schema) {
-        Form::Variants(variants) => variants.iter().map(|v| pair(v.name, v.doc)).collect(),
-        Form::Plain(plain) => {
+        SchemaForm::Variants(variants) => variants.iter().map(|v| pair(v.name, v.doc)).collect(),
+        SchemaForm::Plain(plain) => {
             keys(plain).into_iter().map(|key| pair(key, doc(&plain["properties"][key]))).collect()
         }
-        Form::Anything | Form::Choice(_) => Vec::new(),
+        SchemaForm::Anything | SchemaForm::Choice(_) => Vec::new(),
     }
 }
 

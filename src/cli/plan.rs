@@ -6,10 +6,12 @@ use super::{Reading, counted};
 use crate::error::Result;
 use crate::experiment::registry::Registry;
 use crate::experiment::schema::Budget;
-use crate::experiment::{Loaded, SamplerExperiment, load_any};
+use crate::experiment::{Experiment, load};
 use crate::report::table::Table;
+use crate::run::chi_square::Draws;
+use crate::run::job::{Job, Passes};
 use crate::run::memory::{available, readable};
-use crate::run::{self, estimate_seconds};
+use crate::run::{self, Plan, estimate_seconds};
 
 /// Show what would run: cells, estimated time and memory, and where each value comes from.
 #[derive(clap::Args, Debug)]
@@ -22,7 +24,7 @@ pub struct Args {
     /// Number of threads that the estimate assumes; default: all cores.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Do not run the few passes that the estimate of time is based on.
+    /// Do not run the few passes and draws that the estimate of time is based on.
     #[arg(long)]
     dry: bool,
 }
@@ -32,42 +34,17 @@ pub struct Args {
 /// # Errors
 /// Bad input.
 pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
-    let experiment = match load_any(&args.file, &args.reading.options(), registry)? {
-        Loaded::Scene(experiment) => experiment,
-        Loaded::Samplers(experiment) => return plan_samplers(args, &experiment, registry),
-    };
+    let experiment = load(&args.file, &args.reading.options(), registry)?;
     let plan = run::plan(&experiment, registry)?;
     let threads = args.threads.unwrap_or_else(|| run::Options::new("").threads);
-
     print_origins(&experiment.origins);
-
-    let budget = match &experiment.file.budget {
-        Budget::Passes(n) => format!("{n} passes"),
-        Budget::CpuSeconds(s) => format!("{s} CPU seconds each"),
-        Budget::RelativeError(e) => format!("relative error {}", e.at_most),
-    };
-    let (cells, measurements) = (experiment.cells.len(), plan.jobs.len());
-    println!("{}, {}, budget: {budget}", counted(cells, "cell"), counted(measurements, "measurement"));
-    let mut table = Table::new(&["cell", "estimator", "observables", "passes", "CPU time"]);
     let mut total = 0.0;
-    for job in &plan.jobs {
-        let (passes, time) =
-            match if args.dry { None } else { estimate_seconds(job, &experiment.file.budget) } {
-                Some((passes, seconds)) => {
-                    total += seconds;
-                    (passes.to_string(), format!("{seconds:.1} s"))
-                }
-                None => ("-".into(), "-".into()),
-            };
-        table.push(vec![
-            experiment.cells[job.cell].label.clone(),
-            job.name.clone(),
-            job.layout.observables().len().to_string(),
-            passes,
-            time,
-        ]);
+    if !experiment.cells.is_empty() {
+        total += print_passes(&experiment, &plan, args.dry);
     }
-    print!("{}", table.to_text());
+    if !experiment.file.sampler.is_empty() {
+        total += print_draws(&experiment, &plan, args.dry);
+    }
     if !args.dry {
         println!("about {:.0} s on {threads} threads", total / threads as f64);
     }
@@ -94,27 +71,51 @@ fn print_origins(origins: &[(String, String, String)]) {
     println!("{}", values.to_text());
 }
 
-/// What would be drawn; without `--dry` a few chunks of each sampler are, for their time.
-fn plan_samplers(args: &Args, experiment: &SamplerExperiment, registry: &Registry) -> Result<u8> {
-    print_origins(&experiment.origins);
-    let threads = args.threads.unwrap_or_else(|| run::Options::new("").threads);
-    let file = &experiment.file;
-    println!("{}, {} draws each", counted(file.sampler.len(), "sampler"), file.samples);
-    let mut table = Table::new(&["sampler", "kind", "CPU time"]);
+/// What estimators would do; the CPU seconds that it takes, 0 where `dry`.
+fn print_passes(experiment: &Experiment, plan: &Plan, dry: bool) -> f64 {
+    let budget = experiment.file.budget.as_ref();
+    let words = match budget {
+        Some(Budget::Passes(n)) => format!("{n} passes"),
+        Some(Budget::CpuSeconds(s)) => format!("{s} CPU seconds each"),
+        Some(Budget::RelativeError(e)) => format!("relative error {}", e.at_most),
+        None => "none".into(),
+    };
+    let jobs: Vec<&Passes> = plan.jobs.iter().filter_map(Job::passes).collect();
+    let (cells, measurements) = (experiment.cells.len(), jobs.len());
+    println!("{}, {}, budget: {words}", counted(cells, "cell"), counted(measurements, "measurement"));
+    let mut table = Table::new(&["cell", "estimator", "observables", "passes", "CPU time"]);
     let mut total = 0.0;
-    let times = run::samplers::estimate_seconds(experiment, registry, args.dry)?;
-    for (entry, seconds) in file.sampler.iter().zip(times) {
-        let kind = entry.choice().map_or("", |(kind, _)| kind);
-        total += seconds.unwrap_or(0.0);
-        let time = seconds.map_or("-".into(), |seconds| format!("{seconds:.2} s"));
-        table.push(vec![entry.name.clone(), kind.into(), time]);
+    for job in jobs {
+        let estimate = budget.filter(|_| !dry).and_then(|budget| estimate_seconds(job, budget));
+        total += estimate.map_or(0.0, |(_, seconds)| seconds);
+        table.push(vec![
+            experiment.cells[job.cell].label.clone(),
+            job.arm.name.clone(),
+            job.layout.observables().len().to_string(),
+            estimate.map_or("-".into(), |(passes, _)| passes.to_string()),
+            estimate.map_or("-".into(), |(_, seconds)| format!("{seconds:.1} s")),
+        ]);
     }
     print!("{}", table.to_text());
-    if !args.dry {
-        println!(
-            "about {:.0} s on {threads} threads, and some tenths of a second a sampler for masses",
-            total / threads as f64
-        );
+    total
+}
+
+/// What would be drawn from samplers; the CPU seconds of the draws, 0 where `dry`.
+fn print_draws(experiment: &Experiment, plan: &Plan, dry: bool) -> f64 {
+    let jobs: Vec<&Draws> = plan.jobs.iter().filter_map(Job::draws).collect();
+    let samples = experiment.file.samples.unwrap_or_default();
+    println!("{}, {samples} draws each", counted(jobs.len(), "sampler"));
+    let mut table = Table::new(&["sampler", "kind", "CPU time"]);
+    let mut total = 0.0;
+    for job in jobs {
+        let seconds = (!dry).then(|| job.estimate_seconds());
+        total += seconds.unwrap_or(0.0);
+        let time = seconds.map_or("-".into(), |seconds| format!("{seconds:.2} s"));
+        table.push(vec![job.name.clone(), job.kind.clone(), time]);
     }
-    Ok(0)
+    print!("{}", table.to_text());
+    if !dry {
+        println!("beside the draws, some tenths of a second a sampler for masses");
+    }
+    total
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Reading, Working, listen};
 use crate::error::Result;
-use crate::experiment::load_any;
+use crate::experiment::load;
 use crate::experiment::registry::Registry;
 use crate::report::{self, terminal};
 use crate::run::live::Live;
@@ -41,7 +41,7 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     let interrupt = listen()?;
     let mut options = args.working.options();
     options.passes_of = args.passes_of.clone();
-    let read = |file: &PathBuf| load_any(file, &args.reading.options(), registry);
+    let read = |file: &PathBuf| load(file, &args.reading.options(), registry);
     let experiments = args.files.iter().map(read).collect::<Result<Vec<_>>>()?;
     if let Some(address) = &args.tev {
         match Live::connect(address) {
@@ -50,7 +50,7 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
         }
     }
     for experiment in &experiments {
-        let (folder, _) = crate::run::run_any(experiment, registry, &options, &interrupt)?;
+        let (folder, _) = crate::run::run(experiment, registry, &options, &interrupt)?;
         let material = report::write(&folder)?;
         print!("{}", terminal::run_table(&material).to_text());
         print!("{}", terminal::sampler_table(&material).to_text());

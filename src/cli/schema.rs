@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::experiment::Registry;
-use crate::experiment::schema_json::any_schema;
+use crate::experiment::schema_json::editor_schema;
 
 /// Print the JSON Schema of experiment files, for completion and checks in editors.
 #[derive(Debug, clap::Args)]
@@ -16,7 +16,7 @@ pub struct Args {}
 /// # Errors
 /// The output cannot be written.
 pub fn run(_: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
-    writeln!(out, "{:#}", any_schema(registry)).map_err(Error::io(Path::new("stdout"), "print"))
+    writeln!(out, "{:#}", editor_schema(registry)).map_err(Error::io(Path::new("stdout"), "print"))
 }
 
 #[cfg(test)]

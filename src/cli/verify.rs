@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use super::{Reading, Working, listen};
 use crate::error::{Error, Result};
 use crate::experiment::registry::Registry;
-use crate::experiment::{LoadOptions, Loaded, load_any};
+use crate::experiment::{Experiment, LoadOptions, load};
 use crate::report::{self, tables::verdict_table};
 use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::{atomic, provenance};
-use crate::run::Options;
 use crate::run::interrupt::Interrupt;
+use crate::run::{Options, Remeasured};
 use crate::verify::judge::{Case, Judgement, Looks, Measured, judge};
 use crate::verify::junit;
 use crate::verify::levels::{FAMILY_LEVEL, FIRST_LOOK, RETEST_FACTOR};
@@ -64,7 +64,7 @@ struct Judged {
     main: Stored,
     retest: Option<Stored>,
     /// Absent where a results folder was named.
-    experiment: Option<Loaded>,
+    experiment: Option<Experiment>,
 }
 
 /// Everything that verification of one call works with.
@@ -172,19 +172,19 @@ impl Court<'_> {
                 continue;
             }
             for file in experiment_files(path)? {
-                subjects.push(self.measured(load_any(&file, &self.reading, self.registry)?)?);
+                subjects.push(self.measured(load(&file, &self.reading, self.registry)?)?);
             }
         }
         Ok(subjects)
     }
 
-    fn measured(&self, experiment: Loaded) -> Result<Judged> {
-        let folder = RecordFolder::new(self.working.folder(experiment.name()));
-        let main = if crate::run::has_record_of(&experiment, &self.working.out) {
+    fn measured(&self, experiment: Experiment) -> Result<Judged> {
+        let folder = RecordFolder::new(self.working.folder(&experiment.file.name));
+        let main = if crate::run::has_record(&experiment, &self.working.out) {
             folder.read()?
         } else {
-            eprintln!("running {}", experiment.name());
-            crate::run::run_any(&experiment, self.registry, &self.working, &self.interrupt)?.1
+            eprintln!("running {}", experiment.file.name);
+            crate::run::run(&experiment, self.registry, &self.working, &self.interrupt)?.1
         };
         let retest = folder.retest_of(&main)?;
         Ok(Judged { folder, main, retest, experiment: Some(experiment) })
@@ -197,7 +197,7 @@ impl Court<'_> {
             let own = judgement.wanted.iter().filter(|w| w.case == index);
             let mut wanted: Vec<Measured> = own.map(|w| w.subject.clone()).collect();
             let (false, Some(experiment)) = (wanted.is_empty(), &subject.experiment) else { continue };
-            eprintln!("second look at {}", experiment.name());
+            eprintln!("second look at {}", experiment.file.name);
             // What an earlier second look holds stays in its record.
             wanted.extend(subject.retest.iter().flat_map(held));
             let main = &subject.main.record;
@@ -207,28 +207,21 @@ impl Court<'_> {
         Ok(looked)
     }
 
-    fn measured_again(&self, experiment: &Loaded, main: &Record, wanted: &[Measured]) -> Result<Stored> {
-        let quantities = wanted.iter().filter_map(|w| match w {
-            Measured::Quantity(quantity) => Some(quantity.clone()),
-            Measured::Sampler(_) => None,
-        });
-        let samplers = wanted.iter().filter_map(|w| match w {
-            Measured::Sampler(name) => Some(name.clone()),
-            Measured::Quantity(_) => None,
-        });
-        let (registry, working, interrupt) = (self.registry, &self.working, &self.interrupt);
-        match experiment {
-            Loaded::Scene(experiment) => {
-                let wanted: Vec<Quantity> = quantities.collect();
-                let factor = RETEST_FACTOR;
-                crate::run::retest(experiment, registry, working, interrupt, main, &wanted, factor)
-            }
-            Loaded::Samplers(experiment) => {
-                let names = samplers.collect();
-                let factor = RETEST_FACTOR;
-                crate::run::samplers::retest(experiment, registry, working, interrupt, &names, factor)
+    fn measured_again(
+        &self,
+        experiment: &Experiment,
+        main: &Record,
+        wanted: &[Measured],
+    ) -> Result<Stored> {
+        let (mut quantities, mut samplers) = (Vec::new(), Vec::new());
+        for one in wanted {
+            match one {
+                Measured::Quantity(quantity) => quantities.push(quantity.clone()),
+                Measured::Sampler(name) => samplers.push(name.clone()),
             }
         }
+        let look = Remeasured { main, quantities, samplers, factor: RETEST_FACTOR };
+        crate::run::retest(experiment, self.registry, &self.working, &self.interrupt, &look)
     }
 }
 

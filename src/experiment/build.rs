@@ -30,7 +30,7 @@ pub struct Builder<'a> {
 impl<'a> Builder<'a> {
     /// For an experiment.
     pub fn new(experiment: &'a Experiment) -> Builder<'a> {
-        let bands = bands(&experiment.file.bands);
+        let bands = experiment.file.bands.as_ref().map(bands).unwrap_or_default();
         Builder { experiment, bands, shapes: BTreeMap::new(), maps: BTreeMap::new() }
     }
 
@@ -52,7 +52,7 @@ impl<'a> Builder<'a> {
     pub fn scene(&mut self, cell: &CellSpec) -> Result<Scene> {
         let shape = self.shape(&cell.object.shape)?;
         let boundary = self.boundary(&cell.object.boundary)?;
-        let medium = cell.object.medium.per_band(&self.experiment.file.bands.list());
+        let medium = cell.object.medium.per_band(&self.experiment.file.band_list());
         let medium = medium.ok_or_else(|| Error::input("the medium has no coefficients"))?;
         let medium = medium.iter().map(|m| Medium::new(m.sigma_a, m.sigma_s, m.g)).collect();
         let lights = cell.light.iter().enumerate();
@@ -72,7 +72,7 @@ impl<'a> Builder<'a> {
     }
 
     fn boundary(&self, words: &BoundaryEntry) -> Result<Vec<Boundary>> {
-        let bands = self.experiment.file.bands.list();
+        let bands = self.experiment.file.band_list();
         let eta = |eta: &schema::Eta| eta.per_band(&bands).map_err(Error::input);
         Ok(match words {
             BoundaryEntry::Matched {} => vec![Boundary::Matched; bands.len()],
@@ -196,8 +196,8 @@ pub fn inputs(experiment: &Experiment) -> BTreeMap<String, String> {
 }
 
 /// The bands of an experiment and the colours they show as.
-pub fn bands(words: &schema::Bands) -> Vec<Band> {
-    let band = |(band, display_rgb): (resolve::Band, [f64; 3])| Band {
+pub fn bands(words: &schema::BandsEntry) -> Vec<Band> {
+    let band = |(band, display_rgb): (resolve::BandInterval, [f64; 3])| Band {
         name: band.name,
         range_nm: band.range_nm,
         display_rgb,

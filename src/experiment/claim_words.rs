@@ -10,7 +10,7 @@ use super::duel::{Faster, NotSlower};
 /// One claim: exactly one kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{ "required": ["equals"] }, { "required": ["agree"] }, { "required": ["differs"] }, { "required": ["reproduces"] }, { "required": ["faster"] }, { "required": ["not_slower"] }]))]
+#[schemars(extend("oneOf" = [{ "required": ["equals"] }, { "required": ["agree"] }, { "required": ["differs"] }, { "required": ["reproduces"] }, { "required": ["faster"] }, { "required": ["not_slower"] }, { "required": ["sampler"] }]))]
 pub struct ClaimEntry {
     /// Label in verdict tables.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -36,6 +36,24 @@ pub struct ClaimEntry {
     /// An estimator is not much less efficient than another.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_slower: Option<NotSlower>,
+    /// Samplers draw from the densities that they claim.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampler: Option<SamplerClaim>,
+}
+
+/// Samplers draw from the densities that they claim: counts by bin, consecutive draws, directed
+/// contrasts, discrete outcomes, and the identities between draws and densities.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SamplerClaim {
+    /// Their names; all of them without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
+    pub samplers: Option<Vec<String>>,
+    /// The largest relative error of the density, of one size in all coarse bins, that may go unseen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub detect: Option<f64>,
 }
 
 /// Outcomes that controls expect.
@@ -92,8 +110,8 @@ pub struct Equals {
     pub only: BTreeMap<String, String>,
 }
 
-/// Estimators differ in every cell, or cells that differ only `across` one axis do, and the test finds it:
-/// a negative control.
+/// Estimators differ in every cell, or cells that differ only `across` one axis do, and the test finds
+/// it: a negative control.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Differs {

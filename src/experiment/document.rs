@@ -13,7 +13,7 @@ use crate::error::{Diagnostic, Place};
 
 /// What kind of input a value was read from.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Source {
+pub enum InputKind {
     /// The experiment file itself.
     File,
     /// A `--set` argument.
@@ -30,7 +30,7 @@ pub enum Source {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Origin {
     /// The kind of input.
-    pub source: Source,
+    pub source: InputKind,
     /// The bytes of the value in that input.
     pub place: Place,
 }
@@ -40,11 +40,11 @@ impl fmt::Display for Origin {
         let (line, column) = self.place.line_column();
         let name = &self.place.name;
         match &self.source {
-            Source::File => write!(f, "{name}:{line}:{column}"),
-            Source::Set => write!(f, "--set {}", self.place.text),
-            Source::Setting(setting) => write!(f, "setting `{setting}` ({name}:{line}:{column})"),
-            Source::Sweep(axis) => write!(f, "sweep `{axis}` ({name}:{line}:{column})"),
-            Source::Csv => write!(f, "{name}:{line}"),
+            InputKind::File => write!(f, "{name}:{line}:{column}"),
+            InputKind::Set => write!(f, "--set {}", self.place.text),
+            InputKind::Setting(setting) => write!(f, "setting `{setting}` ({name}:{line}:{column})"),
+            InputKind::Sweep(axis) => write!(f, "sweep `{axis}` ({name}:{line}:{column})"),
+            InputKind::Csv => write!(f, "{name}:{line}"),
         }
     }
 }
@@ -162,7 +162,7 @@ impl Node {
 /// # Errors
 /// Every syntax error, each with its place.
 pub fn parse(name: &str, text: &str) -> Result<Node, Vec<Diagnostic>> {
-    let reader = Reader { name: name.into(), text: text.into(), offset: 0, source: Source::File };
+    let reader = Reader { name: name.into(), text: text.into(), offset: 0, source: InputKind::File };
     let (table, errors) = DeTable::parse_recoverable(text);
     let mut findings: Vec<Diagnostic> = errors.iter().map(|e| reader.syntax_error(e)).collect();
     let span = table.span();
@@ -176,7 +176,8 @@ pub fn parse(name: &str, text: &str) -> Result<Node, Vec<Diagnostic>> {
 /// # Errors
 /// Every syntax error, each with its place in the argument.
 pub fn parse_set(argument: &str) -> Result<(String, Node), Vec<Diagnostic>> {
-    let reader = Reader { name: "--set".into(), text: argument.into(), offset: 0, source: Source::Set };
+    let reader =
+        Reader { name: "--set".into(), text: argument.into(), offset: 0, source: InputKind::Set };
     let Some((key, value)) = argument.split_once('=') else {
         return Err(vec![Diagnostic {
             rule: "`--set` needs `key=value`".into(),
@@ -209,7 +210,7 @@ struct Reader {
     name: Arc<str>,
     text: Arc<str>,
     offset: usize,
-    source: Source,
+    source: InputKind,
 }
 
 impl Reader {

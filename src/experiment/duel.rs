@@ -17,8 +17,8 @@ pub enum CostMeasure {
     /// Counts of rays, events and paths with fixed weights: the same on every machine.
     #[default]
     Counters,
-    /// CPU time. The estimators are played side by side, and the baseline twice, so that what the machine
-    /// adds is seen.
+    /// CPU time. The estimators are played side by side, and the baseline twice, so that what the
+    /// machine adds is seen.
     Cpu,
 }
 
@@ -39,8 +39,8 @@ pub struct Faster {
     /// What counts as cost.
     #[serde(default)]
     pub cost: CostMeasure,
-    /// The observable; the sensor's first one without it. `pixels` for the variance of a pixel, averaged over
-    /// the image.
+    /// The observable; the sensor's first one without it. `pixels` for the variance of a pixel, averaged
+    /// over the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
     /// The transport class; `all` without it.
@@ -55,9 +55,9 @@ pub struct Faster {
     pub only: BTreeMap<String, String>,
 }
 
-/// In every cell and band, the candidate is at most `margin` times as expensive as the baseline: variance
-/// times cost of the candidate over that of the baseline lies below it, with all of its 99.9 % interval.
-/// That the means agree is tested first.
+/// In every cell and band, the candidate is at most `margin` times as expensive as the baseline:
+/// variance times cost of the candidate over that of the baseline lies below it, with all of its 99.9 %
+/// interval. That the means agree is tested first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NotSlower {
@@ -72,8 +72,8 @@ pub struct NotSlower {
     /// What counts as cost.
     #[serde(default)]
     pub cost: CostMeasure,
-    /// The observable; the sensor's first one without it. `pixels` for the variance of a pixel, averaged over
-    /// the image.
+    /// The observable; the sensor's first one without it. `pixels` for the variance of a pixel, averaged
+    /// over the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
     /// The transport class; `all` without it.

@@ -7,11 +7,11 @@ use serde::de::DeserializeOwned;
 use super::document::{self, Node, Value};
 use super::picture::PictureEntry;
 use super::registry::Registry;
-use super::rules::{self, At, CELL_KEYS, Findings, Known};
-use super::schema::{Bands, ClaimEntry, ExperimentFile};
+use super::rules::{self, At, CELL_KEYS, ExperimentParts, Findings, Known};
+use super::schema::{BandsEntry, ClaimEntry, ExperimentFile};
 use super::schema_json::json_schema;
-use super::sweep::{self, Point, SweepAxis};
-use super::validate::Walk;
+use super::sweep::{self, AxisPoint, SweepAxis};
+use super::validate::SchemaWalk;
 use super::validate::grammar::Grammar;
 use super::{Axis, CellSpec, Experiment, LoadOptions, origins, overrides, resolved};
 use crate::error::{Diagnostic, Error, Place, Result};
@@ -34,7 +34,7 @@ pub fn load_text(
 }
 
 /// Applies the chosen setting, then the `--set` arguments; the keys that they set, and where.
-pub fn apply(
+fn apply(
     root: &mut Node,
     options: &LoadOptions,
     grammar: &Grammar,
@@ -73,22 +73,23 @@ struct Loader<'a> {
 
 impl Loader<'_> {
     fn experiment(self, overridden: &[(String, Place)]) -> Result<Experiment> {
-        let mut walk = Walk::new(&self.grammar, false);
-        walk.root(&self.root, &CELL_KEYS);
+        let parts = rules::parts(At::new(&self.root, &self.findings), &self.root);
+        let mut walk = SchemaWalk::new(&self.grammar, false);
+        walk.root(&self.root, &CELL_KEYS, &parts.required());
         walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
         let axes = sweep::axes(&self.root, self.path, overridden, &self.findings);
-        self.shared_rules(axes.as_deref());
+        self.shared_rules(parts, axes.as_deref());
         let bands = self.bands();
         let Some(axes) = axes else {
             self.cell_rules(&self.root, bands.as_ref(), true);
             return Err(refusal(self.findings.into_sorted()));
         };
-        let points = sweep::cells(&axes);
+        let points = if parts.scene { sweep::cells(&axes) } else { Vec::new() };
         let trees: Vec<Node> = points.iter().map(|points| self.cell_tree(points)).collect();
         trees.iter().for_each(|tree| self.cell_rules(tree, bands.as_ref(), false));
         let cells: Option<Vec<CellSpec>> =
             trees.iter().zip(&points).map(|(tree, points)| cell(tree, &axes, points)).collect();
-        let first = self.first_cell(&trees[0]);
+        let first = self.first_cell(trees.first());
         let settings = settings(&self.root);
         match (self.findings.into_sorted(), cells, typed::<ExperimentFile>(&first)) {
             (findings, Some(cells), Some(mut file)) if findings.is_empty() => {
@@ -102,31 +103,40 @@ impl Loader<'_> {
         }
     }
 
-    /// The bands where nothing is wrong with them: their number may be absurd else.
-    fn bands(&self) -> Option<Bands> {
-        let mut walk = Walk::new(&self.grammar, false);
+    /// The bands where nothing is wrong with them: otherwise their number may be absurd.
+    fn bands(&self) -> Option<BandsEntry> {
+        self.root.get("bands")?;
+        let mut walk = SchemaWalk::new(&self.grammar, false);
         walk.entry(&self.root, "bands");
         let is_sound = walk.into_findings().is_empty();
         self.root.get("bands").filter(|_| is_sound).and_then(typed)
     }
 
     /// Rules of what all cells share.
-    fn shared_rules(&self, axes: Option<&[SweepAxis]>) {
+    fn shared_rules(&self, parts: ExperimentParts, axes: Option<&[SweepAxis]>) {
         let at = At::new(&self.root, &self.findings);
+        if let Some(name) = self.root.get("name").and_then(Node::as_str) {
+            rules::experiment_name(at.to("name"), name);
+        }
         if let Some(bands) = at.typed("bands") {
             rules::bands(at.to("bands"), &bands);
         }
-        let estimators = self.root.get("estimator");
-        if let Some(entries) = estimators {
-            rules::unique_names(at.to("estimator"), entries, "estimators");
+        for (key, what) in [("estimator", "estimators"), ("sampler", "samplers")] {
+            if let Some(entries) = self.root.get(key) {
+                rules::names(at.to(key), entries, what);
+            }
         }
         if let Some(over) = self.root.at(&["pair", "over"]) {
             rules::pair(at.to("pair").to("over"), over, &self.grammar);
         }
-        let names = estimators.map(Node::items).unwrap_or_default();
-        let names = names.iter().filter_map(|entry| entry.get("name")?.as_str()).collect();
+        let names = |key: &str| -> Vec<&str> {
+            let entries = self.root.get(key).map(Node::items).unwrap_or_default();
+            entries.iter().filter_map(|entry| entry.get("name")?.as_str()).collect()
+        };
+        let (estimators, samplers) = (names("estimator"), names("sampler"));
         let bands = self.bands().map(|bands| bands.list().into_iter().map(|band| band.name).collect());
-        let known = Known { estimators: names, bands, axes, budget: at.typed("budget") };
+        let budget = at.typed("budget");
+        let known = Known { parts, estimators, samplers, bands, axes, budget };
         let claims = at.to("claim");
         for (i, entry) in self.root.get("claim").map(Node::items).unwrap_or_default().iter().enumerate()
         {
@@ -144,8 +154,8 @@ impl Loader<'_> {
     }
 
     /// The walk and the rules of object, sensor and lights in one cell.
-    fn cell_rules(&self, tree: &Node, bands: Option<&Bands>, lenient: bool) {
-        let mut walk = Walk::new(&self.grammar, lenient);
+    fn cell_rules(&self, tree: &Node, bands: Option<&BandsEntry>, lenient: bool) {
+        let mut walk = SchemaWalk::new(&self.grammar, lenient);
         CELL_KEYS.iter().for_each(|key| walk.entry(tree, key));
         walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
         let at = At::new(tree, &self.findings);
@@ -163,7 +173,7 @@ impl Loader<'_> {
     }
 
     /// Object, sensor and lights of the cell at `points`.
-    fn cell_tree(&self, points: &[&Point]) -> Node {
+    fn cell_tree(&self, points: &[&AxisPoint]) -> Node {
         let mut tree = Node { value: Value::Table(Default::default()), ..self.bare_root() };
         if let (Value::Table(entries), Value::Table(all)) = (&mut tree.value, &self.root.value) {
             let kept = all.iter().filter(|(key, _)| CELL_KEYS.contains(&key.as_str()));
@@ -182,10 +192,12 @@ impl Loader<'_> {
     }
 
     /// The document with the first cell's object, sensor and lights, and without sweep and settings.
-    fn first_cell(&self, tree: &Node) -> Node {
+    fn first_cell(&self, tree: Option<&Node>) -> Node {
         let mut first = self.root.clone();
-        if let (Value::Table(entries), Value::Table(cell)) = (&mut first.value, &tree.value) {
-            entries.extend(cell.clone());
+        if let Value::Table(entries) = &mut first.value {
+            if let Some(Value::Table(cell)) = tree.map(|tree| &tree.value) {
+                entries.extend(cell.clone());
+            }
             entries.retain(|key, _| key != "sweep" && key != "setting");
         }
         first
@@ -193,7 +205,7 @@ impl Loader<'_> {
 }
 
 /// The names of the settings that a file offers.
-pub fn settings(root: &Node) -> Vec<String> {
+fn settings(root: &Node) -> Vec<String> {
     match root.get("setting").map(|node| &node.value) {
         Some(Value::Table(settings)) => settings.keys().cloned().collect(),
         _ => Vec::new(),
@@ -201,7 +213,7 @@ pub fn settings(root: &Node) -> Vec<String> {
 }
 
 /// The findings, of which there must be one where an experiment is refused.
-pub fn refusal(findings: Vec<Diagnostic>) -> Error {
+fn refusal(findings: Vec<Diagnostic>) -> Error {
     match findings.is_empty() {
         true => Error::input("the experiment passed every rule and still does not fit its types"),
         false => Error::Input(findings),
@@ -209,11 +221,11 @@ pub fn refusal(findings: Vec<Diagnostic>) -> Error {
 }
 
 /// A node as its type, where it fits.
-pub fn typed<T: DeserializeOwned>(node: &Node) -> Option<T> {
+fn typed<T: DeserializeOwned>(node: &Node) -> Option<T> {
     serde_json::from_value(node.to_json()).ok()
 }
 
-fn cell(tree: &Node, axes: &[SweepAxis], points: &[&Point]) -> Option<CellSpec> {
+fn cell(tree: &Node, axes: &[SweepAxis], points: &[&AxisPoint]) -> Option<CellSpec> {
     let labels: Vec<&str> = points.iter().map(|point| point.label.as_str()).collect();
     let mut csv_row = std::collections::BTreeMap::new();
     for (name, column) in points.iter().flat_map(|point| &point.columns) {

@@ -43,12 +43,6 @@ pub mod resolve;
 /// Canonical content of cells and experiments.
 mod resolved;
 
-/// What an experiment on samplers may say.
-pub mod sampler_file;
-
-/// From a text to an experiment on samplers.
-mod sampler_load;
-
 /// Rules between values.
 mod rules;
 
@@ -70,6 +64,9 @@ pub mod sweep;
 /// Rows from a CSV file.
 mod sweep_csv;
 
+/// Axes and points as types.
+mod sweep_point;
+
 /// The walk along the schema.
 pub mod validate;
 
@@ -77,7 +74,6 @@ pub mod validate;
 pub(crate) mod tests;
 
 pub use registry::Registry;
-pub use sampler_file::SamplerExperiment;
 pub use sweep::resolve_path;
 
 use schema::{ExperimentFile, LightEntry, Object, SensorEntry};
@@ -90,7 +86,8 @@ pub struct Experiment {
     /// Name, seed, bands, estimators, pairing, budget, claims and display of all cells; object, sensor
     /// and lights of the first. Sweeps stand in it as rows, CSV files read; settings are applied.
     pub file: ExperimentFile,
-    /// The cells, the last axis fastest. Without a sweep there is one, labelled `base`.
+    /// The cells, the last axis fastest. Without a sweep there is one, labelled `base`; without a scene,
+    /// none.
     pub cells: Vec<CellSpec>,
     /// The axes of the sweep.
     pub axes: Vec<Axis>,
@@ -141,62 +138,18 @@ pub struct LoadOptions {
     pub setting: Option<String>,
 }
 
-/// A validated experiment of either sort.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Loaded {
-    /// Estimators in a scene.
-    Scene(Box<Experiment>),
-    /// Samplers.
-    Samplers(Box<SamplerExperiment>),
-}
-
-impl Loaded {
-    /// Its name.
-    pub fn name(&self) -> &str {
-        match self {
-            Loaded::Scene(experiment) => &experiment.file.name,
-            Loaded::Samplers(experiment) => &experiment.file.name,
-        }
-    }
-
-    /// The names of the settings that the file offers.
-    pub fn settings(&self) -> &[String] {
-        match self {
-            Loaded::Scene(experiment) => &experiment.settings,
-            Loaded::Samplers(experiment) => &experiment.settings,
-        }
-    }
-}
-
-/// Reads and validates an experiment file of either sort: one that has `sampler`, and nothing that says
-/// of a scene, is on samplers.
-///
-/// # Errors
-/// The file cannot be read, or everything that is wrong with it, at once.
-pub fn load_any(path: &Path, options: &LoadOptions, registry: &Registry) -> Result<Loaded> {
-    let text = read(path)?;
-    if sampler_load::is_on_samplers(path, &text) {
-        let experiment = sampler_load::load_text(path, &text, options, registry)?;
-        return Ok(Loaded::Samplers(Box::new(experiment)));
-    }
-    Ok(Loaded::Scene(Box::new(load::load_text(path, &text, options, registry)?)))
-}
-
-/// Reads and validates an experiment file with a scene.
+/// Reads and validates an experiment file.
 ///
 /// # Errors
 /// The file cannot be read, or everything that is wrong with it, at once.
 pub fn load(path: &Path, options: &LoadOptions, registry: &Registry) -> Result<Experiment> {
-    load::load_text(path, &read(path)?, options, registry)
-}
-
-fn read(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|error| {
+    let text = std::fs::read_to_string(path).map_err(|error| {
         Error::input_help(
             format!("could not read the experiment file {}: {error}", path.display()),
             "name a TOML file; `scatterproof init` writes an example",
         )
-    })
+    })?;
+    load::load_text(path, &text, options, registry)
 }
 
 impl From<&sweep::SweepAxis> for Axis {

@@ -9,14 +9,10 @@ use super::schema::ExperimentFile;
 /// The dotted key, value and origin of every leaf of `root`, and of the defaults that `file`, which
 /// was read from it, has beside them. A list without tables is one leaf.
 pub fn list(root: &Node, file: &ExperimentFile) -> Vec<(String, String, String)> {
-    list_of(root, &json(&ExperimentFile { sweep: Vec::new(), ..file.clone() }))
-}
-
-/// The same for any file, which says `file`.
-pub fn list_of(root: &Node, file: &Json) -> Vec<(String, String, String)> {
+    let file = ExperimentFile { sweep: Vec::new(), ..file.clone() };
     let mut leaves = Vec::new();
     given(root, String::new(), &mut leaves);
-    defaults(file, Some(root), String::new(), &mut leaves);
+    defaults(&json(&file), Some(root), String::new(), &mut leaves);
     leaves.sort();
     leaves
 }

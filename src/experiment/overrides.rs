@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::document::{Node, Source, Value};
+use super::document::{InputKind, Node, Value};
 use super::suggest;
 use super::validate::grammar::Grammar;
 use crate::error::Diagnostic;
@@ -66,14 +66,14 @@ fn flatten(node: &Node, key: String, name: &str, entries: &mut Vec<(String, Node
         }
         _ => {
             let mut node = node.clone();
-            relabel(&mut node, &Source::Setting(name.into()));
+            relabel(&mut node, &InputKind::Setting(name.into()));
             entries.push((key, node));
         }
     }
 }
 
 /// Gives a value and all within it another source.
-pub fn relabel(node: &mut Node, source: &Source) {
+pub fn relabel(node: &mut Node, source: &InputKind) {
     node.origin.source = source.clone();
     match &mut node.value {
         Value::Array(items) => items.iter_mut().for_each(|item| relabel(item, source)),

@@ -12,17 +12,17 @@ use crate::results::pictures::{self, Wanted};
 pub struct PictureEntry {
     /// Two estimators side by side.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub split: Option<Split>,
+    pub split: Option<SplitEntry>,
     /// Means as passes add up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub running: Option<Running>,
+    pub running: Option<RunningEntry>,
 }
 
-/// A plot a cell: the mean of one number over the first passes, with its interval, as passes add up; and the value that
-/// an `equals` claim expects of it.
+/// A plot a cell: the mean of one number over the first passes, with its interval, as passes add up; and
+/// the value that an `equals` claim expects of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Running {
+pub struct RunningEntry {
     /// The estimators; all of them without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
@@ -42,7 +42,7 @@ pub struct Running {
 /// columns give one grid per label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Split {
+pub struct SplitEntry {
     /// The estimator of the left halves.
     pub left: String,
     /// The estimator of the right halves.
@@ -53,8 +53,8 @@ pub struct Split {
     /// The axis of the sweep whose labels are the columns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub columns: Option<String>,
-    /// Stops by which all pictures of the grid are brightened; without it each picture has a white of its
-    /// own, the same for both halves: the 95th percentile of the half with less noise.
+    /// Stops by which all pictures of the grid are brightened; without it each picture has a white of
+    /// its own, the same for both halves: the 95th percentile of the half with less noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_stops: Option<f64>,
 }

@@ -1,13 +1,13 @@
 //! What the entries of a file mean: values per band, coefficients.
 
-use super::schema::{Bands, Coefficients, Eta, EtaFormula, MediumEntry, Spectrum};
+use super::schema::{BandsEntry, Coefficients, Eta, EtaFormula, ExperimentFile, MediumEntry, Spectrum};
 use crate::optics::colour::{self, BandColours};
 use crate::optics::dispersion::{self, Dispersion};
 use crate::optics::materials;
 
 /// One wavelength band.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Band {
+pub struct BandInterval {
     /// Its name in tables.
     pub name: String,
     /// From and to, nm, where they are known.
@@ -25,26 +25,33 @@ pub struct BandMedium {
     pub g: f64,
 }
 
-impl Bands {
+impl ExperimentFile {
+    /// The bands in order; none without a scene.
+    pub fn band_list(&self) -> Vec<BandInterval> {
+        self.bands.as_ref().map(BandsEntry::list).unwrap_or_default()
+    }
+}
+
+impl BandsEntry {
     /// The bands in order. Bins of a range are named by it, as `400-420nm`.
-    pub fn list(&self) -> Vec<Band> {
+    pub fn list(&self) -> Vec<BandInterval> {
         match self {
-            Bands::Rgb {} => {
-                ["R", "G", "B"].map(|name| Band { name: name.into(), range_nm: None }).to_vec()
+            BandsEntry::Rgb {} => {
+                ["R", "G", "B"].map(|name| BandInterval { name: name.into(), range_nm: None }).to_vec()
             }
-            Bands::Spectral { from_nm, to_nm, count } => {
+            BandsEntry::Spectral { from_nm, to_nm, count } => {
                 let edge = |i: usize| from_nm + (to_nm - from_nm) * (i as f64 / *count as f64);
                 let bins = (0..*count).map(|i| [edge(i), edge(i + 1)]);
-                bins.map(|[from, to]| Band {
+                bins.map(|[from, to]| BandInterval {
                     name: format!("{}-{}nm", rounded(from), rounded(to)),
                     range_nm: Some([from, to]),
                 })
                 .collect()
             }
-            Bands::Explicit(list) => {
+            BandsEntry::Explicit(list) => {
                 let range = |from: Option<f64>, to: Option<f64>| Some([from?, to?]);
                 list.iter()
-                    .map(|b| Band { name: b.name.clone(), range_nm: range(b.from_nm, b.to_nm) })
+                    .map(|b| BandInterval { name: b.name.clone(), range_nm: range(b.from_nm, b.to_nm) })
                     .collect()
             }
         }
@@ -55,7 +62,7 @@ impl Bands {
         let bands = self.list();
         let ranges: Option<Vec<[f64; 2]>> = bands.iter().map(|band| band.range_nm).collect();
         colour::display_rgb(match (self, &ranges) {
-            (Bands::Rgb {}, _) => BandColours::Rgb,
+            (BandsEntry::Rgb {}, _) => BandColours::Rgb,
             (_, Some(ranges)) => BandColours::Ranges(ranges),
             (_, None) => BandColours::Unknown(bands.len()),
         })
@@ -82,7 +89,7 @@ impl Eta {
     ///
     /// # Errors
     /// Why there is none: bands without wavelengths, a formula that is not real, an unknown name.
-    pub fn per_band(&self, bands: &[Band]) -> Result<Vec<f64>, String> {
+    pub fn per_band(&self, bands: &[BandInterval]) -> Result<Vec<f64>, String> {
         let formula = match self {
             Eta::Grey(eta) => return Ok(vec![*eta; bands.len()]),
             Eta::PerBand(list) => return Ok(list.clone()),
@@ -101,7 +108,7 @@ impl Eta {
     }
 }
 
-fn dispersed(formula: &Dispersion, band: &Band) -> Result<f64, String> {
+fn dispersed(formula: &Dispersion, band: &BandInterval) -> Result<f64, String> {
     let [from, to] = band.range_nm.ok_or(format!(
         "dispersion needs wavelengths, and band `{}` has none: use `bands.spectral`, or explicit bands \
          with `from_nm` and `to_nm`",
@@ -117,14 +124,14 @@ pub fn eta_materials() -> Vec<&'static str> {
 }
 
 impl MediumEntry {
-    /// The coefficients in each band; none where a name is unknown, no pair is whole, or wavelengths are needed and
-    /// missing.
-    pub fn per_band(&self, bands: &[Band]) -> Option<Vec<BandMedium>> {
+    /// The coefficients in each band; none where a name is unknown, no pair is whole, or wavelengths are
+    /// needed and missing.
+    pub fn per_band(&self, bands: &[BandInterval]) -> Option<Vec<BandMedium>> {
         match self {
             MediumEntry::Coefficients(coefficients) => coefficients.per_band(bands.len()),
             MediumEntry::Skin(words) => {
                 let g = words.g.unwrap_or(0.0);
-                let band = |band: &Band| {
+                let band = |band: &BandInterval| {
                     let (sigma_a, reduced) = words.band(band.range_nm?);
                     Some(BandMedium { sigma_a, sigma_s: reduced / (1.0 - g), g })
                 };
@@ -169,8 +176,8 @@ mod tests {
 
     #[test]
     fn bins_cover_the_range() {
-        let bands = Bands::Spectral { from_nm: 400.0, to_nm: 700.0, count: 4 }.list();
-        assert_eq!(bands[1], Band { name: "475-550nm".into(), range_nm: Some([475.0, 550.0]) });
+        let bands = BandsEntry::Spectral { from_nm: 400.0, to_nm: 700.0, count: 4 }.list();
+        assert_eq!(bands[1], BandInterval { name: "475-550nm".into(), range_nm: Some([475.0, 550.0]) });
         assert_eq!(bands[3].range_nm.unwrap()[1], 700.0);
     }
 
@@ -194,13 +201,13 @@ mod tests {
             reduced_sigma_s_per_mm: grey(1.5),
             ..none.clone()
         };
-        let two = Bands::Rgb {}.list()[..2].to_vec();
+        let two = BandsEntry::Rgb {}.list()[..2].to_vec();
         for coefficients in [total, parts, reduced] {
             assert_eq!(MediumEntry::Coefficients(coefficients).per_band(&two), Some(expected.clone()));
         }
         assert_eq!(none.per_band(2), None);
         let preset = MediumEntry::Preset { name: "skin1".into(), scale: 2.0, g: Some(0.5) };
-        let red = preset.per_band(&Bands::Rgb {}.list()).unwrap()[0];
+        let red = preset.per_band(&BandsEntry::Rgb {}.list()).unwrap()[0];
         assert_eq!(red, BandMedium { sigma_a: 0.064, sigma_s: 2.96, g: 0.5 });
     }
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::{Value as Json, json};
 
 use super::schema::{ExperimentFile, Scalar, Sweep, SweepRow};
-use super::sweep::{Point, SweepAxis};
+use super::sweep::{AxisPoint, SweepAxis};
 use super::{CellSpec, Experiment};
 
 impl CellSpec {
@@ -26,8 +26,8 @@ impl CellSpec {
 
 impl Experiment {
     /// The whole experiment without its claims and pictures, as a file of its own: overrides applied,
-    /// defaults written out, object, sensor and lights of the first cell, sweeps as rows. Loading it again
-    /// gives the same cells.
+    /// defaults written out, object, sensor and lights of the first cell, sweeps as rows. Loading it
+    /// again gives the same cells.
     pub fn resolved(&self) -> Json {
         json(&ExperimentFile { claim: Vec::new(), picture: Vec::new(), ..self.file.clone() })
     }
@@ -50,7 +50,7 @@ fn axis(axis: &SweepAxis) -> Sweep {
     }
 }
 
-fn row(point: &Point) -> SweepRow {
+fn row(point: &AxisPoint) -> SweepRow {
     let text = |text: &String| Scalar::Text(text.clone());
     SweepRow {
         label: point.label.clone(),

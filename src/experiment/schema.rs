@@ -1,6 +1,8 @@
 //! What an experiment file may say. The types below are the single source: `scatterproof schema`
 //! prints the JSON Schema that they generate, and `validate` walks a file along that same schema.
 //! Keys carry units. Physics has no defaults; run control has.
+//!
+//! A file has a scene with estimators, or samplers, or both; `rules` says which keys belong together.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-pub use super::claim_words::{Agree, ClaimEntry, Differs, Equals, Expect, Reproduces};
+pub use super::claim_words::{Agree, ClaimEntry, Differs, Equals, Expect, Reproduces, SamplerClaim};
 pub use super::direction::{Direction, Polar};
 pub use super::duel::{CONTROL, CostMeasure, Duel, Faster, NotSlower};
 use super::picture::PictureEntry;
@@ -35,15 +37,20 @@ pub struct ExperimentFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fresh: Option<String>,
     /// The wavelength bands; each is rendered by itself.
-    pub bands: Bands,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bands: Option<BandsEntry>,
     /// The body.
-    pub object: Object,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object: Option<Object>,
     /// What is measured.
-    pub sensor: SensorEntry,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<SensorEntry>,
     /// The lights, all shining at once.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(min = 1))]
     pub light: Vec<LightEntry>,
     /// The estimators that are compared.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(min = 1))]
     pub estimator: Vec<EstimatorEntry>,
     /// Axes of the sweep; they multiply.
@@ -51,9 +58,18 @@ pub struct ExperimentFile {
     pub sweep: Vec<Sweep>,
     /// Cells that share random streams.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pair: Option<Pair>,
+    pub pair: Option<PairEntry>,
     /// How much work.
-    pub budget: Budget,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<Budget>,
+    /// Draws per sampler.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1000, max = 10000000000u64))]
+    pub samples: Option<u64>,
+    /// The samplers whose draws are held against the densities that they claim.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(min = 1))]
+    pub sampler: Vec<SamplerEntry>,
     /// What must hold.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub claim: Vec<ClaimEntry>,
@@ -72,7 +88,7 @@ pub struct ExperimentFile {
 /// The wavelength bands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Bands {
+pub enum BandsEntry {
     /// Three bands R, G, B without wavelengths.
     Rgb {},
     /// Equal bins over a range of wavelengths.
@@ -424,11 +440,38 @@ pub struct Environment {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EstimatorEntry {
     /// Name in tables and claims, unique.
-    #[schemars(length(min = 1))]
+    #[schemars(length(min = 1), regex(pattern = r"^[^/\\\x00-\x1F\x7F]*$"))]
     pub name: String,
     /// The kind and its options.
     #[serde(flatten)]
     pub kind: BTreeMap<String, Value>,
+}
+
+/// One sampler: a unique `name` and exactly one kind with its options, as
+/// `henyey_greenstein = { g = 0.9 }`. The kinds are those that the program registers (`scatterproof
+/// list`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SamplerEntry {
+    /// Name in tables and claims, unique.
+    #[schemars(length(min = 1), regex(pattern = r"^[^/\\\x00-\x1F\x7F]*$"))]
+    pub name: String,
+    /// The kind and its options.
+    #[serde(flatten)]
+    pub kind: BTreeMap<String, Value>,
+}
+
+impl EstimatorEntry {
+    /// Its kind and options, which validation has found to be one pair.
+    pub fn choice(&self) -> Option<(&str, &Value)> {
+        self.kind.iter().next().map(|(kind, options)| (kind.as_str(), options))
+    }
+}
+
+impl SamplerEntry {
+    /// Its kind and options, which validation has found to be one pair.
+    pub fn choice(&self) -> Option<(&str, &Value)> {
+        self.kind.iter().next().map(|(kind, options)| (kind.as_str(), options))
+    }
 }
 
 /// One axis of the sweep: `keys` with `rows`, one `key` with `values`, or rows from a CSV file.
@@ -493,7 +536,7 @@ pub struct SweepCsv {
 /// Cells that differ only in these keys are played on the same random streams.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Pair {
+pub struct PairEntry {
     /// Dotted keys left out of the streams' key, as `object.shape`.
     #[schemars(length(min = 1))]
     pub over: Vec<String>,

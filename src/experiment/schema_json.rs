@@ -1,59 +1,39 @@
-//! The complete JSON Schemas of experiment files, estimators and samplers included: what editors complete
-//! from, what `scatterproof schema` prints, and what validation walks.
+//! The complete JSON Schemas of experiment files, estimators and samplers included: what editors
+//! complete from, what `scatterproof schema` prints, and what validation walks.
 
 use serde_json::{Map, Value as Json, json};
 
 use super::registry::Registry;
-use super::sampler_file::SamplerFile;
+use super::rules::{SAMPLER_KEYS, SCENE_KEYS};
 use super::schema::ExperimentFile;
 
-/// The JSON Schema (2020-12) of an experiment file whose estimators are those of `registry`.
+/// The JSON Schema (2020-12) of an experiment file whose estimators and samplers are those of
+/// `registry`, as validation walks it.
 pub fn json_schema(registry: &Registry) -> Json {
     let mut schema = schemars::schema_for!(ExperimentFile).to_value();
     schema["title"] = json!("scatterproof experiment");
-    let kinds = registry.estimators.iter().map(|entry| (entry.kind, entry.doc, entry.options()));
-    inject("EstimatorEntry", kinds.collect(), &mut schema);
+    let estimators = registry.estimators.iter().map(|entry| (entry.kind, entry.doc, entry.options()));
+    inject("EstimatorEntry", "", estimators.collect(), &mut schema);
+    let samplers = registry.samplers.iter().map(|entry| (entry.kind, entry.doc, entry.options()));
+    inject("SamplerEntry", "sampler.", samplers.collect(), &mut schema);
     schema
 }
 
-/// The JSON Schema of an experiment file on samplers, whose kinds are those of `registry`.
-pub fn sampler_schema(registry: &Registry) -> Json {
-    let mut schema = schemars::schema_for!(SamplerFile).to_value();
-    schema["title"] = json!("scatterproof experiment on samplers");
-    let kinds = registry.samplers.iter();
-    let kinds = kinds.map(|entry| (entry.kind, entry.doc, entry.options()));
-    inject("SamplerEntry", kinds.collect(), &mut schema);
+/// The same for editors, which keys belong together included: a scene with estimators, or samplers, or
+/// both.
+pub fn editor_schema(registry: &Registry) -> Json {
+    let mut schema = json_schema(registry);
+    let parts = [&SCENE_KEYS[..], &SAMPLER_KEYS];
+    schema["anyOf"] = json!(parts.map(|keys| json!({ "required": keys })));
+    let together = parts.into_iter().flat_map(|keys| keys.iter().map(move |key| (*key, json!(keys))));
+    schema["dependentRequired"] = Json::Object(together.map(|(k, v)| (k.to_string(), v)).collect());
     schema
-}
-
-/// The JSON Schema of any experiment file: one with a `sampler` is an experiment on samplers.
-pub fn any_schema(registry: &Registry) -> Json {
-    let (mut scenes, mut samplers) = (json_schema(registry), sampler_schema(registry));
-    let mut definitions = Map::new();
-    for (schema, prefix) in [(&mut scenes, ""), (&mut samplers, "sampler")] {
-        if !prefix.is_empty() {
-            rename_references(prefix, schema);
-        }
-        if let Some(object) = schema.as_object_mut() {
-            object.remove("$schema");
-            let Some(Json::Object(own)) = object.remove("$defs") else { continue };
-            let name = |name: String| if prefix.is_empty() { name } else { format!("{prefix}.{name}") };
-            definitions.extend(own.into_iter().map(|(key, schema)| (name(key), schema)));
-        }
-    }
-    json!({
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "scatterproof experiment",
-        "if": { "required": ["sampler"] },
-        "then": samplers,
-        "else": scenes,
-        "$defs": definitions,
-    })
 }
 
 /// Completes the definition `name` of one entry: its name and exactly one registered kind, of which a
-/// line of documentation and the schema of the options are given.
-fn inject(name: &str, kinds: Vec<(&'static str, &'static str, Json)>, schema: &mut Json) {
+/// line of documentation and the schema of the options are given. What the options define stands at the
+/// root under names that begin with `prefix` and the kind.
+fn inject(name: &str, prefix: &str, kinds: Vec<(&'static str, &'static str, Json)>, schema: &mut Json) {
     let mut entry = schema["$defs"][name].clone();
     let required = kinds.iter().map(|(kind, ..)| json!({ "required": [kind] })).collect::<Vec<_>>();
     for (kind, doc, mut options) in kinds {
@@ -62,7 +42,7 @@ fn inject(name: &str, kinds: Vec<(&'static str, &'static str, Json)>, schema: &m
             object.remove("$schema");
             object.remove("title");
         }
-        lift_definitions(kind, &mut options, schema);
+        lift_definitions(&format!("{prefix}{kind}"), &mut options, schema);
         entry["properties"][kind] = options;
     }
     entry["additionalProperties"] = json!(false);
@@ -72,7 +52,7 @@ fn inject(name: &str, kinds: Vec<(&'static str, &'static str, Json)>, schema: &m
     schema["$defs"][name] = entry;
 }
 
-/// Moves the definitions of an estimator's options to the root, under names that carry its kind.
+/// Moves the definitions of a kind's options to the root, under names that carry the kind.
 fn lift_definitions(kind: &str, options: &mut Json, schema: &mut Json) {
     let Some(Json::Object(definitions)) = options.as_object_mut().and_then(|o| o.remove("$defs")) else {
         return;

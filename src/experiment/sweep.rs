@@ -3,48 +3,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use super::document::{Node, Source, Value};
+use super::document::{InputKind, Node, Value};
 use super::overrides::{is_within, overlap, relabel};
 use super::rules::{CELL_KEYS, Findings};
 use super::suggest;
 use super::sweep_csv;
+pub use super::sweep_point::{AxisPoint, RowField, SweepAxis};
 use crate::error::Place;
 
 /// More cells than this are taken for a mistake.
 const MOST_CELLS: usize = 100_000;
-
-/// One axis.
-#[derive(Clone, Debug)]
-pub struct SweepAxis {
-    /// Its name.
-    pub name: String,
-    /// Its points in order.
-    pub points: Vec<Point>,
-}
-
-/// One point of an axis.
-#[derive(Clone, Debug)]
-pub struct Point {
-    /// Its label.
-    pub label: String,
-    /// Where it stands.
-    pub place: Place,
-    /// The dotted keys that it sets, and the values.
-    pub sets: Vec<(String, Node)>,
-    /// The columns of its row.
-    pub columns: BTreeMap<String, Column>,
-    /// The line of its CSV file, counted from 1.
-    pub csv_line: Option<usize>,
-}
-
-/// One field of a row.
-#[derive(Clone, Debug)]
-pub struct Column {
-    /// Its text.
-    pub text: String,
-    /// Where it stands.
-    pub place: Place,
-}
 
 /// The path of a file that an experiment file names, relative to the folder of that file.
 pub fn resolve_path(experiment: &Path, named: &str) -> PathBuf {
@@ -74,7 +42,7 @@ pub fn axes(
 }
 
 /// The points of every cell, the first axis slowest. Without axes there is one cell.
-pub fn cells(axes: &[SweepAxis]) -> Vec<Vec<&Point>> {
+pub fn cells(axes: &[SweepAxis]) -> Vec<Vec<&AxisPoint>> {
     axes.iter().fold(vec![Vec::new()], |cells, axis| {
         let extend = |cell: Vec<_>| axis.points.iter().map(move |point| [&cell[..], &[point]].concat());
         cells.into_iter().flat_map(extend).collect()
@@ -83,9 +51,9 @@ pub fn cells(axes: &[SweepAxis]) -> Vec<Vec<&Point>> {
 
 fn axis(entry: &Node, experiment: &Path, findings: &Findings) -> Option<SweepAxis> {
     let mut points = match form(entry, findings)? {
-        Form::Values => from_values(entry, findings),
-        Form::Rows => from_rows(entry, findings),
-        Form::Csv => {
+        AxisForm::Values => from_values(entry, findings),
+        AxisForm::Rows => from_rows(entry, findings),
+        AxisForm::Csv => {
             let entry = entry.get("csv")?;
             let path = entry.get("path").and_then(Node::as_str)?;
             sweep_csv::points(entry, &resolve_path(experiment, path), findings)
@@ -94,7 +62,7 @@ fn axis(entry: &Node, experiment: &Path, findings: &Findings) -> Option<SweepAxi
     let first_key = points.first().and_then(|point| point.sets.first()).map(|(key, _)| key.clone());
     let named = entry.get("name").and_then(Node::as_str).map(String::from);
     let name = named.or_else(|| Some(first_key?.rsplit('.').next()?.to_string()))?;
-    let source = Source::Sweep(name.as_str().into());
+    let source = InputKind::Sweep(name.as_str().into());
     for (_, value) in points.iter_mut().filter(|p| p.csv_line.is_none()).flat_map(|p| &mut p.sets) {
         relabel(value, &source);
     }
@@ -102,19 +70,19 @@ fn axis(entry: &Node, experiment: &Path, findings: &Findings) -> Option<SweepAxi
     (unique_labels(&points, findings) && known_keys).then_some(SweepAxis { name, points })
 }
 
-enum Form {
+enum AxisForm {
     Values,
     Rows,
     Csv,
 }
 
-fn form(entry: &Node, findings: &Findings) -> Option<Form> {
+fn form(entry: &Node, findings: &Findings) -> Option<AxisForm> {
     let keys = ["csv", "key", "keys", "rows", "values"];
     let given: Vec<&str> = keys.into_iter().filter(|key| entry.get(key).is_some()).collect();
     match given[..] {
-        ["csv"] => Some(Form::Csv),
-        ["key", "values"] => Some(Form::Values),
-        ["keys", "rows"] => Some(Form::Rows),
+        ["csv"] => Some(AxisForm::Csv),
+        ["key", "values"] => Some(AxisForm::Values),
+        ["keys", "rows"] => Some(AxisForm::Rows),
         _ => {
             let found = if given.is_empty() { "none".into() } else { suggest::quoted(&given) };
             let rule = "a sweep needs exactly one of `key` with `values`, `keys` with `rows`, `csv`";
@@ -124,11 +92,11 @@ fn form(entry: &Node, findings: &Findings) -> Option<Form> {
     }
 }
 
-fn from_values(entry: &Node, findings: &Findings) -> Option<Vec<Point>> {
+fn from_values(entry: &Node, findings: &Findings) -> Option<Vec<AxisPoint>> {
     let (key, values) = (entry.get("key")?, entry.get("values")?);
     not_empty(values, findings)?;
     let point = |value: &Node| {
-        Some(Point {
+        Some(AxisPoint {
             label: value.label(),
             place: value.origin.place.clone(),
             sets: vec![setting(key, value)?],
@@ -139,16 +107,16 @@ fn from_values(entry: &Node, findings: &Findings) -> Option<Vec<Point>> {
     values.items().iter().map(point).collect()
 }
 
-fn from_rows(entry: &Node, findings: &Findings) -> Option<Vec<Point>> {
+fn from_rows(entry: &Node, findings: &Findings) -> Option<Vec<AxisPoint>> {
     let (keys, rows) = (entry.get("keys")?, entry.get("rows")?);
     not_empty(keys, findings)?;
     not_empty(rows, findings)?;
-    let points: Vec<Option<Point>> =
+    let points: Vec<Option<AxisPoint>> =
         rows.items().iter().map(|row| from_row(keys.items(), row, findings)).collect();
     points.into_iter().collect()
 }
 
-fn from_row(keys: &[Node], row: &Node, findings: &Findings) -> Option<Point> {
+fn from_row(keys: &[Node], row: &Node, findings: &Findings) -> Option<AxisPoint> {
     let (label, values) = (row.get("label")?, row.get("values")?);
     let count = values.items().len();
     if count != keys.len() {
@@ -163,7 +131,7 @@ fn from_row(keys: &[Node], row: &Node, findings: &Findings) -> Option<Point> {
         }
         _ => BTreeMap::new(),
     };
-    Some(Point {
+    Some(AxisPoint {
         label: label.as_str()?.to_string(),
         place: label.origin.place.clone(),
         sets: sets?,
@@ -172,8 +140,8 @@ fn from_row(keys: &[Node], row: &Node, findings: &Findings) -> Option<Point> {
     })
 }
 
-fn column(node: &Node) -> Column {
-    Column { text: node.label(), place: node.origin.place.clone() }
+fn column(node: &Node) -> RowField {
+    RowField { text: node.label(), place: node.origin.place.clone() }
 }
 
 /// A key with its value, which takes the place of the key's text for findings about the key.
@@ -190,16 +158,16 @@ fn not_empty(list: &Node, findings: &Findings) -> Option<()> {
     Some(())
 }
 
-fn unique_labels(points: &[Point], findings: &Findings) -> bool {
+fn unique_labels(points: &[AxisPoint], findings: &Findings) -> bool {
     let mut labels = BTreeSet::new();
-    let twice: Vec<&Point> = points.iter().filter(|point| !labels.insert(&point.label)).collect();
+    let twice: Vec<&AxisPoint> = points.iter().filter(|point| !labels.insert(&point.label)).collect();
     for point in &twice {
         findings.at(&point.place, format!("label `{}` stands twice on the axis", point.label), None);
     }
     twice.is_empty()
 }
 
-fn cell_keys_only(points: &[Point], findings: &Findings) -> bool {
+fn cell_keys_only(points: &[AxisPoint], findings: &Findings) -> bool {
     let sets = points.first().map(|point| &point.sets[..]).unwrap_or_default();
     let is_foreign = |key: &str| !key.split('.').next().is_some_and(|word| CELL_KEYS.contains(&word));
     let foreign: Vec<_> = sets.iter().filter(|(key, _)| is_foreign(key)).collect();

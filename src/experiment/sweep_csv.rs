@@ -7,15 +7,15 @@ use std::sync::Arc;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
-use super::document::{Node, Origin, Source, Value};
+use super::document::{InputKind, Node, Origin, Value};
 use super::rules::Findings;
 use super::suggest;
-use super::sweep::{Column, Point};
+use super::sweep_point::{AxisPoint, RowField};
 use crate::error::Place;
 
 /// Reads the rows that the `csv` entry of a sweep names; `path` is that of the CSV file. None where
 /// something is wrong with it; the findings say what.
-pub fn points(entry: &Node, path: &Path, findings: &Findings) -> Option<Vec<Point>> {
+pub fn points(entry: &Node, path: &Path, findings: &Findings) -> Option<Vec<AxisPoint>> {
     let path_node = entry.get("path")?;
     let text = match std::fs::read_to_string(path) {
         Ok(text) => text,
@@ -128,25 +128,25 @@ fn columns(entry: &Node, header: &[String], findings: &Findings) -> Option<Vec<S
     (sets.len() == columns.len()).then_some(sets)
 }
 
-fn point(file: &File, header: &[String], sets: &[Set], record: &StringRecord) -> Point {
+fn point(file: &File, header: &[String], sets: &[Set], record: &StringRecord) -> AxisPoint {
     let start = record.position().map_or(0, |p| p.byte() as usize);
     let text = |index: usize| record.get(index).unwrap_or("").to_string();
     let place = |index| file.place(file.field(start, index));
-    let columns: BTreeMap<String, Column> = header
+    let columns: BTreeMap<String, RowField> = header
         .iter()
         .enumerate()
-        .map(|(i, name)| (name.clone(), Column { text: text(i), place: place(i) }))
+        .map(|(i, name)| (name.clone(), RowField { text: text(i), place: place(i) }))
         .collect();
     let value = |set: &Set| Node {
         value: number_or_text(&text(set.index)),
-        origin: Origin { source: Source::Csv, place: place(set.index) },
+        origin: Origin { source: InputKind::Csv, place: place(set.index) },
         key: Some(set.place.clone()),
         inline: false,
     };
     let texts: Vec<String> = sets.iter().map(|set| text(set.index)).collect();
     let label = columns.get("label").map_or_else(|| texts.join(", "), |column| column.text.clone());
     let line = file.place(file.line(start));
-    Point {
+    AxisPoint {
         label,
         place: line.clone(),
         sets: sets.iter().map(|set| (set.key.clone(), value(set))).collect(),

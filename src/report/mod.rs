@@ -69,6 +69,7 @@ pub fn write_judged(
     let stored = Stored { timing: folder.read_timing()?, ..stored };
     let provenance = folder.read_provenance()?;
     let rows = measurements(&stored, stored.timing.as_ref());
+    folder.clear_pictures()?;
     let pictures = pictures::write_pictures(folder, &stored)?;
     let viewers = viewer::viewers(&stored, &pictures)?;
     let wanted = folder.read_pictures()?;
@@ -194,5 +195,25 @@ mod tests {
 
         write(&folder).expect("a report");
         assert_eq!((read("report.md"), read("report.html")), (markdown, html));
+    }
+
+    #[test]
+    fn pictures_of_an_earlier_record_go_and_names_are_no_paths() {
+        let temp = tempfile::tempdir().expect("a folder");
+        let folder = RecordFolder::new(temp.path().join("sample"));
+        let stored = sample::stored(0.5);
+        folder.write(stored.record.clone(), stored.arrays.clone()).expect("a record");
+        write(&folder).expect("a report");
+        folder.write_view("images/of-mine.png", b"").expect("a file");
+        let mut renamed = stored;
+        renamed.record.cells[0].runs[0].estimator = "../mean, as published".into();
+        folder.write(renamed.record, renamed.arrays).expect("a record");
+        write(&folder).expect("a report");
+        let names = std::fs::read_dir(folder.root().join("images")).expect("a folder").flatten();
+        let mut names: Vec<_> = names.map(|entry| entry.file_name()).collect();
+        names.sort();
+        let runs = ["000-000.mean-as-published.exr", "000-000.mean-as-published.png"];
+        assert_eq!(names[..2], runs);
+        assert_eq!(names[2..], ["000-snee.exr", "000-snee.png", "of-mine.png"]);
     }
 }

@@ -28,6 +28,19 @@ fn write_with(path: &Path, doing: &str, fill: impl FnOnce(&mut File) -> io::Resu
     })
 }
 
+/// Removes the files that [`write`] had not finished where its process was killed.
+pub fn sweep(folder: &Path) -> Result<()> {
+    for entry in fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with('.') && name.ends_with(".tmp") {
+            let path = entry.path();
+            fs::remove_file(&path).map_err(Error::io(&path, "remove an unfinished file"))?;
+        }
+    }
+    Ok(())
+}
+
 /// Creates a folder and its parents.
 pub fn create_folder(path: &Path, doing: &str) -> Result<()> {
     fs::create_dir_all(path).map_err(Error::io(path, doing))

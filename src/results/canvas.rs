@@ -28,8 +28,9 @@ impl Canvas {
         Canvas { width, height, data: vec![255; 3 * width * height] }
     }
 
-    /// Paints the columns `columns` of a picture, radiance times `gain`, every pixel as a square of `zoom` by
-    /// `zoom`, with its top left corner at `(x, y)`. What lies beyond the sheet is not painted.
+    /// Paints the columns `columns` of a picture, radiance times `gain`, every pixel as a square of
+    /// `zoom` by `zoom`, with its top left corner at `(x, y)`. What lies beyond the sheet is not
+    /// painted.
     pub fn paint(
         &mut self,
         picture: &Picture,

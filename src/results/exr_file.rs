@@ -31,9 +31,9 @@ pub struct ExrImage {
 /// A part of a file: its name, and its channels by name.
 pub type Part = (String, Vec<(String, Vec<f32>)>);
 
-/// Writes a picture, row 0 of the file at the top: a first part `rgb` that any viewer shows (channels R, G, B), then a part for each
-/// band with channels `mean` and `std_error`. Values are rounded to f32; the record has them whole.
-/// Every part carries `attributes` as lines of its standard attribute `comments`.
+/// Writes a picture, row 0 of the file at the top: a first part `rgb` that any viewer shows (channels R,
+/// G, B), then a part for each band with channels `mean` and `std_error`. Values are rounded to f32; the
+/// record has them whole. Every part carries `attributes` as lines of its standard attribute `comments`.
 pub fn write_exr(path: &Path, picture: &Picture, attributes: &[(&str, &str)]) -> Result<()> {
     let rgb = |c: usize| picture.rgb().map(|rgb| rgb[c] as f32).collect();
     let colours = ["R", "G", "B"].iter().enumerate();

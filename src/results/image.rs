@@ -68,7 +68,8 @@ pub struct Png {
     pub bytes: Vec<u8>,
     /// Pixels with a channel above 1 after exposure, shown as 1: brighter than the picture can say.
     pub clipped: usize,
-    /// Pixels with a channel below 0 (outside the sRGB gamut) or not finite; negatives and NaN show as 0.
+    /// Pixels with a channel below 0 (outside the sRGB gamut) or not finite; negatives and NaN show as
+    /// 0.
     pub out_of_gamut: usize,
 }
 
@@ -158,11 +159,12 @@ pub fn diverging(x: f64) -> [u8; 3] {
     [0, 1, 2].map(|c| (from[c] + part * (to[c] - from[c])).round() as u8)
 }
 
-/// Linear sRGB, row by row from the top, as data for a script, not to be looked at: a PNG of twice its height, without a colour
-/// profile and without row filters. A value is the upper half of its 32-bit float (sign, 8 bits of exponent, 7 of
-/// mantissa): relative error at most 2^-8, not finite where the value is not, any exposure. The upper rows hold
-/// the first bytes, the lower rows the second ones. An exponent of its own for every channel: one that
-/// three channels share loses the dark ones of saturated colours by several levels of a display.
+/// Linear sRGB, row by row from the top, as data for a script, not to be looked at: a PNG of twice its
+/// height, without a colour profile and without row filters. A value is the upper half of its 32-bit
+/// float (sign, 8 bits of exponent, 7 of mantissa): relative error at most 2^-8, not finite where the
+/// value is not, any exposure. The upper rows hold the first bytes, the lower rows the second ones. An
+/// exponent of its own for every channel: one that three channels share loses the dark ones of saturated
+/// colours by several levels of a display.
 pub fn to_linear_png(width: usize, rgb: impl Iterator<Item = [f64; 3]>) -> Result<Vec<u8>> {
     let pixels: Vec<[u16; 3]> = rgb.map(|rgb| rgb.map(upper_half)).collect();
     let is_grey = pixels.iter().all(|[r, g, b]| r == g && g == b);

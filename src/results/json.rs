@@ -1,16 +1,18 @@
 //! Canonical JSON and content hashes: equal values have equal bytes.
 
 use serde::Serialize;
-use serde_json::Value;
 
 /// JSON with sorted keys, two-space indentation and a final newline; numbers are the shortest text
 /// that reads back as the same f64. Numbers that are not finite become `null`.
+///
+/// # Panics
+/// On a type that has no JSON (a map whose keys are no texts): a mistake in the program, and no input
+/// makes it.
 pub fn canonical(value: &impl Serialize) -> String {
     // serde_json::Value keeps its keys in a BTreeMap, so the detour sorts structs and maps alike.
-    let value = serde_json::to_value(value).unwrap_or(Value::Null);
-    let mut text = serde_json::to_string_pretty(&value).unwrap_or_default();
-    text.push('\n');
-    text
+    let value =
+        serde_json::to_value(value).unwrap_or_else(|error| panic!("a type without JSON: {error}"));
+    format!("{value:#}\n")
 }
 
 /// blake3 of bytes.

@@ -1,6 +1,6 @@
-//! `manifest.json`: what of a result is kept where its arrays are not. The passes of every run, so that `run --passes-of`
-//! plays as many again; the hash of every array, so that it can be seen whether they came out the same; and the hash of
-//! every table, plot and picture for people, so that one that was changed by hand is found.
+//! `manifest.json`: what remains of a result where its arrays are not kept. It holds the passes of every
+//! run, for `run --passes-of`; the hash of every array, to tell whether a re-run reproduces it; and the
+//! hash of every table, plot and picture, so that one changed by hand is found.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -33,7 +33,7 @@ pub struct Manifest {
     pub experiment_hash: String,
     /// What fixes the bits: see `results::provenance`.
     pub fingerprint: String,
-    /// What was played, in the order of cells and estimators.
+    /// The runs, in the order of cells and estimators.
     pub runs: Vec<ManifestRun>,
     /// blake3 of tables, plots and pictures, hex, by path relative to the results folder.
     pub views: BTreeMap<String, String>,
@@ -78,7 +78,7 @@ impl Manifest {
         }
     }
 
-    /// Passes of an estimator in a cell, where it was played there.
+    /// Passes of an estimator in a cell, where it was run there.
     pub fn passes(&self, cell: usize, estimator: &str) -> Option<u64> {
         let mut runs = self.runs.iter();
         runs.find(|run| run.cell == cell && run.estimator == estimator).map(|run| run.passes)

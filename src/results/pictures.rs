@@ -13,7 +13,8 @@ pub enum Wanted {
     Running(Running),
 }
 
-/// A grid of pictures, a picture a cell, whose left half is one estimator's and whose right half another's.
+/// A grid of pictures, a picture a cell, whose left half is one estimator's and whose right half
+/// another's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Split {

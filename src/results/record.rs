@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::sampler::SamplerRun;
 
 /// Version of this layout; a reader refuses others.
-pub const SCHEMA_VERSION: u32 = 3;
+pub const SCHEMA_VERSION: u32 = 4;
 
 /// `record.json`: everything but the arrays, which stand in `.npy` files beside it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -141,30 +141,30 @@ impl ObservedRegion {
 pub struct EstimatorRun {
     /// The name the experiment gives it.
     pub estimator: String,
-    /// The estimator that this is a second arm of, for comparisons of CPU time: the same on streams of its
-    /// own, so that the two differ by chance and by the machine's noise alone.
+    /// The estimator that this is a second arm of, for comparisons of CPU time: the same on streams of
+    /// its own, so that the two differ by chance and by the machine's noise alone.
     pub control_of: Option<String>,
     /// Its kind, as `path`.
     pub kind: String,
     /// What it promises of its mean.
-    pub bias: Bias,
+    pub bias: StatedBias,
     /// The model whose integral it estimates; none where it is light transport itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
     /// Where its mean is known beforehand to be far from normal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub heavy_tails: Vec<HeavyTail>,
+    pub heavy_tails: Vec<StatedTail>,
     /// What a reader must know (a transport that it cannot sample).
     pub notes: Vec<String>,
     /// Number of independent passes.
     pub passes: u64,
     /// The observables, in the order of the observables array's observable axis.
     pub observables: Vec<Observable>,
-    /// Path of the moments of the observables, `[batch][observable][band][5]` f64: count, mean, and the sums of
-    /// second, third and fourth powers of deviations from the mean.
+    /// Path of the moments of the observables, `[batch][observable][band][5]` f64: count, mean, and the
+    /// sums of second, third and fourth powers of deviations from the mean.
     pub moments: String,
-    /// Path of the counts of work, `[batch][counter]` f64: the batches of `moments`, the counters in the order
-    /// of `cost`'s names. Their sums over batches are `cost`.
+    /// Path of the counts of work, `[batch][counter]` f64: the batches of `moments`, the counters in the
+    /// order of `cost`'s names. Their sums over batches are `cost`.
     pub costs: String,
     /// The image, where the sensor has pixels.
     pub image: Option<Image>,
@@ -177,19 +177,19 @@ pub struct EstimatorRun {
 /// Scores whose sample mean has no valid interval.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct HeavyTail {
+pub struct StatedTail {
     /// Index into [`Record::bands`].
     pub band: usize,
     /// In this class, and in `all`.
     pub class: String,
-    /// Because.
+    /// Why.
     pub reason: String,
 }
 
 /// What an estimator promises of its mean.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Bias {
+pub enum StatedBias {
     /// The expectation is the integral.
     Unbiased,
     /// The expectation tends to the integral as passes grow.
@@ -209,8 +209,8 @@ pub struct Observable {
     pub class: String,
 }
 
-/// The observable of claims of efficiency that stands for all pixels at once: its variance is that of a pixel,
-/// averaged over the pixels. It has no mean; that of the sensor's first observable stands for it.
+/// The observable of claims of efficiency that stands for all pixels at once: its variance is that of a
+/// pixel, averaged over the pixels. It has no mean; that of the sensor's first observable stands for it.
 pub const PIXELS: &str = "pixels";
 
 impl Observable {
@@ -235,10 +235,10 @@ pub struct Image {
     pub height: usize,
     /// Path of the `[2][row][column][band]` f64 array: mean over passes, and its standard error.
     pub pixels: String,
-    /// Path of the `[batch][band][5]` f64 array: the moments, as of `moments`, of half the squared difference of
-    /// passes 2i and 2i + 1, averaged over the pixels. Its mean is the variance of a pixel in one pass, averaged
-    /// over the pixels. The batches are those of `moments`, but at least 2 passes each; a last pass without a
-    /// partner is in none.
+    /// Path of the `[batch][band][5]` f64 array: the moments, as of `moments`, of half the squared
+    /// difference of passes 2i and 2i + 1, averaged over the pixels. Its mean is the variance of a pixel
+    /// in one pass, averaged over the pixels. The batches are those of `moments`, but at least 2 passes
+    /// each; a last pass without a partner is in none.
     pub spread: String,
 }
 
@@ -368,8 +368,8 @@ pub enum Against {
         /// True where both were played on the same random streams, pass by pass.
         paired: bool,
     },
-    /// Another estimator of the same integral, by efficiency: the baseline's variance times cost over this
-    /// quantity's must exceed a bound.
+    /// Another estimator of the same integral, by efficiency: the baseline's variance times cost over
+    /// this quantity's must exceed a bound.
     Efficiency {
         /// The same quantity of the baseline.
         baseline: Quantity,

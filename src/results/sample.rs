@@ -57,7 +57,8 @@ pub fn quantity(estimator: &str, band: usize) -> Quantity {
 
 /// Replaces an estimator's moments by what `score(pass, observable, band)` says.
 pub fn set_observables(stored: &mut Stored, estimator: &str, score: impl Fn(u64, usize, usize) -> f64) {
-    stored.arrays.insert(observables_path(0, estimator), moments(PASSES, score));
+    let path = observables_path(0, index_of(stored, estimator));
+    stored.arrays.insert(path, moments(PASSES, score));
 }
 
 /// What pairs of passes show of 16 pixels whose standard deviation is `noise`: see [`Image::spread`].
@@ -72,15 +73,22 @@ pub fn pairs(noise: f64, first: u64) -> impl Fn(u64, usize) -> f64 {
 
 /// Replaces the spread of an estimator's pixels by what `spread(pair, band)` says.
 pub fn set_spread(stored: &mut Stored, estimator: &str, spread: impl Fn(u64, usize) -> f64) {
-    set_spread_of(&mut stored.arrays, estimator, spread);
+    let run = index_of(stored, estimator);
+    set_spread_of(&mut stored.arrays, run, spread);
 }
 
-fn set_spread_of(arrays: &mut Arrays, estimator: &str, spread: impl Fn(u64, usize) -> f64) {
+/// The index of an estimator's run.
+fn index_of(stored: &Stored, estimator: &str) -> usize {
+    let mut runs = stored.record.cells[0].runs.iter();
+    runs.position(|run| run.estimator == estimator).expect("a run of that name")
+}
+
+fn set_spread_of(arrays: &mut Arrays, run: usize, spread: impl Fn(u64, usize) -> f64) {
     let mut tree = Counter::new(0, batch_level(PASSES) - 1);
     (0..PASSES / 2).for_each(|i| tree.push([0, 1].map(|b| Moments::of(spread(i, b))).to_vec()));
     let batches = tree.batches();
     let data = batches.iter().flatten().flat_map(Moments::to_array).collect();
-    arrays.insert(spread_path(0, estimator), Array::new(vec![batches.len(), 2, 5], data));
+    arrays.insert(spread_path(0, run), Array::new(vec![batches.len(), 2, 5], data));
 }
 
 fn moments(passes: u64, score: impl Fn(u64, usize, usize) -> f64) -> Array {
@@ -94,31 +102,26 @@ fn moments(passes: u64, score: impl Fn(u64, usize, usize) -> f64) -> Array {
 
 fn run(e: usize, name: &str, noise: f64, arrays: &mut Arrays) -> EstimatorRun {
     let score = |i, o: usize, b: usize| 1.0 + noise * uniform(i + 1000 * (4 * e + 2 * o + b) as u64);
-    arrays.insert(observables_path(0, name), moments(PASSES, score));
+    arrays.insert(observables_path(0, e), moments(PASSES, score));
     let pixels = (0..24).map(|i| if i < 12 { 0.1 * i as f64 } else { 0.01 }).collect();
-    arrays.insert(pixels_path(0, name), Array::new(vec![2, 2, 3, 2], pixels));
-    set_spread_of(arrays, name, pairs(noise, 1_000_000 * e as u64));
+    arrays.insert(pixels_path(0, e), Array::new(vec![2, 2, 3, 2], pixels));
+    set_spread_of(arrays, e, pairs(noise, 1_000_000 * e as u64));
     let costs = (0..PASSES / 4).map(|_| 16.0).collect(); // batches of 4 passes, 4 rays each
-    arrays.insert(costs_path(0, name), Array::new(vec![PASSES as usize / 4, 1], costs));
+    arrays.insert(costs_path(0, e), Array::new(vec![PASSES as usize / 4, 1], costs));
     let observable = |class: &str| Observable { name: "mean".into(), class: class.into() };
     EstimatorRun {
         estimator: name.into(),
         control_of: None,
         kind: "path".into(),
-        bias: Bias::Unbiased,
+        bias: StatedBias::Unbiased,
         model: None,
         heavy_tails: vec![],
         notes: vec![],
         passes: PASSES,
         observables: vec![observable("all"), observable("single")],
-        moments: observables_path(0, name),
-        costs: costs_path(0, name),
-        image: Some(Image {
-            width: 3,
-            height: 2,
-            pixels: pixels_path(0, name),
-            spread: spread_path(0, name),
-        }),
+        moments: observables_path(0, e),
+        costs: costs_path(0, e),
+        image: Some(Image { width: 3, height: 2, pixels: pixels_path(0, e), spread: spread_path(0, e) }),
         cost: BTreeMap::from([("rays".into(), 1024)]),
         anomalies: BTreeMap::new(),
     }

@@ -2,10 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::npy::Array;
-use super::record::Record;
-use super::store::{Arrays, Stored};
-
 /// One sampler's draws, held beside its density.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -94,42 +90,7 @@ pub struct ContrastRun {
     pub bound: f64,
 }
 
-/// Bins of a run: one row each of what was counted, masses, bounds.
-#[derive(Clone, Copy, Debug)]
-pub struct Bins<'a> {
-    /// Draws, or pairs.
-    pub observed: &'a [f64],
-    /// Masses, which sum to 1 where the density is one.
-    pub mass: &'a [f64],
-    /// Bounds of the errors of the masses.
-    pub bound: &'a [f64],
-}
-
-impl Stored {
-    /// The bins that stand at `path`.
-    pub fn bins(&self, path: &str) -> Option<Bins<'_>> {
-        let array = self.arrays.get(path)?;
-        let n = array.data.len() / 3;
-        let row = |i: usize| &array.data[i * n..(i + 1) * n];
-        (array.shape.first() == Some(&3)).then(|| Bins { observed: row(0), mass: row(1), bound: row(2) })
-    }
-}
-
 /// Where the bins of sampler number `index` stand, relative to the record's folder.
 pub fn bins_path(index: usize, which: &str) -> String {
     format!("samplers/{index:03}.{which}.npy")
-}
-
-/// What does not fit together in the record of a sampler, as a sentence.
-pub(super) fn defect(record: &Record, arrays: &Arrays) -> Option<String> {
-    record.samplers.iter().find_map(|run| {
-        let paths = [Some(&run.coarse), run.fine.as_ref(), run.serial.as_ref()];
-        let wrong = |array: Option<&Array>| match array.map(|a| &a.shape[..]) {
-            Some([3, n]) => *n == 0,
-            Some([3, a, b]) => a != b || *a == 0,
-            _ => true,
-        };
-        let bad = paths.into_iter().flatten().find(|path| wrong(arrays.get(*path)))?;
-        Some(format!("bins of {} have no usable array at {bad}", run.sampler))
-    })
 }

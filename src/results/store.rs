@@ -3,7 +3,7 @@
 //! ```text
 //! record/record.json              everything but the arrays (see results::record)
 //! record/record.json.b3           its hash, as b3sum writes and checks it
-//! record/cells/<NNN>/<estimator>.observables.npy, <estimator>.costs.npy, <estimator>.pixels.npy, .spread.npy
+//! record/cells/<CELL>/<RUN>.observables.npy, .costs.npy, .pixels.npy, .spread.npy
 //! record/samplers/<NNN>.coarse.npy, .fine.npy, .serial.npy
 //! timing.json, provenance.json    beside the record, never byte-identical
 //! pictures.json                   what pictures are wanted beside those of every run
@@ -39,24 +39,29 @@ pub struct Stored {
     pub timing: Option<Timing>,
 }
 
-/// Where a run's moments of the observables stand, relative to the record's folder.
-pub fn observables_path(cell: usize, estimator: &str) -> String {
-    format!("cells/{cell:03}/{estimator}.observables.npy")
+/// Where a run's moments of the observables stand, relative to the record's folder: `run` is its index
+/// among the cell's runs. Files are numbered, so that no name is ever a path.
+pub fn observables_path(cell: usize, run: usize) -> String {
+    array_path(cell, run, "observables")
 }
 
-/// Where a run's counts of work stand, relative to the record's folder.
-pub fn costs_path(cell: usize, estimator: &str) -> String {
-    format!("cells/{cell:03}/{estimator}.costs.npy")
+/// Where a run's counts of work stand.
+pub fn costs_path(cell: usize, run: usize) -> String {
+    array_path(cell, run, "costs")
 }
 
-/// Where a run's pixels stand, relative to the record's folder.
-pub fn pixels_path(cell: usize, estimator: &str) -> String {
-    format!("cells/{cell:03}/{estimator}.pixels.npy")
+/// Where a run's pixels stand.
+pub fn pixels_path(cell: usize, run: usize) -> String {
+    array_path(cell, run, "pixels")
 }
 
-/// Where the spread of a run's pixels stands, relative to the record's folder.
-pub fn spread_path(cell: usize, estimator: &str) -> String {
-    format!("cells/{cell:03}/{estimator}.spread.npy")
+/// Where the spread of a run's pixels stands.
+pub fn spread_path(cell: usize, run: usize) -> String {
+    array_path(cell, run, "spread")
+}
+
+fn array_path(cell: usize, run: usize, what: &str) -> String {
+    format!("cells/{cell:03}/{run:03}.{what}.npy")
 }
 
 impl Stored {
@@ -100,6 +105,14 @@ impl Stored {
         (band < bands).then(|| (0..batches).map(row).collect())
     }
 
+    /// The bins that stand at `path`.
+    pub fn bins(&self, path: &str) -> Option<Bins<'_>> {
+        let array = self.arrays.get(path)?;
+        let n = array.data.len() / 3;
+        let row = |i: usize| &array.data[i * n..(i + 1) * n];
+        (array.shape.first() == Some(&3)).then(|| Bins { observed: row(0), mass: row(1), bound: row(2) })
+    }
+
     /// What does not fit together, as a sentence.
     fn defect(&self) -> Option<String> {
         let bands = self.record.bands.len();
@@ -130,8 +143,33 @@ impl Stored {
         if let Some(claim) = claims.chain(of_samplers).find(|claim| *claim >= stated) {
             return Some(format!("comparisons are of claim {claim}, and there are {stated} claims"));
         }
-        super::sampler::defect(record, &self.arrays)
+        sampler_defect(record, &self.arrays)
     }
+}
+
+/// Bins of a run: one row each of what was counted, masses, bounds.
+#[derive(Clone, Copy, Debug)]
+pub struct Bins<'a> {
+    /// Draws, or pairs.
+    pub observed: &'a [f64],
+    /// Masses, which sum to 1 where the density is one.
+    pub mass: &'a [f64],
+    /// Bounds of the errors of the masses.
+    pub bound: &'a [f64],
+}
+
+/// What does not fit together in the record of a sampler, as a sentence.
+fn sampler_defect(record: &Record, arrays: &Arrays) -> Option<String> {
+    record.samplers.iter().find_map(|run| {
+        let paths = [Some(&run.coarse), run.fine.as_ref(), run.serial.as_ref()];
+        let wrong = |array: Option<&Array>| match array.map(|a| &a.shape[..]) {
+            Some([3, n]) => *n == 0,
+            Some([3, a, b]) => a != b || *a == 0,
+            _ => true,
+        };
+        let bad = paths.into_iter().flatten().find(|path| wrong(arrays.get(*path)))?;
+        Some(format!("bins of {} have no usable array at {bad}", run.sampler))
+    })
 }
 
 /// The folder of one experiment's results.
@@ -165,7 +203,7 @@ impl RecordFolder {
         if let Some(defect) = stored.defect() {
             return Err(Error::record(&self.root, format!("will not write a record whose {defect}")));
         }
-        let (path, stage) = (self.record_dir(), self.root.join(".record.new"));
+        let (path, stage) = (self.record_dir(), self.stage());
         atomic::create_folder(&self.root, "create the results folder")?;
         atomic::recover(&path, &self.aside())?;
         let written = write_stage(&stage, &stored)
@@ -174,6 +212,11 @@ impl RecordFolder {
             let _ = fs::remove_dir_all(&stage);
         }
         written.map(|()| stored)
+    }
+
+    /// Removes a record that a killed run had not finished.
+    pub fn remove_unfinished(&self) -> Result<()> {
+        remove_folder(&self.stage(), "remove an unfinished record")
     }
 
     /// Reads a record and checks version, checksums and shapes.
@@ -262,15 +305,29 @@ impl RecordFolder {
         atomic::write(&path, bytes, "write results")
     }
 
-    /// Removes a folder of views beside the record, so that none of an earlier record stays among those of this one.
+    /// Removes a folder of views beside the record, so that none of an earlier record stays among those
+    /// of this one.
     pub fn clear_views(&self, name: &str) -> Result<()> {
-        let path = self.root.join(name);
-        match fs::remove_dir_all(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                Err(Error::io(&path, "remove the views of an earlier record")(error))
+        remove_folder(&self.root.join(name), "remove the views of an earlier record")
+    }
+
+    /// Removes the pictures of an earlier record from `images/`: what begins with the number of a cell
+    /// or `split-`, as every picture of a report does.
+    pub fn clear_pictures(&self) -> Result<()> {
+        let folder = self.root.join("images");
+        let Ok(entries) = fs::read_dir(&folder) else { return Ok(()) };
+        for entry in entries.flatten() {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            let number = name.split_once('-').map_or("", |(number, _)| number);
+            let is_cell = number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit());
+            if is_cell || number == "split" {
+                let path = entry.path();
+                fs::remove_file(&path)
+                    .map_err(Error::io(&path, "remove a picture of an earlier record"))?;
             }
-            _ => Ok(()),
         }
+        Ok(())
     }
 
     fn read_json<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>> {
@@ -287,17 +344,28 @@ impl RecordFolder {
         self.root.join("record")
     }
 
+    /// Where a record is written before it takes its place.
+    fn stage(&self) -> PathBuf {
+        self.root.join(".record.new")
+    }
+
     /// Where an earlier record waits while a new one takes its place.
     fn aside(&self) -> PathBuf {
         self.root.join(".record.old")
     }
 }
 
+/// Removes a folder, where it is there.
+fn remove_folder(path: &Path, doing: &str) -> Result<()> {
+    match fs::remove_dir_all(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path, doing)(error)),
+        _ => Ok(()),
+    }
+}
+
 /// Writes all files of a record into a fresh folder.
 fn write_stage(stage: &Path, stored: &Stored) -> Result<()> {
-    if stage.exists() {
-        fs::remove_dir_all(stage).map_err(Error::io(stage, "remove an unfinished record"))?;
-    }
+    remove_folder(stage, "remove an unfinished record")?;
     for (name, array) in &stored.arrays {
         let path = inside(stage, name)?;
         atomic::create_folder(path.parent().unwrap_or(stage), "create the record's folder")?;
@@ -327,8 +395,10 @@ fn read_record(path: &Path) -> Result<Record> {
     let version = value.get("schema_version").and_then(|v| v.as_u64());
     if version != Some(u64::from(SCHEMA_VERSION)) {
         let found = version.map_or("none".to_string(), |v| v.to_string());
-        let message =
-            format!("schema version {found}, this program reads {SCHEMA_VERSION}; run it again");
+        let message = format!(
+            "schema version {found}, this program reads {SCHEMA_VERSION}: the record was written by another \
+             version of the program; run it again"
+        );
         return Err(Error::record(path, message));
     }
     let sum = path.with_extension("json.b3");

@@ -45,7 +45,7 @@ fn reads_back_what_was_written_and_writes_the_same_bytes() {
 }
 
 #[test]
-fn gates_are_found_by_name() {
+fn observables_are_found_by_name() {
     let (_temp, folder, _) = written();
     let stored = folder.read().expect("a record");
     let batches = stored.batches(&sample::quantity("snee", 1)).expect("batches");
@@ -74,8 +74,8 @@ fn truncated_json() {
 #[test]
 fn another_version() {
     let (_temp, folder, _) = written();
-    tamper(&folder, "\"schema_version\": 3", "\"schema_version\": 7", false);
-    refused(&folder, &["schema version 7", "reads 3"]);
+    tamper(&folder, "\"schema_version\": 4", "\"schema_version\": 7", false);
+    refused(&folder, &["schema version 7", "reads 4", "run it again"]);
 }
 
 #[test]
@@ -95,22 +95,22 @@ fn unknown_key() {
 #[test]
 fn changed_missing_and_truncated_arrays() {
     let (_temp, folder, _) = written();
-    let path = folder.record_dir().join(observables_path(0, "mis"));
+    let path = folder.record_dir().join(observables_path(0, 0));
     let mut bytes = fs::read(&path).expect("bytes");
     fs::write(&path, &bytes[..bytes.len() - 3]).expect("a write");
-    refused(&folder, &["truncated", "mis.observables.npy"]);
+    refused(&folder, &["truncated", "000.observables.npy"]);
     let last = bytes.len() - 1;
     bytes[last] ^= 1;
     fs::write(&path, &bytes).expect("a write");
-    refused(&folder, &["checksum mismatch", "mis.observables.npy"]);
+    refused(&folder, &["checksum mismatch", "000.observables.npy"]);
     fs::remove_file(&path).expect("a removal");
-    refused(&folder, &["could not read the record", "mis.observables.npy"]);
+    refused(&folder, &["could not read the record", "000.observables.npy"]);
 }
 
 #[test]
 fn a_path_that_leaves_the_folder() {
     let (_temp, folder, _) = written();
-    tamper(&folder, "\"cells/000/mis.observables.npy\": ", "\"../../secret\": ", true);
+    tamper(&folder, "\"cells/000/000.observables.npy\": ", "\"../../secret\": ", true);
     refused(&folder, &["not a path inside the record"]);
 }
 
@@ -124,7 +124,7 @@ fn will_not_write_what_does_not_fit_or_read_back() {
         assert!(!folder.root().join(".record.new").exists());
     };
     let mut arrays = stored.arrays.clone();
-    arrays.insert(observables_path(0, "mis"), Array::new(vec![1, 1, 1, 5], vec![0.0; 5]));
+    arrays.insert(observables_path(0, 0), Array::new(vec![1, 1, 1, 5], vec![0.0; 5]));
     refused(&stored.record, &arrays, "moments of mis");
     let mut record = stored.record.clone();
     record.bands[0].display_rgb[0] = f64::NAN;

@@ -23,8 +23,8 @@ pub struct Batches {
     pub processes: u64,
     /// CPU seconds of a batch.
     pub cpu_seconds: Vec<f64>,
-    /// Was the whole batch timed side by side with its rivals, by a worker that was warm? A claim on CPU time
-    /// rests on such batches alone.
+    /// Was the whole batch timed side by side with its rivals, by a worker that was warm? A claim on CPU
+    /// time rests on such batches alone.
     pub settled: Vec<bool>,
 }
 

@@ -1,13 +1,13 @@
-//! From finished blocks to the record, its arrays, and the timing.
+//! From what jobs gave to the record, its arrays, and the timing.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde_json::{Value, json};
+use serde_json::json;
 
-use super::comparisons::statements;
-use super::job::{Finished, Job};
+use super::comparisons::{expand_samplers, statements};
+use super::job::{Finished, Job, Passes, Task};
 use super::jobs::{Plan, named};
-use super::keys::Stage;
+use super::workers::{Completed, Output};
 use crate::error::Result;
 use crate::estimators::{self, Anomaly, Cost};
 use crate::experiment::Experiment;
@@ -16,7 +16,8 @@ use crate::results::json::hash_json;
 use crate::results::npy::Array;
 use crate::results::provenance::fingerprint;
 use crate::results::record::{
-    Bias, Cell, EstimatorRun, HeavyTail, Image, ObservedRegion, Record, Replay, SCHEMA_VERSION, Tile,
+    Cell, EstimatorRun, Image, ObservedRegion, Record, Replay, SCHEMA_VERSION, StatedBias, StatedTail,
+    Tile,
 };
 use crate::results::store::{Arrays, costs_path, observables_path, pixels_path, spread_path};
 use crate::results::timing::{self, Timing};
@@ -37,11 +38,16 @@ pub fn experiment_hash(experiment: &Experiment) -> String {
     hash_json(&json!({"resolved": experiment.resolved(), "inputs": inputs(experiment)}))
 }
 
+/// Hashes of the claims, hex.
+pub fn claim_hashes(experiment: &Experiment) -> Vec<String> {
+    experiment.file.claim.iter().map(hash_json).collect()
+}
+
 /// Puts what a plan's jobs measured into a record.
 pub fn assemble(
     experiment: &Experiment,
     plan: &Plan,
-    finished: Vec<Finished>,
+    completed: Vec<Completed>,
     replays: Vec<Replay>,
 ) -> Result<Assembled> {
     let mut arrays = Arrays::new();
@@ -50,28 +56,37 @@ pub fn assemble(
         label: cell.label.clone(),
         axes: cell.axes.clone(),
         content_hash: hash_json(&cell.content()),
-        regions: plan.jobs.iter().find(|job| job.cell == index).map_or_else(Vec::new, regions),
+        regions: plan
+            .jobs
+            .iter()
+            .filter_map(Job::passes)
+            .find(|job| job.cell == index)
+            .map_or_else(Vec::new, regions),
         runs: Vec::new(),
     };
     let mut cells: Vec<Cell> = experiment.cells.iter().enumerate().map(empty).collect();
+    let mut samplers = Vec::new();
+    let hashes = claim_hashes(experiment);
     let mut post_hoc = BTreeSet::new();
-    for (job, block) in plan.jobs.iter().zip(finished) {
-        let late = (0..job.claims.len()).filter(|&i| !block.origin.claims.contains(&job.claims[i]));
-        post_hoc.extend(late);
-        let cost = timing::Cost {
-            cpu_seconds: block.tally.cpu_seconds,
-            wall_seconds: block.tally.wall_seconds,
-            passes: block.tally.passes,
-            paths: block.tally.cost[Cost::Paths as usize],
-        };
-        let label = &cells[job.cell].label;
-        timing.add(label, &job.name, cost);
-        timing.set_batches(label, &job.name, batches(&block));
-        let kind = &plan.kinds[job.estimator_index];
-        let entry = &experiment.file.estimator[job.estimator_index];
-        cells[job.cell].runs.push(estimator_run(job, &entry.name, kind, block, &mut arrays));
+    for (job, Completed { start, output }) in plan.jobs.iter().zip(completed) {
+        post_hoc.extend((0..hashes.len()).filter(|&i| !start.claims.contains(&hashes[i])));
+        match (&job.task, output) {
+            (Task::Estimate(passes), Output::Passes(finished)) => {
+                let cell = &mut cells[passes.cell];
+                timing.add(&cell.label, &passes.arm.name, cost(&finished));
+                timing.set_batches(&cell.label, &passes.arm.name, batches(&finished));
+                let run = estimator_run(experiment, passes, cell.runs.len(), *finished, &mut arrays);
+                cell.runs.push(run);
+            }
+            (_, Output::Draws(sampled)) => {
+                timing.add("", &sampled.run.sampler, sampled.cost);
+                samplers.push(sampled.run);
+                arrays.extend(sampled.arrays);
+            }
+            (Task::Draw(_), Output::Passes(_)) => {}
+        }
     }
-    let claims = serde_json::to_value(&experiment.file.claim).unwrap_or(Value::Null);
+    let claims = json!(experiment.file.claim);
     let record = Record {
         schema_version: SCHEMA_VERSION,
         experiment: experiment.file.name.clone(),
@@ -84,24 +99,34 @@ pub fn assemble(
         statements: statements(&experiment.file.claim),
         post_hoc: post_hoc.into_iter().collect(),
         comparisons: plan.comparisons.clone(),
-        sampler_comparisons: Vec::new(),
+        sampler_comparisons: expand_samplers(&experiment.file.claim, &samplers),
         replays,
         bands: plan.bands.clone(),
         cells,
-        samplers: Vec::new(),
+        samplers,
         checksums: BTreeMap::new(),
     };
     Ok(Assembled { record, arrays, timing })
 }
 
 /// The regions of the sensor of a job's cell.
-fn regions(job: &Job) -> Vec<ObservedRegion> {
+fn regions(job: &Passes) -> Vec<ObservedRegion> {
     let tile = |PixelRectangle { columns, rows }: PixelRectangle| Tile { columns, rows };
     let region = |region: &SensorRegion| ObservedRegion {
         name: region.name.clone(),
         tile: region.tile.map(tile),
     };
     job.layout.regions().iter().map(region).collect()
+}
+
+fn cost(finished: &Finished) -> timing::Cost {
+    let total = finished.total();
+    timing::Cost {
+        cpu_seconds: total.cpu_seconds,
+        wall_seconds: finished.tally.wall_seconds,
+        passes: finished.passes,
+        paths: total.cost[Cost::Paths as usize],
+    }
 }
 
 /// CPU time by batch.
@@ -114,36 +139,37 @@ fn batches(finished: &Finished) -> timing::Batches {
     }
 }
 
+/// The run of a job, number `run` of its cell, and its arrays.
 fn estimator_run(
-    job: &Job,
-    entry: &str,
-    kind: &str,
+    experiment: &Experiment,
+    job: &Passes,
+    run: usize,
     finished: Finished,
     arrays: &mut Arrays,
 ) -> EstimatorRun {
     let (observables, bands) = (job.layout.observables().len(), job.layout.bands());
+    let entry = &experiment.file.estimator[job.entry];
+    let total = finished.total();
     let batches = &finished.batches;
     let shape = vec![batches.len(), observables, bands, 5];
     let data = batches.iter().flatten().flat_map(|moments| moments.to_array()).collect();
-    let name = &job.name;
-    let moments = observables_path(job.cell, name);
+    let moments = observables_path(job.cell, run);
     arrays.insert(moments.clone(), Array::new(shape, data));
 
     let mut counters = Cost::ALL;
     counters.sort_by_key(|counter| counter.name());
     let counted = finished.work.iter().flat_map(|work| counters.map(|c| work.cost[c as usize] as f64));
-    let costs = costs_path(job.cell, name);
+    let costs = costs_path(job.cell, run);
     arrays
         .insert(costs.clone(), Array::new(vec![finished.work.len(), counters.len()], counted.collect()));
 
-    let image = job.layout.image().filter(|_| job.stage == Stage::Main);
-    let image = image.map(|(width, height)| {
+    let image = job.image_size().map(|(width, height)| {
         let errors = finished.image.std_error();
         let mut data = finished.image.mean;
         data.extend(errors);
-        let pixels = pixels_path(job.cell, name);
+        let pixels = pixels_path(job.cell, run);
         arrays.insert(pixels.clone(), Array::new(vec![2, height, width, bands], data));
-        let spread = spread_path(job.cell, name);
+        let spread = spread_path(job.cell, run);
         let pairs = finished.spread.iter().flatten().flat_map(|moments| moments.to_array()).collect();
         arrays.insert(spread.clone(), Array::new(vec![finished.spread.len(), bands, 5], pairs));
         Image { width, height, pixels, spread }
@@ -152,13 +178,13 @@ fn estimator_run(
         names.into_iter().map(str::to_string).zip(values.iter().copied()).collect()
     };
     EstimatorRun {
-        estimator: name.clone(),
-        control_of: job.is_control.then(|| entry.into()),
-        kind: kind.into(),
+        estimator: job.arm.name.clone(),
+        control_of: job.arm.is_control.then(|| entry.name.clone()),
+        kind: entry.choice().map_or_else(String::new, |(kind, _)| kind.into()),
         bias: match job.estimator.bias() {
-            estimators::Bias::Unbiased => Bias::Unbiased,
-            estimators::Bias::Consistent => Bias::Consistent,
-            estimators::Bias::Biased(why) => Bias::Biased(why),
+            estimators::Bias::Unbiased => StatedBias::Unbiased,
+            estimators::Bias::Consistent => StatedBias::Consistent,
+            estimators::Bias::Biased(why) => StatedBias::Biased(why),
         },
         model: job.estimator.model(),
         heavy_tails: job.estimator.heavy_tails().into_iter().map(heavy_tail).collect(),
@@ -168,11 +194,11 @@ fn estimator_run(
         moments,
         costs,
         image,
-        cost: counts(Cost::ALL.map(Cost::name).into(), &finished.tally.cost),
+        cost: counts(Cost::ALL.map(Cost::name).into(), &total.cost),
         anomalies: counts(Anomaly::ALL.map(Anomaly::name).into(), &finished.tally.anomalies),
     }
 }
 
-fn heavy_tail(tail: estimators::HeavyTail) -> HeavyTail {
-    HeavyTail { band: tail.band, class: tail.class.name().into(), reason: tail.reason }
+fn heavy_tail(tail: estimators::HeavyTail) -> StatedTail {
+    StatedTail { band: tail.band, class: tail.class.name().into(), reason: tail.reason }
 }

@@ -1,23 +1,41 @@
-//! States of jobs on disk, so that a run goes on where it was stopped and nothing is played twice.
+//! States of jobs on disk, so that a run goes on where it was stopped and nothing is computed twice.
 //!
 //! One file a job, named by its identity: a header in JSON, the numbers as little-endian f64, and a
-//! blake3 of both. A file that does not fit (another job, truncated, damaged) is as good as none.
+//! blake3 of both. A file that does not fit (another job, truncated, damaged) is as good as none. A
+//! state holds what a larger budget goes on from and which claims stood before the first pass: of an
+//! estimator at most 128 batches of 40 bytes per observable and band, and an image of 16 bytes per pixel
+//! and band for each bit that is set in the number of passes; of a sampler its counts.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
+use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 
-use super::job::{Block, Origin, Tally, Work, pair_level};
-use crate::error::Result;
+use super::chi_square::Sampled;
+use super::job::{Block, Start, Tally, Work, pair_level};
+use crate::error::{Error, Result};
 use crate::results::atomic;
 use crate::results::json::{canonical, hash_bytes};
+use crate::results::npy::Array;
+use crate::results::sampler::SamplerRun;
+use crate::results::store::RecordFolder;
+use crate::results::timing::Cost;
 use crate::stats::moments::{ImageMoments, Moments};
 
+/// What stands before the numbers of a state.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Header {
+struct Header<T> {
     identity: String,
-    origin: Origin,
+    start: Start,
+    content: T,
+}
+
+/// The numbers of an estimator's state: nodes of moments and of pairs, then of images.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Nodes {
     tally: Tally,
     /// Level and number of values of every node of moments.
     moments: Vec<(u32, usize)>,
@@ -29,66 +47,119 @@ struct Header {
     work: Vec<(u32, Work)>,
 }
 
-/// Path of a job's state in an experiment's results folder.
-pub fn path(root: &Path, identity: &str) -> PathBuf {
-    root.join("state").join(format!("{}.state", &identity[..32]))
+/// The numbers of a sampler's state: its arrays one after the other.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Counted {
+    run: SamplerRun,
+    /// Path and shape of every array.
+    arrays: Vec<(String, Vec<usize>)>,
+    cost: Cost,
 }
 
-/// Writes the state of a job whose passes start at 0.
-pub fn save(path: &Path, identity: &str, block: &Block) -> Result<()> {
-    let moments = block.moments.nodes();
-    let (pixels, spread) = (block.pixels.nodes(), block.spread.nodes());
-    let header = Header {
-        identity: identity.into(),
-        origin: block.origin.clone(),
-        tally: block.tally,
-        moments: moments.iter().map(|n| (n.level, n.value.len())).collect(),
-        pixels: pixels.iter().map(|n| (n.level, n.value.n, n.value.mean.len())).collect(),
-        spread: spread.iter().map(|n| (n.level, n.value.len())).collect(),
-        work: block.work.nodes().iter().map(|n| (n.level, n.value)).collect(),
-    };
-    let header = canonical(&header);
+/// The folder of the states in an experiment's results folder.
+fn folder(root: &Path) -> PathBuf {
+    root.join("state")
+}
+
+/// Name of a job's state.
+fn name(identity: &str) -> String {
+    format!("{}.state", &identity[..32])
+}
+
+/// Path of a job's state in an experiment's results folder.
+pub fn path(root: &Path, identity: &str) -> PathBuf {
+    folder(root).join(name(identity))
+}
+
+/// Makes the folder of the states, and removes what a killed run left unfinished in the results folder.
+pub fn prepare(root: &Path) -> Result<()> {
+    atomic::create_folder(&folder(root), "create the results folder")?;
+    RecordFolder::new(root).remove_unfinished()?;
+    atomic::sweep(root)?;
+    atomic::sweep(&folder(root))
+}
+
+/// The record is complete: no larger budget goes on from the states of jobs other than these. Of those
+/// remains what stood before their first pass, because their passes were seen.
+pub fn reduce_others<'a>(root: &Path, identities: impl Iterator<Item = &'a str>) -> Result<()> {
+    let kept: Vec<String> = identities.map(name).collect();
+    let folder = folder(root);
+    let entries = fs::read_dir(&folder).map_err(Error::io(&folder, "read the states of the run"))?;
+    for entry in entries.flatten().filter(|entry| !kept.iter().any(|name| entry.file_name() == **name)) {
+        let path = entry.path();
+        match read::<IgnoredAny>(&path) {
+            Some((old, _)) => save(&path, &old.identity, &old.start, (), std::iter::empty())?,
+            None => fs::remove_file(&path).map_err(Error::io(&path, "remove a damaged state"))?,
+        }
+    }
+    Ok(())
+}
+
+fn save<T: Serialize>(
+    path: &Path,
+    identity: &str,
+    start: &Start,
+    content: T,
+    numbers: impl Iterator<Item = f64>,
+) -> Result<()> {
+    let header = canonical(&Header { identity: identity.into(), start: start.clone(), content });
     let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
     bytes.extend(header.as_bytes());
-    let mut put = |x: f64| bytes.extend(x.to_le_bytes());
-    let moments = moments.iter().chain(spread).flat_map(|n| &n.value);
-    moments.flat_map(|m| m.to_array()).for_each(&mut put);
-    pixels.iter().flat_map(|n| n.value.mean.iter().chain(&n.value.m2)).for_each(|&x| put(x));
+    numbers.for_each(|x| bytes.extend(x.to_le_bytes()));
     let checksum = hash_bytes(&bytes);
     bytes.extend(checksum);
     atomic::write(path, &bytes, "save the state of the run")
 }
 
-/// What stood before the first passes of a job's state, whether or not [`load`] can go on from its
-/// passes: they were seen.
-pub fn origin(path: &Path, identity: &str) -> Option<Origin> {
-    let bytes = std::fs::read(path).ok()?;
-    parts(&bytes, identity).map(|(header, _)| header.origin)
+/// Header and numbers of an undamaged state of the job.
+fn load<T: DeserializeOwned>(path: &Path, identity: &str) -> Option<(Header<T>, Vec<f64>)> {
+    read(path).filter(|(header, _)| header.identity == identity)
 }
 
-/// Header and numbers of an undamaged state of the job.
-fn parts<'a>(bytes: &'a [u8], identity: &str) -> Option<(Header, &'a [u8])> {
+/// Header and numbers of an undamaged state.
+fn read<T: DeserializeOwned>(path: &Path) -> Option<(Header<T>, Vec<f64>)> {
+    let bytes = fs::read(path).ok()?;
     let (body, checksum) = bytes.split_last_chunk::<32>()?;
     if hash_bytes(body) != *checksum {
         return None;
     }
     let (length, rest) = body.split_first_chunk::<8>()?;
     let (header, numbers) = rest.split_at_checked(u64::from_le_bytes(*length) as usize)?;
-    let header: Header = serde_json::from_slice(header).ok()?;
-    (header.identity == identity).then_some((header, numbers))
+    let header: Header<T> = serde_json::from_slice(header).ok()?;
+    let numbers = numbers.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+    Some((header, numbers))
+}
+
+/// What stood before the first passes or draws of a job's state, whether or not the job can go on from
+/// it: they were seen.
+pub fn start(path: &Path, identity: &str) -> Option<Start> {
+    load::<IgnoredAny>(path, identity).map(|(header, _)| header.start)
+}
+
+/// Writes the state of a job whose passes start at 0.
+pub fn save_passes(path: &Path, identity: &str, start: &Start, block: &Block) -> Result<()> {
+    let moments = block.moments.nodes();
+    let (pixels, spread) = (block.pixels.nodes(), block.spread.nodes());
+    let nodes = Nodes {
+        tally: block.tally,
+        moments: moments.iter().map(|n| (n.level, n.value.len())).collect(),
+        pixels: pixels.iter().map(|n| (n.level, n.value.n, n.value.mean.len())).collect(),
+        spread: spread.iter().map(|n| (n.level, n.value.len())).collect(),
+        work: block.work.nodes().iter().map(|n| (n.level, n.value)).collect(),
+    };
+    let moments = moments.iter().chain(spread).flat_map(|n| &n.value).flat_map(|m| m.to_array());
+    let images = pixels.iter().flat_map(|n| n.value.mean.iter().chain(&n.value.m2)).copied();
+    save(path, identity, start, nodes, moments.chain(images))
 }
 
 /// Reads the state of a job, with moments kept at `keep_level`; `None` where there is none that fits.
-pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
-    let bytes = std::fs::read(path).ok()?;
-    let (header, numbers) = parts(&bytes, identity)?;
-    let mut numbers = numbers.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b));
-    let mut take = |n: usize| -> Option<Vec<f64>> {
-        let taken: Vec<f64> = numbers.by_ref().take(n).collect();
-        (taken.len() == n).then_some(taken)
-    };
+pub fn load_passes(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
+    let (Header { content: nodes, .. }, numbers) = load::<Nodes>(path, identity)?;
+    let mut numbers = numbers.into_iter();
+    let mut take = |n: usize| take(&mut numbers, n);
     let mut block = Block::empty(0, keep_level);
-    for (level, length) in header.moments {
+    for (level, length) in nodes.moments {
         if level > keep_level {
             return None; // kept coarser than this run's batches: they cannot be cut
         }
@@ -96,7 +167,7 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
         let moments = values.as_chunks::<5>().0.iter().map(|m| Moments::from_array(*m)).collect();
         block.moments.push_node(level, moments);
     }
-    for (level, length) in header.spread {
+    for (level, length) in nodes.spread {
         if level > pair_level(keep_level) {
             return None;
         }
@@ -104,22 +175,47 @@ pub fn load(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
         let moments = values.as_chunks::<5>().0.iter().map(|m| Moments::from_array(*m)).collect();
         block.spread.push_node(level, moments);
     }
-    for (level, n, length) in header.pixels {
+    for (level, n, length) in nodes.pixels {
         let (mean, m2) = (take(length)?, take(length)?);
         block.pixels.push_node(level, ImageMoments { n, mean, m2 });
     }
-    for (level, work) in header.work {
+    for (level, work) in nodes.work {
         if level > keep_level {
             return None;
         }
         block.work.push_node(level, work);
     }
-    block.tally = header.tally;
-    block.origin = header.origin;
+    block.tally = nodes.tally;
     let ends = [block.pixels.next_pass(), block.work.next_pass()];
     let fits = ends.iter().all(|end| *end == block.moments.next_pass())
         && block.spread.next_pass() == block.moments.next_pass() / 2;
     fits.then_some(block)
+}
+
+/// Writes the state of a sampler.
+pub fn save_draws(path: &Path, identity: &str, start: &Start, sampled: &Sampled) -> Result<()> {
+    let arrays = sampled.arrays.iter().map(|(name, array)| (name.clone(), array.shape.clone()));
+    let counted = Counted { run: sampled.run.clone(), arrays: arrays.collect(), cost: sampled.cost };
+    let numbers = sampled.arrays.values().flat_map(|array| array.data.iter().copied());
+    save(path, identity, start, counted, numbers)
+}
+
+/// Reads the state of a sampler of so many draws; `None` where there is none that fits.
+pub fn load_draws(path: &Path, identity: &str, samples: u64) -> Option<Sampled> {
+    let (Header { content: counted, .. }, numbers) = load::<Counted>(path, identity)?;
+    let mut numbers = numbers.into_iter();
+    let arrays = counted.arrays.into_iter().map(|(name, shape)| {
+        let data = take(&mut numbers, shape.iter().product())?;
+        Some((name, Array::new(shape, data)))
+    });
+    let arrays = arrays.collect::<Option<_>>()?;
+    (counted.run.samples == samples).then_some(Sampled { run: counted.run, arrays, cost: counted.cost })
+}
+
+/// The next `n` numbers, where there are so many.
+fn take(numbers: &mut impl Iterator<Item = f64>, n: usize) -> Option<Vec<f64>> {
+    let taken: Vec<f64> = numbers.take(n).collect();
+    (taken.len() == n).then_some(taken)
 }
 
 #[cfg(test)]
@@ -133,8 +229,8 @@ mod tests {
     }
 
     fn block(passes: u64, keep_level: u32) -> Block {
-        let mut block = played(0, passes, keep_level);
-        block.tally.cost[0] = 7;
+        let mut block = blocks(0, passes, keep_level);
+        block.tally.anomalies[0] = 7;
         block
     }
 
@@ -144,7 +240,7 @@ mod tests {
         vec![x, 2.0 * x, x * x, 7.0 * x]
     }
 
-    fn played(start: u64, end: u64, keep_level: u32) -> Block {
+    fn blocks(start: u64, end: u64, keep_level: u32) -> Block {
         let mut block = Block { bands: 2, ..Block::empty(start, keep_level) };
         for pass in start..end {
             let x = 1.0 / (pass as f64 + 3.0);
@@ -163,20 +259,54 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.state");
         let block = block(13, 2);
-        save(&path, "me", &block).expect("saved");
-        // How many bands an image has is said by what is played next.
-        assert_eq!(load(&path, "me", 2), Some(Block { bands: 0, ..block.clone() }));
-        assert!(load(&path, "you", 2).is_none(), "another job");
-        assert!(load(&path, "me", 1).is_none(), "coarser than asked");
+        save_passes(&path, "me", &Start::default(), &block).expect("saved");
+        // How many bands an image has is said by what runs next.
+        assert_eq!(load_passes(&path, "me", 2), Some(Block { bands: 0, ..block.clone() }));
+        assert!(load_passes(&path, "you", 2).is_none(), "another job");
+        assert!(load_passes(&path, "me", 1).is_none(), "coarser than asked");
         // A longer run keeps wider batches: the nodes merge on.
-        assert_eq!(load(&path, "me", 3).expect("a state").moments.nodes().len(), 3);
+        assert_eq!(load_passes(&path, "me", 3).expect("a state").moments.nodes().len(), 3);
 
         let mut bytes = std::fs::read(&path).expect("bytes");
         bytes[200] ^= 1;
         std::fs::write(&path, &bytes).expect("written");
-        assert!(load(&path, "me", 2).is_none(), "damaged");
+        assert!(load_passes(&path, "me", 2).is_none(), "damaged");
         std::fs::write(&path, &bytes[..100]).expect("written");
-        assert!(load(&path, "me", 2).is_none(), "truncated");
+        assert!(load_passes(&path, "me", 2).is_none(), "truncated");
+    }
+
+    #[test]
+    fn of_another_job_only_the_start_remains() {
+        let folder = tempfile::tempdir().expect("a folder");
+        prepare(folder.path()).expect("prepared");
+        let start_of = |claim: &str| Start { claims: vec![claim.into()], ..Start::default() };
+        let [mine, other] = ["a", "b"].map(|letter| letter.repeat(64));
+        let [own, theirs] = [&mine, &other].map(|identity| path(folder.path(), identity));
+        save_passes(&own, &mine, &start_of("x"), &block(13, 2)).expect("saved");
+        save_passes(&theirs, &other, &start_of("y"), &block(13, 2)).expect("saved");
+        fs::write(folder.path().join("state/damaged.state"), "?").expect("written");
+        reduce_others(folder.path(), [mine.as_str()].into_iter()).expect("reduced");
+        assert!(load_passes(&own, &mine, 2).is_some() && load_passes(&theirs, &other, 2).is_none());
+        assert_eq!(start(&theirs, &other), Some(start_of("y")));
+        assert_eq!(fs::read_dir(folder.path().join("state")).expect("a folder").count(), 2);
+        reduce_others(folder.path(), std::iter::empty()).expect("reduced");
+        assert_eq!(start(&theirs, &other), Some(start_of("y")));
+    }
+
+    #[test]
+    fn what_a_killed_run_left_unfinished_goes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        prepare(folder.path()).expect("prepared");
+        for name in [".timing.json.123.tmp", "state/.x.state.123.tmp", "kept.tmp"] {
+            fs::write(folder.path().join(name), "half").expect("written");
+        }
+        fs::create_dir(folder.path().join(".record.new")).expect("a folder");
+        prepare(folder.path()).expect("prepared");
+        let left: Vec<_> = fs::read_dir(folder.path()).expect("a folder").flatten().collect();
+        let mut left: Vec<_> = left.into_iter().map(|entry| entry.file_name()).collect();
+        left.sort();
+        assert_eq!(left, ["kept.tmp", "state"]);
+        assert_eq!(fs::read_dir(folder.path().join("state")).expect("a folder").count(), 0);
     }
 
     #[test]
@@ -184,9 +314,9 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.state");
         let whole = block(29, 3);
-        let later = played(11, 29, 3);
-        save(&path, "me", &block(11, 0)).expect("saved");
-        let mut resumed = load(&path, "me", 3).expect("a state");
+        let later = blocks(11, 29, 3);
+        save_passes(&path, "me", &Start::default(), &block(11, 0)).expect("saved");
+        let mut resumed = load_passes(&path, "me", 3).expect("a state");
         resumed.append(later);
         assert_eq!((resumed.moments, resumed.pixels), (whole.moments, whole.pixels));
         assert_eq!(resumed.work, whole.work);

@@ -4,8 +4,9 @@
 use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
-use crate::experiment::sampler_file::SamplerClaimEntry;
-use crate::experiment::schema::{Agree, ClaimEntry, CostMeasure, Differs, Duel, Equals, Expect};
+use crate::experiment::schema::{
+    Agree, ClaimEntry, CostMeasure, Differs, Duel, Equals, Expect, SamplerClaim,
+};
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::record::{
     self, Against, Band, Claim, ClaimKind, Comparison, ExpectedOutcome, Observable, Quantity,
@@ -33,9 +34,10 @@ pub fn expand(
 }
 
 /// The claims on samplers, for each of the samplers that were drawn from.
-pub fn expand_samplers(claims: &[SamplerClaimEntry], drawn: &[SamplerRun]) -> Vec<SamplerComparison> {
-    let of_claim = |(claim, entry): (usize, &SamplerClaimEntry)| {
-        let words = &entry.sampler;
+pub fn expand_samplers(claims: &[ClaimEntry], drawn: &[SamplerRun]) -> Vec<SamplerComparison> {
+    let claims = claims.iter().enumerate();
+    let claims = claims.filter_map(|(claim, entry)| Some((claim, entry.sampler.as_ref()?)));
+    let of_claim = |(claim, words): (usize, &SamplerClaim)| {
         let is_meant =
             |run: &&SamplerRun| words.samplers.as_ref().is_none_or(|names| names.contains(&run.sampler));
         let sampler = |run: &SamplerRun| SamplerComparison {
@@ -45,7 +47,7 @@ pub fn expand_samplers(claims: &[SamplerClaimEntry], drawn: &[SamplerRun]) -> Ve
         };
         drawn.iter().filter(is_meant).map(sampler).collect::<Vec<_>>()
     };
-    claims.iter().enumerate().flat_map(of_claim).collect()
+    claims.flat_map(of_claim).collect()
 }
 
 /// What claims say of themselves.
@@ -62,20 +64,13 @@ pub fn statements(claims: &[ClaimEntry]) -> Vec<Claim> {
             ClaimEntry { reproduces: Some(words), .. } => {
                 (ClaimKind::Reproduces { numbers: words.numbers.clone() }, false)
             }
+            ClaimEntry { sampler: Some(_), .. } => (ClaimKind::Sampler, false),
             ClaimEntry { faster: Some(_), .. } => (ClaimKind::Faster, false),
             ClaimEntry { not_slower: Some(_), .. } => (ClaimKind::NotSlower, false),
             // Validation has found exactly one kind.
             ClaimEntry { .. } => (ClaimKind::Equals, false),
         };
         statement(index, kind, entry.name.as_ref(), entry.expect, each)
-    };
-    claims.iter().enumerate().map(of_claim).collect()
-}
-
-/// What claims on samplers say of themselves.
-pub fn sampler_statements(claims: &[SamplerClaimEntry]) -> Vec<Claim> {
-    let of_claim = |(index, entry): (usize, &SamplerClaimEntry)| {
-        statement(index, ClaimKind::Sampler, entry.name.as_ref(), entry.expect, false)
     };
     claims.iter().enumerate().map(of_claim).collect()
 }

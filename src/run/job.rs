@@ -1,9 +1,11 @@
-//! One estimator in one cell: what a worker needs to play any run of passes, and what comes back.
+//! Units of work: an estimator in a cell, or a sampler; and the passes of an estimator with what they
+//! leave.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
+use super::chi_square::Draws;
 use super::clock::thread_cpu_time;
 use super::keys::Stage;
 use crate::estimators::{Anomaly, BandUse, Cost, Estimator, Layout, Scores};
@@ -11,39 +13,77 @@ use crate::sampling::stream::StreamKey;
 use crate::stats::moments::{ImageMoments, Moments};
 use crate::stats::tree::{Counter, Merge};
 
-/// A built estimator with its streams.
+/// One unit of work.
 pub struct Job {
-    /// Cell index.
-    pub cell: usize,
-    /// Estimator index in the experiment file.
-    pub estimator_index: usize,
-    /// Name of the run: the estimator's, or that of its control.
+    /// What people call it: cell and estimator, or the sampler.
+    pub label: String,
+    /// Hash of all that its result depends on except the number of passes, hex: its state is kept under
+    /// it.
+    pub identity: String,
+    /// What is to be done.
+    pub task: Task,
+}
+
+/// What a job does.
+pub enum Task {
+    /// Runs passes of an estimator in a cell.
+    Estimate(Box<Passes>),
+    /// Draws from a sampler.
+    Draw(Box<Draws>),
+}
+
+impl Job {
+    /// Its passes, where it is of an estimator.
+    pub fn passes(&self) -> Option<&Passes> {
+        match &self.task {
+            Task::Estimate(passes) => Some(passes),
+            Task::Draw(_) => None,
+        }
+    }
+
+    /// Its draws, where it is of a sampler.
+    pub fn draws(&self) -> Option<&Draws> {
+        match &self.task {
+            Task::Estimate(_) => None,
+            Task::Draw(draws) => Some(draws),
+        }
+    }
+}
+
+/// A run of an estimator in a cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Arm {
+    /// The estimator's name, or that of its control.
     pub name: String,
     /// A second arm of the same estimator, on streams of its own.
     pub is_control: bool,
-    /// Number of the group of jobs that are timed side by side.
-    pub side_by_side: Option<usize>,
-    /// What people call it: cell and estimator.
-    pub label: String,
-    /// Hash of all that its result depends on but the number of passes, hex.
-    pub identity: String,
+    /// It is timed side by side with the other arms of its cell that are.
+    pub is_timed: bool,
+}
+
+/// A built estimator in a cell, with its streams.
+pub struct Passes {
+    /// Cell index.
+    pub cell: usize,
+    /// Estimator index in the experiment file.
+    pub entry: usize,
+    /// Which run of the estimator it is.
+    pub arm: Arm,
     /// What its passes are for.
     pub stage: Stage,
     /// Their number, where it is not the budget's to say.
-    pub passes: Option<u64>,
-    /// Plays passes.
+    pub count: Option<u64>,
+    /// Runs passes.
     pub estimator: Box<dyn Estimator>,
     /// Its observables.
     pub layout: Layout,
-    /// Bands that one call plays together, with their streams.
+    /// Bands that one call runs together, with their streams.
     pub groups: Vec<Group>,
     /// Observables whose relative error a budget may bound.
     pub targets: Vec<usize>,
-    /// Hashes of the experiment's claims, hex.
-    pub claims: Vec<String>,
 }
 
-/// Bands that one call plays together.
+/// Bands that one call runs together.
 pub struct Group {
     /// Their indices.
     pub bands: Vec<usize>,
@@ -60,24 +100,22 @@ pub struct Block {
     pub moments: Counter<Vec<Moments>>,
     /// Moments of `[pixel][band]`.
     pub pixels: Counter<ImageMoments>,
-    /// Moments of `[band]` over pairs of passes, kept by batch: the variance of a pixel as passes 2i and 2i + 1
-    /// show it ([`spread`]). Pairs are counted from pass 0, so that this too is the same for every cut into
-    /// blocks; empty without an image.
+    /// Moments of `[band]` over pairs of passes, kept by batch: the variance of a pixel as passes 2i and
+    /// 2i + 1 show it ([`spread`]). Pairs are counted from pass 0, so that this too is the same for
+    /// every cut into blocks; empty without an image.
     pub spread: Counter<Vec<Moments>>,
-    /// Number of bands; 0 where nothing was played.
+    /// Number of bands; 0 where no pass was run.
     pub bands: usize,
     /// Work and time, kept by batch like the moments.
     pub work: Counter<Work>,
-    /// Work and time.
+    /// What is counted of all passes together.
     pub tally: Tally,
-    /// What stood before the first of these passes was played.
-    pub origin: Origin,
 }
 
-/// What was fixed before the first pass of a job.
+/// What was fixed before the first pass or draw of a job.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Origin {
+pub struct Start {
     /// Hashes of the claims: what is claimed later is claimed with the result in sight.
     pub claims: Vec<String>,
     /// Hash of the budget that was turned into passes.
@@ -107,36 +145,28 @@ impl Merge for Work {
     }
 }
 
-/// Counts and time, which add up in any order.
+/// Counts and time that are not kept by batch and add up in any order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Tally {
-    /// By [`Cost`].
-    pub cost: [u64; Cost::ALL.len()],
     /// By [`Anomaly`].
     pub anomalies: [u64; Anomaly::ALL.len()],
-    /// Passes.
-    pub passes: u64,
-    /// CPU time of the passes alone, seconds.
-    pub cpu_seconds: f64,
     /// Wall time, seconds.
     pub wall_seconds: f64,
-    /// Processes that played some of the passes.
+    /// Processes that ran some of the passes.
     pub processes: u64,
 }
 
 impl Tally {
     /// Adds another run of passes.
     pub fn add(&mut self, other: &Tally) {
-        self.cost.iter_mut().zip(other.cost).for_each(|(a, b)| *a += b);
         self.anomalies.iter_mut().zip(other.anomalies).for_each(|(a, b)| *a += b);
-        self.passes += other.passes;
-        self.cpu_seconds += other.cpu_seconds;
         self.wall_seconds += other.wall_seconds;
         self.processes += other.processes;
     }
 }
 
-/// The groups of bands that an estimator plays together.
+/// The groups of bands that an estimator runs together.
 pub fn band_groups(band_use: BandUse, bands: usize) -> Vec<Vec<usize>> {
     match band_use {
         BandUse::EachAlone => (0..bands).map(|band| vec![band]).collect(),
@@ -173,12 +203,16 @@ impl Block {
             bands: 0,
             work: Counter::new(start, keep_level),
             tally: Tally::default(),
-            origin: Origin::default(),
         }
     }
 
-    /// Pairs the image of the pass that comes next with that of the pass before it, where these two are a pair
-    /// and this block holds the first of them: its node has then merged with none.
+    /// CPU time of the passes alone, seconds.
+    pub fn cpu_seconds(&self) -> f64 {
+        self.work.nodes().iter().map(|node| node.value.cpu_seconds).sum()
+    }
+
+    /// Pairs the image of the pass that comes next with that of the pass before it, where these two are
+    /// a pair and this block holds the first of them: its node has then merged with none.
     fn pair_with(&mut self, next: &[f64]) {
         let is_second = !self.next_pass().is_multiple_of(2);
         if is_second && let Some(first) = self.pixels.nodes().last() {
@@ -227,14 +261,19 @@ pub struct Finished {
     pub spread: Vec<Vec<Moments>>,
     /// Work and time by batch.
     pub work: Vec<Work>,
-    /// Work and time.
+    /// What is counted of all passes together.
     pub tally: Tally,
-    /// What stood before the first pass.
-    pub origin: Origin,
+}
+
+impl Finished {
+    /// Work and time of all passes.
+    pub fn total(&self) -> Work {
+        self.work.iter().fold(Work::default(), |sum, work| sum.merge(*work))
+    }
 }
 
 impl Block {
-    /// All passes are played: folds what the tree still holds apart.
+    /// All passes are done: folds what the tree still holds apart.
     pub fn finish(self) -> Finished {
         Finished {
             passes: self.next_pass(),
@@ -243,14 +282,24 @@ impl Block {
             spread: self.spread.batches(),
             work: self.work.batches(),
             tally: self.tally,
-            origin: self.origin,
         }
     }
 }
 
-impl Job {
-    /// Plays passes `start..end`; only the run itself keeps an image. `stop` is asked between passes; a stopped block is dropped whole.
-    pub fn play(
+impl Passes {
+    /// Number of the group of jobs that are timed side by side, where it is of one.
+    pub fn side_by_side(&self) -> Option<usize> {
+        self.arm.is_timed.then_some(self.cell)
+    }
+
+    /// Columns and rows of the image, where the record has one.
+    pub fn image_size(&self) -> Option<(usize, usize)> {
+        self.layout.image().filter(|_| self.stage == Stage::Main)
+    }
+
+    /// Runs passes `start..end`; only the run itself keeps an image. `stop` is asked between passes; a
+    /// stopped block is dropped whole.
+    pub fn run(
         &self,
         stage: Stage,
         start: u64,
@@ -260,7 +309,6 @@ impl Job {
     ) -> Option<Block> {
         let mut block = Block { bands: self.layout.bands(), ..Block::empty(start, keep_level) };
         let mut scores = Scores::new(self.layout.clone());
-        let mut cpu = Duration::ZERO;
         let wall = Instant::now();
         for pass in start..end {
             if stop() {
@@ -277,7 +325,6 @@ impl Job {
                 self.estimator.pass(&group.bands, &key.pass(pass), &mut scores);
             }
             let spent = thread_cpu_time().saturating_sub(before);
-            cpu += spent;
             block.work.push(Work {
                 cost: std::array::from_fn(|i| scores.cost[i] - counted[i]),
                 cpu_seconds: spent.as_secs_f64(),
@@ -290,10 +337,7 @@ impl Job {
             block.pixels.push(ImageMoments::of(image));
         }
         block.tally = Tally {
-            cost: scores.cost,
             anomalies: scores.anomalies,
-            passes: end - start,
-            cpu_seconds: cpu.as_secs_f64(),
             wall_seconds: wall.elapsed().as_secs_f64(),
             processes: 0,
         };

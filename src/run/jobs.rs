@@ -1,34 +1,37 @@
-//! From an experiment to jobs: every cell's scene, every estimator on it, the streams of both.
+//! From an experiment to jobs: every cell's scene, every estimator on it, every sampler, the streams of
+//! all.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
+use super::chi_square::Draws;
 use super::comparisons;
-use super::job::{Group, Job, band_groups};
-use super::keys::{Stage, StreamName};
-use super::memory::Estimate;
+use super::job::{Arm, Group, Job, Passes, Task, band_groups};
+use super::keys::{KEY_VERSION, Stage, StreamName};
+use super::memory::MemoryEstimate;
 use crate::error::{Error, Result};
 use crate::estimators::Layout;
 use crate::experiment::build::{self, Builder};
 use crate::experiment::registry::Registry;
-use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure};
+use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure, SamplerEntry};
 use crate::experiment::{CellSpec, Experiment};
-use crate::results::json::hash_json;
+use crate::results::json::{canonical, hash_bytes, hash_json};
 use crate::results::provenance;
 use crate::results::record::{Band, Comparison, Observable};
+use crate::samplers::Sampler;
+use crate::sampling::stream::StreamKey;
+use crate::scene::Scene;
 
 /// What a run will do.
 pub struct Plan {
     /// The bands.
     pub bands: Vec<Band>,
-    /// One job per cell and estimator, cells outermost.
+    /// One job per cell and arm of an estimator, cells outermost; then one per sampler.
     pub jobs: Vec<Job>,
-    /// The claims, expanded.
+    /// The claims on estimators, expanded.
     pub comparisons: Vec<Comparison>,
-    /// Kind of each estimator.
-    pub kinds: Vec<String>,
     /// What the passes are for.
     pub stage: Stage,
     scene_bytes: usize,
@@ -38,139 +41,231 @@ pub struct Plan {
 
 impl Plan {
     /// Estimate of the memory it takes.
-    pub fn memory(&self, threads: usize) -> Estimate {
-        Estimate::new(&self.jobs, self.scene_bytes, threads, self.passes)
+    pub fn memory(&self, threads: usize) -> MemoryEstimate {
+        MemoryEstimate::new(&self.jobs, self.scene_bytes, threads, self.passes)
     }
 }
 
-/// Gate observables per cell that a record holds at most.
+/// Observables per cell that a record holds at most.
 const MOST_OBSERVABLES: usize = 4096;
 
 /// Builds everything an experiment needs; what cannot be built is found here, before any work.
 ///
 /// # Errors
 /// Everything that only shows when it is built: meshes, maps, sensors inside bodies, claims on
-/// observables that do not exist.
+/// observables that do not exist, options that a sampler refuses.
 pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
     plan_stage(experiment, registry, Stage::Main)
 }
 
 /// The same for the passes of `stage`.
 pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: Stage) -> Result<Plan> {
+    if !experiment.cells.is_empty() && experiment.file.budget.is_none() {
+        return Err(Error::input_help(
+            "the experiment has no budget",
+            "give it one, as `budget.passes = 64`",
+        ));
+    }
     let mut builder = Builder::new(experiment);
     let bands = builder.bands().to_vec();
-    let inputs = build::inputs(experiment);
-    let claims: Vec<String> = experiment.file.claim.iter().map(hash_json).collect();
+    let cells = cells(experiment, &mut builder)?;
+    let observables: Vec<Vec<Observable>> = cells.iter().map(|cell| named(&cell.layout)).collect();
+    let comparisons = comparisons::expand(experiment, &bands, &observables)?;
+    let inputs = json!(build::inputs(experiment));
+    let planner = Planner { experiment, registry, bands: &bands, inputs, stage };
+    let arms = Duels::new(experiment);
     let mut jobs = Vec::new();
-    let mut observables = Vec::new();
-    let mut kinds = Vec::new();
+    for (index, cell) in cells.iter().enumerate() {
+        for (entry, words) in experiment.file.estimator.iter().enumerate() {
+            let targets = targets(index, &words.name, &comparisons, &observables[index]);
+            for arm in arms.of(cell.spec, &words.name) {
+                jobs.push(planner.passes(index, cell, entry, arm, targets.clone())?);
+            }
+        }
+    }
+    for index in 0..experiment.file.sampler.len() {
+        jobs.push(planner.draws(index)?);
+    }
+    let passes = match experiment.file.budget {
+        Some(Budget::Passes(passes)) => Some(passes),
+        _ => None,
+    };
+    Ok(Plan { jobs, comparisons, stage, scene_bytes: builder.memory_bytes(), passes, bands })
+}
+
+/// A cell, built.
+struct BuiltCell<'a> {
+    spec: &'a CellSpec,
+    scene: Arc<Scene>,
+    layout: Layout,
+}
+
+/// Builds every cell: no two are the same scene, and none has more observables than a record holds.
+fn cells<'a>(experiment: &'a Experiment, builder: &mut Builder) -> Result<Vec<BuiltCell<'a>>> {
     let mut known: BTreeMap<String, &str> = BTreeMap::new();
-    let timed = Timed::new(experiment);
-    for (index, cell) in experiment.cells.iter().enumerate() {
-        if let Some(twin) = known.insert(hash_json(&cell.content()), &cell.label) {
+    let mut cells = Vec::new();
+    for spec in &experiment.cells {
+        if let Some(twin) = known.insert(hash_json(&spec.content()), &spec.label) {
             return Err(Error::input_help(
-                format!("cells `{twin}` and `{}` are the same scene", cell.label),
-                "equal scenes are played on equal streams, so one says nothing about the other: drop one",
+                format!("cells `{twin}` and `{}` are the same scene", spec.label),
+                "equal scenes run on equal streams, so one says nothing about the other: drop one",
             ));
         }
-        let scene = Arc::new(builder.scene(cell)?);
+        let scene = Arc::new(builder.scene(spec)?);
         let layout = Layout::new(&scene);
-        observables.push(named(&layout));
-        if layout.observables().len() > MOST_OBSERVABLES {
+        let count = layout.observables().len();
+        if count > MOST_OBSERVABLES {
             return Err(Error::input_help(
-                format!("cell `{}` has {} observables", cell.label, layout.observables().len()),
+                format!("cell `{}` has {count} observables", spec.label),
                 format!("a record holds at most {MOST_OBSERVABLES}; lower the number of bins"),
             ));
         }
-        for (estimator_index, entry) in experiment.file.estimator.iter().enumerate() {
-            let (kind, options) = entry
-                .kind
-                .iter()
-                .next()
-                .ok_or_else(|| Error::input(format!("estimator `{}` has no kind", entry.name)))?;
-            let registered = registry.get(kind).ok_or_else(|| {
-                Error::input(format!("estimator `{}`: unknown kind `{kind}`", entry.name))
-            })?;
-            if index == 0 {
-                kinds.push(kind.clone());
-            }
-            for arm in timed.arms(cell, &entry.name) {
-                let estimator = (registered.build)(options, Arc::clone(&scene))?;
-                let groups = band_groups(estimator.band_use(), bands.len());
-                let groups = groups
-                    .into_iter()
-                    .map(|group| streams(experiment, cell, &bands, &arm.name, group, stage))
-                    .collect();
-                let label = match cell.label.as_str() {
-                    "" => arm.name.clone(),
-                    cell => format!("{cell} / {}", arm.name),
-                };
-                let identity = json!({
-                    "build": provenance::build(),
-                    "experiment": experiment.file.name,
-                    "seed": experiment.file.seed,
-                    "fresh": experiment.file.fresh,
-                    "stage": stage.name(),
-                    "bands": bands,
-                    "content": cell.content(),
-                    "pair": experiment.file.pair,
-                    "inputs": inputs,
-                    "estimator": entry,
-                    "control": arm.is_control,
-                });
-                jobs.push(Job {
-                    cell: index,
-                    estimator_index,
-                    name: arm.name,
-                    is_control: arm.is_control,
-                    side_by_side: arm.is_timed.then_some(index),
-                    label,
-                    identity: hash_json(&identity),
-                    stage,
-                    passes: None,
-                    groups,
-                    estimator,
-                    layout: layout.clone(),
-                    targets: vec![0],
-                    claims: claims.clone(),
-                });
-            }
+        cells.push(BuiltCell { spec, scene, layout });
+    }
+    Ok(cells)
+}
+
+/// What every job of a plan is made from.
+struct Planner<'a> {
+    experiment: &'a Experiment,
+    registry: &'a Registry,
+    bands: &'a [Band],
+    /// Hashes of the files that the scenes read.
+    inputs: Value,
+    stage: Stage,
+}
+
+impl Planner<'_> {
+    /// The passes of an estimator in a cell.
+    fn passes(
+        &self,
+        index: usize,
+        cell: &BuiltCell,
+        entry: usize,
+        arm: Arm,
+        targets: Vec<usize>,
+    ) -> Result<Job> {
+        let words = &self.experiment.file.estimator[entry];
+        let no_kind = || Error::input(format!("estimator `{}` has no kind", words.name));
+        let (kind, options) = words.choice().ok_or_else(no_kind)?;
+        let unknown = || Error::input(format!("estimator `{}`: unknown kind `{kind}`", words.name));
+        let registered = self.registry.get(kind).ok_or_else(unknown)?;
+        let estimator = (registered.build)(options, Arc::clone(&cell.scene))?;
+        let groups = band_groups(estimator.band_use(), self.bands.len()).into_iter();
+        let groups = groups.map(|group| self.group(cell.spec, &arm.name, group)).collect();
+        let label = match cell.spec.label.as_str() {
+            "" => arm.name.clone(),
+            cell => format!("{cell} / {}", arm.name),
+        };
+        let file = &self.experiment.file;
+        let identity = json!({
+            "build": provenance::build(),
+            "experiment": file.name,
+            "seed": file.seed,
+            "fresh": file.fresh,
+            "stage": self.stage.name(),
+            "bands": self.bands,
+            "content": cell.spec.content(),
+            "pair": file.pair,
+            "inputs": self.inputs,
+            "estimator": words,
+            "control": arm.is_control,
+        });
+        let (stage, layout) = (self.stage, cell.layout.clone());
+        let passes =
+            Passes { cell: index, entry, arm, stage, count: None, estimator, layout, groups, targets };
+        Ok(Job { label, identity: hash_json(&identity), task: Task::Estimate(Box::new(passes)) })
+    }
+
+    /// Bands that run together, with their streams.
+    fn group(&self, cell: &CellSpec, estimator: &str, group: Vec<usize>) -> Group {
+        let file = &self.experiment.file;
+        let content = match &file.pair {
+            Some(pair) => cell.content_without(&pair.over),
+            None => cell.content(),
+        };
+        let names: Vec<&str> = group.iter().map(|&band| self.bands[band].name.as_str()).collect();
+        let fresh = file.fresh.as_deref();
+        let key = |stage| {
+            let (experiment, seed) = (file.name.as_str(), file.seed);
+            StreamName { experiment, seed, fresh, content: &content, bands: &names, estimator, stage }
+                .key()
+        };
+        Group { main: key(self.stage), pilot: key(Stage::Pilot), bands: group }
+    }
+
+    /// The draws from a sampler.
+    fn draws(&self, index: usize) -> Result<Job> {
+        let file = &self.experiment.file;
+        let words = &file.sampler[index];
+        let (kind, sampler) = build_sampler(words, self.registry)?;
+        // Absent on purpose: the number of draws, claims, threads, the order of the file.
+        let mut name = json!({
+            "version": KEY_VERSION,
+            "experiment": file.name,
+            "sampler": words.name,
+            "content": words.kind,
+            "stage": self.stage.name(),
+        });
+        if let Some(seed) = file.seed {
+            name["seed"] = json!(seed);
         }
+        if let Some(fresh) = &file.fresh {
+            name["fresh"] = json!(fresh);
+        }
+        let identity = json!({ "build": provenance::build(), "streams": name, "index": index });
+        let draws = Draws {
+            index,
+            name: words.name.clone(),
+            kind: kind.to_string(),
+            sampler,
+            samples: file.samples.unwrap_or_default(),
+            key: StreamKey::new(hash_bytes(canonical(&name).as_bytes())),
+        };
+        let (label, identity) = (words.name.clone(), hash_json(&identity));
+        Ok(Job { label, identity, task: Task::Draw(Box::new(draws)) })
     }
-    let passes = match experiment.file.budget {
-        Budget::Passes(passes) => Some(passes),
-        Budget::CpuSeconds(_) | Budget::RelativeError(_) => None,
-    };
-    let comparisons = comparisons::expand(experiment, &bands, &observables)?;
-    for job in &mut jobs {
-        job.targets = targets(experiment, job, &comparisons, &observables[job.cell]);
-    }
-    Ok(Plan { bands, jobs, comparisons, kinds, stage, scene_bytes: builder.memory_bytes(), passes })
 }
 
-/// A run of an estimator in a cell.
-struct Arm {
-    name: String,
-    is_control: bool,
-    is_timed: bool,
+/// The kind of a sampler, and the sampler.
+fn build_sampler<'a>(
+    words: &'a SamplerEntry,
+    registry: &Registry,
+) -> Result<(&'a str, Box<dyn Sampler>)> {
+    let no_kind = || Error::input(format!("sampler `{}` has no kind", words.name));
+    let (kind, options) = words.choice().ok_or_else(no_kind)?;
+    let unknown = || Error::input(format!("sampler `{}`: unknown kind `{kind}`", words.name));
+    let registered = registry.samplers.iter().find(|known| known.kind == kind).ok_or_else(unknown)?;
+    Ok((kind, (registered.build)(options)?))
 }
 
-/// What claims compare by CPU time: estimators that are played side by side, and baselines that are played
-/// twice, because the same estimator against itself shows what the machine adds.
-struct Timed<'a> {
+/// Builds every scene and every sampler, as `check` wants it: meshes, maps, the sensor's place and the
+/// options of samplers show only then.
+///
+/// # Errors
+/// What cannot be built.
+pub fn build_all(experiment: &Experiment, registry: &Registry) -> Result<()> {
+    let mut builder = Builder::new(experiment);
+    experiment.cells.iter().try_for_each(|cell| builder.scene(cell).map(|_| ()))?;
+    experiment.file.sampler.iter().try_for_each(|words| build_sampler(words, registry).map(|_| ()))
+}
+
+/// What claims compare by CPU time: estimators that run side by side, and baselines that run twice,
+/// because the same estimator against itself shows what the machine adds.
+struct Duels<'a> {
     /// Where, candidate, baseline.
     duels: Vec<(&'a BTreeMap<String, String>, &'a str, &'a str)>,
 }
 
-impl<'a> Timed<'a> {
-    fn new(experiment: &'a Experiment) -> Timed<'a> {
+impl<'a> Duels<'a> {
+    fn new(experiment: &'a Experiment) -> Duels<'a> {
         let duels = experiment.file.claim.iter().filter_map(ClaimEntry::duel);
         let by_time = duels.filter(|duel| duel.cost == CostMeasure::Cpu);
-        Timed { duels: by_time.map(|duel| (duel.only, duel.candidate, duel.baseline)).collect() }
+        Duels { duels: by_time.map(|duel| (duel.only, duel.candidate, duel.baseline)).collect() }
     }
 
     /// The runs of an estimator in a cell.
-    fn arms(&self, cell: &CellSpec, name: &str) -> Vec<Arm> {
+    fn of(&self, cell: &CellSpec, name: &str) -> Vec<Arm> {
         let here = || {
             self.duels
                 .iter()
@@ -186,27 +281,6 @@ impl<'a> Timed<'a> {
     }
 }
 
-fn streams(
-    experiment: &Experiment,
-    cell: &CellSpec,
-    bands: &[Band],
-    estimator: &str,
-    group: Vec<usize>,
-    main: Stage,
-) -> Group {
-    let content = match &experiment.file.pair {
-        Some(pair) => cell.content_without(&pair.over),
-        None => cell.content(),
-    };
-    let names: Vec<&str> = group.iter().map(|&band| bands[band].name.as_str()).collect();
-    let fresh = experiment.file.fresh.as_deref();
-    let key = |stage| {
-        let (experiment, seed) = (experiment.file.name.as_str(), experiment.file.seed);
-        StreamName { experiment, seed, fresh, content: &content, bands: &names, estimator, stage }.key()
-    };
-    Group { main: key(main), pilot: key(Stage::Pilot), bands: group }
-}
-
 /// A layout's observables as the record names them.
 pub fn named(layout: &Layout) -> Vec<Observable> {
     let name = |o: &crate::estimators::ObservableName| Observable {
@@ -216,16 +290,15 @@ pub fn named(layout: &Layout) -> Vec<Observable> {
     layout.observables().iter().map(name).collect()
 }
 
-/// The observables that claims name of a job; the sensor's first where none does.
+/// The observables that claims name of an estimator in a cell; the sensor's first where none does.
 fn targets(
-    experiment: &Experiment,
-    job: &Job,
+    cell: usize,
+    estimator: &str,
     comparisons: &[Comparison],
     observables: &[Observable],
 ) -> Vec<usize> {
-    let estimator = &experiment.file.estimator[job.estimator_index].name;
     let claimed = comparisons.iter().map(|comparison| &comparison.quantity);
-    let mine = claimed.filter(|q| q.cell == job.cell && q.estimator == *estimator);
+    let mine = claimed.filter(|q| q.cell == cell && q.estimator == estimator);
     let mut indices: Vec<usize> =
         mine.filter_map(|q| observables.iter().position(|o| *o == q.observable)).collect();
     indices.sort_unstable();

@@ -1,18 +1,17 @@
 //! Images on show while they are made: what is sent to a viewer, and when.
 //!
-//! The collector makes an image of what it has in order, from a copy: nothing here reaches a record. It does
-//! so at most twice a second, only where the one before is on its way, and for a twentieth of its time. A
-//! thread of its own sends, and one image waits at most: a viewer that is slow or hangs stalls nothing. A
-//! job's last image that finds the place taken is sent when all jobs are played.
+//! The collector makes an image of what it has in order, from a copy: nothing here reaches a record. It
+//! does so at most twice a second, only where the one before is on its way, and for a twentieth of its
+//! time. A thread of its own sends, and one image waits at most: a viewer that is slow or hangs stalls
+//! nothing. A job's last image that finds the place taken is sent when all jobs are played.
 
 use std::collections::BTreeMap;
 use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::job::{Block, Finished, Job};
-use super::keys::Stage;
-use super::tev::{Address, Connection, Frame};
+use super::job::{Block, Finished, Job, Passes};
+use super::tev::{Address, Connection, TevImage};
 use crate::results::image::Picture;
 use crate::results::npy::Array;
 use crate::results::record::Band;
@@ -42,7 +41,7 @@ struct Shared {
 /// What lies between the collector and the thread that sends.
 #[derive(Debug, Default)]
 struct Post {
-    waiting: Option<Frame>,
+    waiting: Option<TevImage>,
     is_sending: bool,
     /// Nothing can be sent any more, for this reason, which nobody has told yet.
     lost: Option<String>,
@@ -82,7 +81,7 @@ impl Live {
     }
 
     /// Puts an image where it is taken from, unless another one waits there.
-    fn offer(&self, frame: impl FnOnce() -> Frame) -> bool {
+    fn offer(&self, frame: impl FnOnce() -> TevImage) -> bool {
         let is_free = |post: &Post| post.waiting.is_none() && !post.is_closed;
         if !is_free(&self.shared.post()) {
             return false;
@@ -93,7 +92,8 @@ impl Live {
         true
     }
 
-    /// Waits until no image waits, and none is under way where `all` are meant; false where that lasts too long.
+    /// Waits until no image waits, and none is under way where `all` are meant; false where that lasts
+    /// too long.
     fn wait(&self, until: Instant, all: bool) -> bool {
         let left = until.saturating_duration_since(Instant::now());
         let is_busy =
@@ -129,7 +129,7 @@ impl Shared {
         }
     }
 
-    fn take(&self) -> Option<Frame> {
+    fn take(&self) -> Option<TevImage> {
         let is_idle = |post: &mut Post| post.waiting.is_none() && !post.is_closed;
         let post = self.changed.wait_while(self.post(), is_idle);
         let mut post = post.unwrap_or_else(PoisonError::into_inner);
@@ -140,13 +140,13 @@ impl Shared {
 }
 
 /// Width, height and channels of an image that a viewer has.
-type Shape = (usize, usize, Vec<String>);
+type Format = (usize, usize, Vec<String>);
 
 /// Sends an image; first has it created, where the viewer has none of its name and shape.
 fn send(
     connection: &mut Connection,
-    frame: &Frame,
-    created: &mut BTreeMap<String, Shape>,
+    frame: &TevImage,
+    created: &mut BTreeMap<String, Format>,
 ) -> io::Result<()> {
     let channels = frame.channels.iter().map(|(name, _)| name.clone()).collect();
     let shape = (frame.width, frame.height, channels);
@@ -205,13 +205,13 @@ impl Show<'_> {
             .is_none_or(|size| self.live.offer(|| self.frame(job, size, &finished.image)))
     }
 
-    /// All jobs are played: sends the images of those that are `owed`. What there is to say, where some were
-    /// not sent.
-    pub fn close(&self, owed: &[usize], finished: &[Finished]) -> Option<String> {
+    /// All jobs are played: sends the images of those that are `owed`. What there is to say, where some
+    /// were not sent.
+    pub fn close(&self, owed: &[(usize, &Finished)]) -> Option<String> {
         let until = Instant::now() + LAST_WAIT;
         let mut sent = 0;
-        for &job in owed {
-            if !self.live.wait(until, false) || !self.done(job, &finished[job]) {
+        for &(job, finished) in owed {
+            if !self.live.wait(until, false) || !self.done(job, finished) {
                 break;
             }
             sent += 1;
@@ -227,9 +227,10 @@ impl Show<'_> {
         ))
     }
 
-    /// An image with the channels of the run's OpenEXR file. Their names end with the band, as tev reads a name
-    /// that begins with a digit (a bin of wavelengths) wrongly, and shows R, G, B of one head together.
-    fn frame(&self, job: usize, (width, height): (usize, usize), image: &ImageMoments) -> Frame {
+    /// An image with the channels of the run's OpenEXR file. Their names end with the band, as tev reads
+    /// a name that begins with a digit (a bin of wavelengths) wrongly, and shows R, G, B of one head
+    /// together.
+    fn frame(&self, job: usize, (width, height): (usize, usize), image: &ImageMoments) -> TevImage {
         let data = image.mean.iter().copied().chain(image.std_error()).collect();
         let pixels = Array::new(vec![2, height, width, self.bands.len()], data);
         let picture = Picture::new(self.bands, &pixels);
@@ -245,13 +246,13 @@ impl Show<'_> {
             channels.push((format!("std_error.{}", band.name), std_error));
         }
         let name = self.jobs[job].label.replacen(" / ", "/", 1);
-        Frame { name: format!("{}/{name}", self.experiment), width, height, channels }
+        TevImage { name: format!("{}/{name}", self.experiment), width, height, channels }
     }
 }
 
 /// Columns and rows of a job's image, where its record has one.
 fn image_size(job: &Job) -> Option<(usize, usize)> {
-    job.layout.image().filter(|_| job.stage == Stage::Main)
+    job.passes().and_then(Passes::image_size)
 }
 
 #[cfg(test)]
@@ -269,8 +270,8 @@ mod tests {
         assert_eq!([1999, 2000].map(|ms| pace(100).is_due(after(ms))), [false, true]);
     }
 
-    fn frame(name: &str) -> Frame {
-        Frame { name: name.into(), width: 1, height: 1, channels: vec![("R".into(), vec![0.5])] }
+    fn frame(name: &str) -> TevImage {
+        TevImage { name: name.into(), width: 1, height: 1, channels: vec![("R".into(), vec![0.5])] }
     }
 
     // No thread sends: the first image waits, the second is not even made.

@@ -1,37 +1,39 @@
 //! What a run holds in memory, and whether it fits.
 
-use super::job::Job;
+use super::job::{Job, Passes};
 use crate::error::{Error, Result};
 
 /// Estimate of a run's largest memory, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Estimate {
+pub struct MemoryEstimate {
     /// Meshes and maps.
     pub shapes: usize,
     /// Moments of observables and images of everything measured, kept until the record is written.
     pub results: usize,
-    /// What the threads and the collector hold on top while playing.
+    /// What the threads and the collector hold on top during the run.
     pub working: usize,
 }
 
-impl Estimate {
+impl MemoryEstimate {
     /// For jobs on a number of threads, whose scenes hold `shapes` bytes.
     ///
     /// An image keeps mean and M2, 16 bytes a pixel and band. A finished job holds one, and the record's
     /// array beside it; and 128 batches of 5 moments per observable, likewise twice. A job under way
     /// holds one image per bit of its passes, and as much again while its state is written. Each thread
     /// holds the images of its block (sized by time: large images have blocks of a few passes) and one
-    /// more waits to be collected. Jobs that are timed side by side are under way together, and two batches
-    /// of each may wait for the turn of those before them. What an estimator needs for a pass it needs on each thread.
-    pub fn new(jobs: &[Job], shapes: usize, threads: usize, passes: Option<u64>) -> Estimate {
-        let image = |job: &Job| 16 * job.layout.pixels() * job.layout.bands();
-        let moments = |job: &Job| 128 * 40 * job.layout.observables().len() * job.layout.bands();
-        let largest = jobs.iter().map(image).max().unwrap_or(0);
+    /// more waits to be collected. Jobs that are timed side by side are under way together, and two
+    /// batches of each may wait for the turn of those before them. What an estimator needs for a pass it
+    /// needs on each thread.
+    pub fn new(jobs: &[Job], shapes: usize, threads: usize, passes: Option<u64>) -> MemoryEstimate {
+        let jobs: Vec<&Passes> = jobs.iter().filter_map(Job::passes).collect();
+        let image = |job: &Passes| 16 * job.layout.pixels() * job.layout.bands();
+        let moments = |job: &Passes| 128 * 40 * job.layout.observables().len() * job.layout.bands();
+        let largest = jobs.iter().map(|job| image(job)).max().unwrap_or(0);
         let own = jobs.iter().map(|job| job.estimator.working_bytes()).max().unwrap_or(0);
-        let side_by_side = |group| jobs.iter().filter(|job| job.side_by_side == Some(group)).count();
-        let arms = jobs.iter().filter_map(|job| job.side_by_side).map(side_by_side).max().unwrap_or(1);
+        let side_by_side = |group| jobs.iter().filter(|job| job.side_by_side() == Some(group)).count();
+        let arms = jobs.iter().filter_map(|job| job.side_by_side()).map(side_by_side).max().unwrap_or(1);
         let bits = passes.map_or(20, |passes| passes.max(1).ilog2() as usize + 1);
-        Estimate {
+        MemoryEstimate {
             shapes,
             results: jobs.iter().map(|job| 2 * (image(job) + moments(job))).sum(),
             working: (2 * bits * arms + (3 + 2 * arms) * threads) * largest + threads * own,
@@ -89,7 +91,7 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused() {
-        let estimate = Estimate { shapes: 0, results: 950, working: 0 };
+        let estimate = MemoryEstimate { shapes: 0, results: 950, working: 0 };
         assert!(estimate.check(Some(1000)).is_err());
         assert!(estimate.check(Some(2000)).is_ok());
         assert!(estimate.check(None).is_ok());

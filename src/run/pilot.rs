@@ -1,7 +1,7 @@
 //! Budgets into passes. Stopping by the clock or by the error reached would bias a mean, so a pilot on
 //! streams of its own fixes an integer number of passes before the run starts.
 
-use super::job::Job;
+use super::job::Passes;
 use super::keys::Stage;
 use crate::experiment::schema::{Budget, RelativeError};
 use crate::stats::moments::Moments;
@@ -14,9 +14,9 @@ const ALL: u32 = Counter::<Vec<Moments>>::MERGE_ALL;
 pub const LEAST_PASSES: u64 = 128;
 
 /// The passes that a budget pays for; `None` where `stop` was raised.
-pub fn passes(job: &Job, budget: &Budget, stop: &dyn Fn() -> bool) -> Option<u64> {
-    if job.passes.is_some() {
-        return job.passes;
+pub fn passes(job: &Passes, budget: &Budget, stop: &dyn Fn() -> bool) -> Option<u64> {
+    if job.count.is_some() {
+        return job.count;
     }
     match budget {
         Budget::Passes(passes) => Some(*passes),
@@ -27,23 +27,23 @@ pub fn passes(job: &Job, budget: &Budget, stop: &dyn Fn() -> bool) -> Option<u64
 
 /// Passes that a budget pays for and the CPU seconds they will take, from a short pilot; `None` where
 /// the pilot saw nothing to time.
-pub fn estimate_seconds(job: &Job, budget: &Budget) -> Option<(u64, f64)> {
+pub fn estimate_seconds(job: &Passes, budget: &Budget) -> Option<(u64, f64)> {
     let passes = passes(job, budget, &|| false)?;
-    let mut played = 1;
+    let mut tried = 1;
     loop {
-        let cpu = job.play(Stage::Pilot, 0, played, ALL, &|| false)?.tally.cpu_seconds;
-        if cpu > 0.02 || played >= passes {
-            return Some((passes, cpu / played as f64 * passes as f64));
+        let cpu = job.run(Stage::Pilot, 0, tried, ALL, &|| false)?.cpu_seconds();
+        if cpu > 0.02 || tried >= passes {
+            return Some((passes, cpu / tried as f64 * passes as f64));
         }
-        played *= 2;
+        tried *= 2;
     }
 }
 
 /// Doubles the pilot until it has used a twentieth of the budget, then divides.
-fn for_seconds(job: &Job, seconds: f64, stop: &dyn Fn() -> bool) -> Option<u64> {
+fn for_seconds(job: &Passes, seconds: f64, stop: &dyn Fn() -> bool) -> Option<u64> {
     let mut passes = 1;
     loop {
-        let cpu = job.play(Stage::Pilot, 0, passes, ALL, stop)?.tally.cpu_seconds;
+        let cpu = job.run(Stage::Pilot, 0, passes, ALL, stop)?.cpu_seconds();
         if cpu > seconds / 20.0 || passes >= 1 << 20 {
             return Some(((seconds * passes as f64 / cpu) as u64).max(2));
         }
@@ -63,11 +63,11 @@ const FEWEST_BATCHES: f64 = 64.0;
 const LONGEST_PILOT: u64 = 1 << 17;
 
 /// Doubles the pilot until the passes that it predicts are at most [`PILOT_SHARE`] times its own.
-fn for_error(job: &Job, target: &RelativeError, stop: &dyn Fn() -> bool) -> Option<u64> {
+fn for_error(job: &Passes, target: &RelativeError, stop: &dyn Fn() -> bool) -> Option<u64> {
     let mut pilot = Counter::new(0, ALL);
     let mut length = LEAST_PASSES;
     loop {
-        let more = job.play(Stage::Pilot, pilot.next_pass(), length, ALL, stop)?;
+        let more = job.run(Stage::Pilot, pilot.next_pass(), length, ALL, stop)?;
         for node in more.moments.nodes() {
             pilot.push_node(node.level, node.value.clone());
         }

@@ -1,6 +1,6 @@
 //! The first passes of every measurement once more: other blocks, other order, one thread, same bits.
 
-use super::job::{Block, Finished, Job};
+use super::job::{Block, Finished, Passes};
 use crate::results::json::hash_hex;
 use crate::results::record::Replay;
 use crate::stats::moments::Moments;
@@ -9,11 +9,10 @@ use crate::stats::tree::batch_level;
 /// Passes of a block: coprime to every batch and unlike any size that a run would choose.
 const BLOCK: u64 = 7;
 
-/// Plays the first `passes` of a finished job again, rounded up to whole batches; nothing where `stop` was
-/// raised. The blocks are played last to first and joined in their order.
+/// Runs the first `passes` of a finished job again, rounded up to whole batches; nothing where `stop`
+/// was raised. The blocks are run last to first and joined in their order.
 pub fn replay(
-    job: &Job,
-    estimator: &str,
+    job: &Passes,
     finished: &Finished,
     passes: u64,
     stop: &dyn Fn() -> bool,
@@ -22,16 +21,16 @@ pub fn replay(
     let batches = passes.div_ceil(1 << level).min(finished.batches.len() as u64);
     let end = (batches << level).min(finished.passes);
     let starts: Vec<u64> = (0..end).step_by(BLOCK as usize).collect();
-    let played: Option<Vec<Block>> = starts
+    let blocks: Option<Vec<Block>> = starts
         .iter()
         .rev()
-        .map(|&start| job.play(job.stage, start, end.min(start + BLOCK), level, stop))
+        .map(|&start| job.run(job.stage, start, end.min(start + BLOCK), level, stop))
         .collect();
     let mut all = Block::empty(0, level);
-    played?.into_iter().rev().for_each(|block| all.append(block));
+    blocks?.into_iter().rev().for_each(|block| all.append(block));
     Some(Replay {
         cell: job.cell,
-        estimator: estimator.into(),
+        estimator: job.arm.name.clone(),
         passes: end,
         recorded: digest(&finished.batches[..batches as usize]),
         replayed: digest(&all.moments.batches()),

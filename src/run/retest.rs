@@ -1,17 +1,30 @@
 //! Second looks: what failed a first test is measured again, on streams of its own and with more passes.
 
 use super::interrupt::Interrupt;
+use super::job::Task;
 use super::jobs::plan_stage;
 use super::keys::Stage;
-use super::{Options, play};
+use super::{Options, execute};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::experiment::registry::Registry;
 use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 
-/// Plays the measurements behind `wanted` again, with `factor` times the passes of `main`, and writes
-/// them into `retest/` beside the record. What an earlier call has played is not played again.
+/// What is measured again.
+pub struct Remeasured<'a> {
+    /// The record of the first look.
+    pub main: &'a Record,
+    /// Quantities of estimators: all that their run measures.
+    pub quantities: Vec<Quantity>,
+    /// Samplers by name.
+    pub samplers: Vec<String>,
+    /// How many times the passes and draws of the first look.
+    pub factor: u64,
+}
+
+/// Measures again what `look` says, and writes the record into `retest/` beside the first. What an
+/// earlier call has measured is not measured again.
 ///
 /// # Errors
 /// As [`super::run`].
@@ -20,20 +33,30 @@ pub fn retest(
     registry: &Registry,
     options: &Options,
     interrupt: &Interrupt,
-    main: &Record,
-    wanted: &[Quantity],
-    factor: u64,
+    look: &Remeasured,
 ) -> Result<Stored> {
     let mut plan = plan_stage(experiment, registry, Stage::Retest)?;
-    plan.jobs.retain(|job| wanted.iter().any(|q| q.cell == job.cell && q.estimator == job.name));
+    plan.jobs.retain(|job| match &job.task {
+        Task::Estimate(passes) => {
+            let same = |q: &Quantity| q.cell == passes.cell && q.estimator == passes.arm.name;
+            look.quantities.iter().any(same)
+        }
+        Task::Draw(draws) => look.samplers.contains(&draws.name),
+    });
     for job in &mut plan.jobs {
-        let runs = main.cells.get(job.cell).map_or(&[][..], |cell| &cell.runs);
-        let first = runs.iter().find(|run| run.estimator == job.name);
-        let first = first.ok_or_else(|| {
-            Error::input(format!("the record of `{}` holds no {}", main.experiment, job.label))
-        })?;
-        job.passes = Some(first.passes.saturating_mul(factor));
+        match &mut job.task {
+            Task::Estimate(passes) => {
+                let runs = look.main.cells.get(passes.cell).map_or(&[][..], |cell| &cell.runs);
+                let first = runs.iter().find(|run| run.estimator == passes.arm.name);
+                let first = first.ok_or_else(|| {
+                    let (name, label) = (&look.main.experiment, &job.label);
+                    Error::input(format!("the record of `{name}` holds no {label}"))
+                })?;
+                passes.count = Some(first.passes.saturating_mul(look.factor));
+            }
+            Task::Draw(draws) => draws.samples = draws.samples.saturating_mul(look.factor),
+        }
     }
     let root = RecordFolder::new(options.folder(&experiment.file.name)).retest();
-    play(experiment, &plan, root.root(), options, interrupt).map(|(_, stored)| stored)
+    execute(experiment, &plan, root.root(), options, interrupt).map(|(_, stored)| stored)
 }

@@ -1,9 +1,10 @@
-//! What tev, a viewer of images, is told over TCP: the packets as bytes, and a connection that takes them.
+//! What tev, a viewer of images, is told over TCP: the packets as bytes, and a connection that takes
+//! them.
 //!
 //! The form is that of tev's own source (github.com/Tom94/tev: `IpcPacket` in `include/tev/Ipc.h` at
 //! 029022e, `src/Ipc.cpp` at 61253bf, `src/main.cpp` at 009e7c1). A packet
-//! is its own length in bytes (u32, these four included), a type (i8) and that type's fields. Integers are
-//! little-endian, truth is one byte, a text ends with a zero byte, pixels are f32.
+//! is its own length in bytes (u32, these four included), a type (i8) and that type's fields. Integers
+//! are little-endian, truth is one byte, a text ends with a zero byte, pixels are f32.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -62,7 +63,7 @@ impl fmt::Display for Address {
 
 /// An image as a viewer shows it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
+pub struct TevImage {
     /// Under which it is shown.
     pub name: String,
     /// Pixels per row.
@@ -73,7 +74,7 @@ pub struct Frame {
     pub channels: Vec<(String, Vec<f32>)>,
 }
 
-impl Frame {
+impl TevImage {
     /// Has the viewer show an empty image of this name, size and channels; `is_focus` selects it there.
     pub fn create(&self, is_focus: bool) -> Vec<u8> {
         let mut packet = Packet::new(CREATE_IMAGE, is_focus, &self.name);
@@ -190,7 +191,8 @@ impl Connection {
         })
     }
 
-    /// What is written after the viewer has gone is lost without a word, at first; that it has gone can be read.
+    /// What is written after the viewer has gone is lost without a word, at first; that it has gone can
+    /// be read.
     ///
     /// # Errors
     /// It has gone.
@@ -210,10 +212,10 @@ impl Connection {
 mod tests {
     use super::*;
 
-    fn frame(width: usize, height: usize, channels: usize) -> Frame {
+    fn frame(width: usize, height: usize, channels: usize) -> TevImage {
         let values = |c: usize| (0..width * height).map(|i| (c * 1000 + i) as f32).collect();
         let channels = (0..channels).map(|c| (format!("c{c}"), values(c))).collect();
-        Frame { name: "a/b".into(), width, height, channels }
+        TevImage { name: "a/b".into(), width, height, channels }
     }
 
     // Written out by hand from tev's `setCreateImage`.

@@ -1,13 +1,14 @@
-//! Threads that play blocks, and the one place where results are put in order.
+//! Threads that run blocks of passes and draw from samplers, and the one place where results are put in
+//! order.
 //!
 //! Workers take the next run of passes from a shared source; the collector (the calling thread) appends
 //! finished blocks in the order of their passes, whatever the order in which they arrive. Blocks are
 //! sized by the time they take; the fixed tree over passes makes results independent of that size.
 //!
-//! Jobs that are timed side by side are played by quadruples: one worker plays two batches of every arm in
-//! the order A B .. B A, so that whatever drifts steadily (clock rate, temperature, other load) adds the
-//! same to each arm. A worker's first quadruple of a group warms it up, and one of which an earlier process
-//! had played a part is not in that order: neither counts as timed (`Work::settled`).
+//! Jobs that are timed side by side run by quadruples: one worker runs two batches of every arm in the
+//! order A B .. B A, so that whatever drifts steadily (clock rate, temperature, other load) adds the
+//! same to each arm. A worker's first quadruple of a group warms it up, and one of which an earlier
+//! process had played a part is not in that order: neither counts as timed (`Work::settled`).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,8 +16,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
 use super::checkpoint;
+use super::chi_square::{Draws, Sampled};
 use super::interrupt::Interrupt;
-use super::job::{Block, Finished, Job, Origin};
+use super::job::{Block, Finished, Job, Passes, Start, Task};
 use super::live::Show;
 use super::pilot;
 use super::progress::Progress;
@@ -29,9 +31,9 @@ use crate::stats::tree::batch_level;
 pub struct Settings<'a> {
     /// Number of threads.
     pub threads: usize,
-    /// Passes per block, where somebody insists.
+    /// Passes per block, where the user sets them.
     pub block_passes: Option<u64>,
-    /// Somebody may ask to stop.
+    /// The stop flag.
     pub interrupt: &'a Interrupt,
     /// Folder of the experiment's results.
     pub root: &'a Path,
@@ -39,6 +41,36 @@ pub struct Settings<'a> {
     pub progress: &'a Progress,
     /// Shows images as they are made.
     pub show: Option<Show<'a>>,
+    /// How much work a job with an estimator is; none where there is no such job.
+    pub budget: Option<&'a Budget>,
+    /// Hashes of the experiment's claims, hex.
+    pub claims: &'a [String],
+}
+
+/// What a job gave, and what stood before its first pass or draw.
+pub struct Completed {
+    /// What was fixed beforehand.
+    pub start: Start,
+    /// What came out.
+    pub output: Output,
+}
+
+/// What came out of a job.
+pub enum Output {
+    /// Of an estimator.
+    Passes(Box<Finished>),
+    /// Of a sampler.
+    Draws(Box<Sampled>),
+}
+
+impl Completed {
+    /// What passes measured, where the job is of an estimator.
+    pub fn passes(&self) -> Option<&Finished> {
+        match &self.output {
+            Output::Passes(finished) => Some(finished),
+            Output::Draws(_) => None,
+        }
+    }
 }
 
 /// Wall time that a block should take, seconds.
@@ -47,13 +79,15 @@ const BLOCK_SECONDS: f64 = 0.25;
 const CHECKPOINT_EVERY: Duration = Duration::from_secs(5);
 
 enum Message {
-    /// A job begins: its passes in all, and what an earlier run had done of them.
-    Begin { job: usize, passes: u64, done: Box<Block> },
-    /// A block was played.
-    Played { job: usize, block: Box<Block> },
+    /// A job begins: what is fixed of it, and what an earlier run had done.
+    Begin { job: usize, start: Start, done: Box<Block> },
+    /// A block is done.
+    Block { job: usize, block: Box<Block> },
+    /// A sampler is done, in this run or an earlier one.
+    Sampled { job: usize, start: Start, sampled: Box<Sampled>, is_new: bool },
 }
 
-struct Source {
+struct Queue {
     next_group: usize,
     active: Option<Active>,
 }
@@ -61,14 +95,14 @@ struct Source {
 /// The group of jobs under way: one, or the arms that are timed side by side.
 struct Active {
     group: usize,
-    arms: Vec<Arm>,
+    lanes: Vec<Lane>,
     /// Number of the next quadruple of batches.
     quadruple: u64,
     seconds_per_pass: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Arm {
+struct Lane {
     job: usize,
     passes: u64,
     next: u64,
@@ -83,28 +117,38 @@ struct Span {
     keep_level: u32,
 }
 
-/// What a worker plays in one go.
-struct Unit {
+/// What a worker does in one go.
+enum Unit {
+    /// All draws from a sampler.
+    Draws(usize),
+    /// Passes of estimators.
+    Passes(Turn),
+}
+
+/// Passes that a worker runs in one go.
+struct Turn {
     group: usize,
     spans: Vec<Span>,
-    /// These are whole batches of rivals in an order that cancels drift.
+    /// They are whole batches of rivals in an order that cancels drift.
     is_balanced: bool,
 }
 
 struct Pool<'a> {
     jobs: &'a [Job],
-    /// Indices of jobs that are played together.
+    /// Indices of jobs that run together.
     groups: Vec<Vec<usize>>,
-    budget: &'a Budget,
+    /// Number of samplers.
+    samplers: usize,
     settings: &'a Settings<'a>,
-    source: Mutex<Source>,
+    queue: Mutex<Queue>,
 }
 
-/// Plays every job and returns their blocks in the order of the jobs. Where the run is interrupted, all
+/// Does every job and returns what came out in the order of the jobs. Where the run is interrupted, all
 /// states are saved first.
-pub fn play_all(jobs: &[Job], budget: &Budget, settings: &Settings) -> Result<Vec<Finished>> {
-    let source = Mutex::new(Source { next_group: 0, active: None });
-    let pool = Pool { jobs, groups: groups(jobs), budget, settings, source };
+pub fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed>> {
+    let queue = Mutex::new(Queue { next_group: 0, active: None });
+    let samplers = jobs.iter().filter(|job| job.draws().is_some()).count();
+    let pool = Pool { jobs, groups: groups(jobs), samplers, settings, queue };
     // Bounded: blocks with images wait with their workers, not in memory.
     let (sender, receiver) = mpsc::sync_channel(settings.threads);
     std::thread::scope(|scope| {
@@ -124,9 +168,11 @@ pub fn play_all(jobs: &[Job], budget: &Budget, settings: &Settings) -> Result<Ve
 /// Jobs that are timed side by side, together; the others one by one.
 fn groups(jobs: &[Job]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
+    let side_by_side = |job: &Job| job.passes().and_then(Passes::side_by_side);
     for (index, job) in jobs.iter().enumerate() {
-        let same = |group: &&mut Vec<usize>| jobs[group[0]].side_by_side == job.side_by_side;
-        match groups.iter_mut().find(same).filter(|_| job.side_by_side.is_some()) {
+        let own = side_by_side(job);
+        let same = |group: &&mut Vec<usize>| side_by_side(&jobs[group[0]]) == own;
+        match groups.iter_mut().find(same).filter(|_| own.is_some()) {
             Some(group) => group.push(index),
             None => groups.push(vec![index]),
         }
@@ -134,22 +180,22 @@ fn groups(jobs: &[Job]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Two batches of every arm in the order A B .. B A, without what is played already; and whether nothing of
-/// it was.
-fn quadruple(arms: &[Arm], number: u64) -> (Vec<Span>, bool) {
-    let span = |arm: &Arm, batch: u64| {
-        let keep_level = batch_level(arm.passes);
-        let at = |batch: u64| arm.passes.min(batch << keep_level);
-        Span { job: arm.job, start: at(batch).max(arm.next), end: at(batch + 1), keep_level }
+/// Two batches of every arm in the order A B .. B A, without what is done already; and whether nothing
+/// of it was.
+fn quadruple(lanes: &[Lane], number: u64) -> (Vec<Span>, bool) {
+    let span = |lane: &Lane, batch: u64| {
+        let keep_level = batch_level(lane.passes);
+        let at = |batch: u64| lane.passes.min(batch << keep_level);
+        Span { job: lane.job, start: at(batch).max(lane.next), end: at(batch + 1), keep_level }
     };
-    let there = arms.iter().map(|arm| span(arm, 2 * number));
-    let back = arms.iter().rev().map(|arm| span(arm, 2 * number + 1));
+    let there = lanes.iter().map(|lane| span(lane, 2 * number));
+    let back = lanes.iter().rev().map(|lane| span(lane, 2 * number + 1));
     let spans: Vec<Span> = there.chain(back).collect();
     let is_whole = spans.iter().all(|span| span.end == span.start + (1 << span.keep_level));
     (spans.into_iter().filter(|span| span.start < span.end).collect(), is_whole)
 }
 
-/// Stops the other threads where one panics: the run is lost, and they should not play it to its end.
+/// Stops the other threads where one panics: the run is lost, and they should not go on to its end.
 struct StopOnPanic<'a>(&'a Interrupt);
 
 impl Drop for StopOnPanic<'_> {
@@ -163,78 +209,118 @@ impl Drop for StopOnPanic<'_> {
 impl Pool<'_> {
     fn work(&self, sender: &mpsc::SyncSender<Message>) {
         let _guard = StopOnPanic(self.settings.interrupt);
-        let stop = || self.settings.interrupt.raised();
         let mut warm = None;
         while let Some(unit) = self.next(sender) {
-            let begun = Instant::now();
-            let is_settled = unit.is_balanced && warm == Some(unit.group);
-            warm = Some(unit.group);
-            for span in &unit.spans {
-                let job = &self.jobs[span.job];
-                let played = job.play(job.stage, span.start, span.end, span.keep_level, &stop);
-                let Some(mut block) = played else { return };
-                if is_settled {
-                    block.settle(span.keep_level);
+            let went_on = match unit {
+                Unit::Draws(job) => self.draw(job, sender),
+                Unit::Passes(turn) => {
+                    let was_warm = warm.replace(turn.group) == Some(turn.group);
+                    self.take_turn(&turn, was_warm, sender)
                 }
-                // Sent before the lock is asked for, which another worker's pilot may hold for long.
-                if sender.send(Message::Played { job: span.job, block: Box::new(block) }).is_err() {
-                    return;
-                }
-            }
-            let passes: u64 = unit.spans.iter().map(|span| span.end - span.start).sum();
-            let seconds = begun.elapsed().as_secs_f64() / passes as f64;
-            if let Some(active) = self.lock().active.as_mut().filter(|a| a.group == unit.group) {
-                active.seconds_per_pass = Some(seconds);
+            };
+            if went_on.is_none() {
+                return;
             }
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Source> {
-        self.source.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Runs the passes of a turn; nothing where the run ends meanwhile.
+    fn take_turn(&self, turn: &Turn, is_warm: bool, sender: &mpsc::SyncSender<Message>) -> Option<()> {
+        let stop = || self.settings.interrupt.raised();
+        let begun = Instant::now();
+        for span in &turn.spans {
+            let job = self.jobs[span.job].passes()?;
+            let mut block = job.run(job.stage, span.start, span.end, span.keep_level, &stop)?;
+            if turn.is_balanced && is_warm {
+                block.settle(span.keep_level);
+            }
+            // Sent before the lock is asked for, which another worker's pilot may hold for long.
+            sender.send(Message::Block { job: span.job, block: Box::new(block) }).ok()?;
+        }
+        let passes: u64 = turn.spans.iter().map(|span| span.end - span.start).sum();
+        let seconds = begun.elapsed().as_secs_f64() / passes as f64;
+        if let Some(active) = self.lock().active.as_mut().filter(|a| a.group == turn.group) {
+            active.seconds_per_pass = Some(seconds);
+        }
+        Some(())
     }
 
-    /// The next passes to play; begins the next group where the last one has none left.
+    /// Draws from a sampler, unless an earlier run has; threads that no sampler is left for help.
+    fn draw(&self, index: usize, sender: &mpsc::SyncSender<Message>) -> Option<()> {
+        let job = &self.jobs[index];
+        let draws: &Draws = job.draws()?;
+        let path = checkpoint::path(self.settings.root, &job.identity);
+        let start = Start {
+            claims: self.claims(checkpoint::start(&path, &job.identity).as_ref()),
+            budget: String::new(),
+            passes: draws.samples,
+        };
+        let kept = checkpoint::load_draws(&path, &job.identity, draws.samples);
+        let is_new = kept.is_none();
+        let threads = (self.settings.threads / self.samplers).max(1);
+        let sampled = kept.or_else(|| draws.run(threads, self.settings.interrupt))?;
+        let sampled = Box::new(sampled);
+        sender.send(Message::Sampled { job: index, start, sampled, is_new }).ok()
+    }
+
+    /// The claims that stood before the first pass or draw: those of an earlier state, whether or not
+    /// the job goes on from it.
+    fn claims(&self, earlier: Option<&Start>) -> Vec<String> {
+        earlier.map_or_else(|| self.settings.claims.to_vec(), |start| start.claims.clone())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What is to be done next; begins the next group where the last one has none left.
     fn next(&self, sender: &mpsc::SyncSender<Message>) -> Option<Unit> {
-        let mut source = self.lock();
+        let mut queue = self.lock();
         loop {
             if self.settings.interrupt.raised() {
                 return None;
             }
-            if let Some(unit) = source.active.as_mut().and_then(|active| self.take(active)) {
-                return Some(unit);
+            if let Some(turn) = queue.active.as_mut().and_then(|active| self.take(active)) {
+                return Some(Unit::Passes(turn));
             }
-            let group = source.next_group;
+            let group = queue.next_group;
             let jobs = self.groups.get(group)?;
-            source.next_group += 1;
-            let arms: Option<Vec<Arm>> = jobs.iter().map(|&job| self.begin(job, sender)).collect();
-            let (quadruple, seconds_per_pass) = (0, None);
-            source.active = Some(Active { group, arms: arms?, quadruple, seconds_per_pass });
+            queue.next_group += 1;
+            let mut lanes = Vec::new();
+            for &index in jobs {
+                match &self.jobs[index].task {
+                    Task::Draw(_) => return Some(Unit::Draws(index)),
+                    Task::Estimate(passes) => lanes.push(self.begin(index, passes, sender)?),
+                }
+            }
+            queue.active = Some(Active { group, lanes, quadruple: 0, seconds_per_pass: None });
         }
     }
 
     /// The next passes of a group, if it has any left.
-    fn take(&self, active: &mut Active) -> Option<Unit> {
+    fn take(&self, active: &mut Active) -> Option<Turn> {
         let group = active.group;
-        if let [arm] = active.arms[..] {
-            let start = arm.next;
-            let end = arm.passes.min(start + self.block_length(active));
-            active.arms[0].next = end;
-            let span = Span { job: arm.job, start, end, keep_level: batch_level(arm.passes) };
-            return (start < end).then(|| Unit { group, spans: vec![span], is_balanced: false });
+        if let [lane] = active.lanes[..] {
+            let start = lane.next;
+            let end = lane.passes.min(start + self.block_length(active));
+            active.lanes[0].next = end;
+            let span = Span { job: lane.job, start, end, keep_level: batch_level(lane.passes) };
+            return (start < end).then(|| Turn { group, spans: vec![span], is_balanced: false });
         }
-        let most = active.arms.iter().map(|arm| arm.passes.div_ceil(1 << batch_level(arm.passes))).max();
+        let batches = |lane: &Lane| lane.passes.div_ceil(1 << batch_level(lane.passes));
+        let most = active.lanes.iter().map(batches).max();
         while 2 * active.quadruple < most? {
-            let (spans, is_balanced) = quadruple(&active.arms, active.quadruple);
+            let (spans, is_balanced) = quadruple(&active.lanes, active.quadruple);
             active.quadruple += 1;
             if !spans.is_empty() {
-                return Some(Unit { group, spans, is_balanced });
+                return Some(Turn { group, spans, is_balanced });
             }
         }
         None
     }
 
     fn block_length(&self, active: &Active) -> u64 {
-        let left = active.arms[0].passes - active.arms[0].next;
+        let left = active.lanes[0].passes - active.lanes[0].next;
         let fair = (left / (2 * self.settings.threads as u64)).max(1);
         let timed = match active.seconds_per_pass {
             Some(seconds) => (BLOCK_SECONDS / seconds.max(1e-9)) as u64,
@@ -244,29 +330,27 @@ impl Pool<'_> {
     }
 
     /// Fixes a job's passes and finds what is done of it. Other workers wait meanwhile.
-    fn begin(&self, index: usize, sender: &mpsc::SyncSender<Message>) -> Option<Arm> {
-        let job = &self.jobs[index];
-        let path = checkpoint::path(self.settings.root, &job.identity);
-        let origin = checkpoint::origin(&path, &job.identity);
-        let budget = hash_json(&(self.budget, &job.targets));
+    fn begin(&self, index: usize, passes: &Passes, sender: &mpsc::SyncSender<Message>) -> Option<Lane> {
+        let identity = &self.jobs[index].identity;
+        let path = checkpoint::path(self.settings.root, identity);
+        let earlier = checkpoint::start(&path, identity);
+        let budget = hash_json(&(self.settings.budget, &passes.targets));
         // A pilot that times itself would find another number each time.
-        let passes = match (job.passes, &origin) {
-            (Some(passes), _) => passes,
-            (None, Some(origin)) if origin.budget == budget => origin.passes,
-            _ => pilot::passes(job, self.budget, &|| self.settings.interrupt.raised())?,
+        let count = match (passes.count, &earlier) {
+            (Some(count), _) => count,
+            (None, Some(earlier)) if earlier.budget == budget => earlier.passes,
+            _ => pilot::passes(passes, self.settings.budget?, &|| self.settings.interrupt.raised())?,
         };
-        // Where a state goes too far or too coarsely, its passes are played again; they were seen all the
-        // same, so what is claimed since then stays claimed too late.
-        let claims = origin.map_or_else(|| job.claims.clone(), |origin| origin.claims);
-        let keep_level = batch_level(passes);
-        let mut done = checkpoint::load(&path, &job.identity, keep_level)
-            .filter(|block| block.next_pass() <= passes)
+        let keep_level = batch_level(count);
+        // Where a state goes too far or too coarsely, its passes run again.
+        let mut done = checkpoint::load_passes(&path, identity, keep_level)
+            .filter(|block| block.next_pass() <= count)
             .unwrap_or_else(|| Block::empty(0, keep_level));
-        done.origin = Origin { claims, budget, passes };
+        let start = Start { claims: self.claims(earlier.as_ref()), budget, passes: count };
         let next = done.next_pass();
-        done.tally.processes += u64::from(next < passes);
-        sender.send(Message::Begin { job: index, passes, done: Box::new(done) }).ok()?;
-        Some(Arm { job: index, passes, next })
+        done.tally.processes += u64::from(next < count);
+        sender.send(Message::Begin { job: index, start, done: Box::new(done) }).ok()?;
+        Some(Lane { job: index, passes: count, next })
     }
 }
 
@@ -274,14 +358,14 @@ impl Pool<'_> {
 struct Collector<'a> {
     jobs: &'a [Job],
     settings: &'a Settings<'a>,
-    finished: BTreeMap<usize, Finished>,
-    running: BTreeMap<usize, Running>,
+    completed: BTreeMap<usize, Completed>,
+    under_way: BTreeMap<usize, UnderWay>,
     /// Jobs whose last image found no place on its way to the viewer.
     owed: Vec<usize>,
 }
 
-struct Running {
-    passes: u64,
+struct UnderWay {
+    start: Start,
     done: Block,
     /// Passes that the state on disk holds.
     on_disk: u64,
@@ -292,43 +376,53 @@ struct Running {
 
 impl<'a> Collector<'a> {
     fn new(jobs: &'a [Job], settings: &'a Settings<'a>) -> Collector<'a> {
-        let (finished, running, owed) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
-        Collector { jobs, settings, finished, running, owed }
+        let (completed, under_way) = (BTreeMap::new(), BTreeMap::new());
+        Collector { jobs, settings, completed, under_way, owed: Vec::new() }
     }
 
-    fn collect(mut self, receiver: mpsc::Receiver<Message>) -> Result<Vec<Finished>> {
+    fn collect(mut self, receiver: mpsc::Receiver<Message>) -> Result<Vec<Completed>> {
         // Owned: where this returns early, senders that wait fail instead of waiting for ever.
         for message in receiver {
             let job = match message {
-                Message::Begin { job, passes, done } => {
+                Message::Begin { job, start, done } => {
                     let (early, saved) = (BTreeMap::new(), Instant::now());
                     let on_disk = done.next_pass();
-                    self.running.insert(job, Running { passes, done: *done, on_disk, early, saved });
+                    self.under_way.insert(job, UnderWay { start, done: *done, on_disk, early, saved });
                     job
                 }
-                Message::Played { job, block } => {
+                Message::Block { job, block } => {
                     let has_grown = self.take(job, *block)?;
-                    let running = self.running.get(&job).filter(|_| has_grown);
+                    let running = self.under_way.get(&job).filter(|_| has_grown);
                     if let (Some(show), Some(running)) = (self.settings.show, running) {
                         show.under_way(job, &running.done);
                     }
+                    job
+                }
+                Message::Sampled { job, start, sampled, is_new } => {
+                    if is_new {
+                        let identity = &self.jobs[job].identity;
+                        let path = checkpoint::path(self.settings.root, identity);
+                        checkpoint::save_draws(&path, identity, &start, &sampled)?;
+                    }
+                    self.completed.insert(job, Completed { start, output: Output::Draws(sampled) });
                     job
                 }
             };
             self.close_if_done(job)?;
             self.progress(job);
         }
-        if self.finished.len() == self.jobs.len() {
-            let finished: Vec<Finished> = self.finished.into_values().collect();
-            let slow = self.settings.show.and_then(|show| show.close(&self.owed, &finished));
+        if self.completed.len() == self.jobs.len() {
+            let owed = self.owed.iter().filter_map(|job| Some((*job, self.completed[job].passes()?)));
+            let owed: Vec<(usize, &Finished)> = owed.collect();
+            let slow = self.settings.show.and_then(|show| show.close(&owed));
             let gone = self.settings.show.and_then(|show| show.live.complaint());
             slow.iter().chain(&gone).for_each(|what| self.settings.progress.say(what));
-            return Ok(finished);
+            return Ok(self.completed.into_values().collect());
         }
-        for (&job, running) in &self.running {
-            self.save(job, &running.done)?;
+        for (&job, running) in &self.under_way {
+            self.save(job, running)?;
         }
-        let done = self.finished.len();
+        let done = self.completed.len();
         Err(Error::Interrupted(format!(
             "{done} of {} measurements are complete and the passes done of the others are kept in {}; the \
              same command goes on from there",
@@ -339,7 +433,7 @@ impl<'a> Collector<'a> {
 
     /// Takes a block; whether passes were appended, of this or of earlier ones that waited for it.
     fn take(&mut self, job: usize, block: Block) -> Result<bool> {
-        let Some(running) = self.running.get_mut(&job) else { return Ok(false) };
+        let Some(running) = self.under_way.get_mut(&job) else { return Ok(false) };
         let before = running.done.next_pass();
         running.early.insert(block.moments.start(), block);
         while let Some(next) = running.early.remove(&running.done.next_pass()) {
@@ -348,44 +442,45 @@ impl<'a> Collector<'a> {
         let has_grown = running.done.next_pass() > before;
         if running.saved.elapsed() > CHECKPOINT_EVERY {
             running.saved = Instant::now();
-            let running = &self.running[&job];
-            self.save(job, &running.done)?;
+            self.save(job, &self.under_way[&job])?;
         }
         Ok(has_grown)
     }
 
     fn close_if_done(&mut self, job: usize) -> Result<()> {
-        if self.running.get(&job).is_some_and(|r| r.done.next_pass() == r.passes)
-            && let Some(running) = self.running.remove(&job)
+        if self.under_way.get(&job).is_some_and(|r| r.done.next_pass() == r.start.passes)
+            && let Some(running) = self.under_way.remove(&job)
         {
             if running.done.next_pass() > running.on_disk {
-                self.save(job, &running.done)?;
+                self.save(job, &running)?;
             }
-            let finished = running.done.finish();
+            let finished = Box::new(running.done.finish());
             if self.settings.show.is_some_and(|show| !show.done(job, &finished)) {
                 self.owed.push(job);
             }
-            self.finished.insert(job, finished);
+            let output = Output::Passes(finished);
+            self.completed.insert(job, Completed { start: running.start, output });
         }
         Ok(())
     }
 
-    fn save(&self, job: usize, block: &Block) -> Result<()> {
+    fn save(&self, job: usize, running: &UnderWay) -> Result<()> {
         let identity = &self.jobs[job].identity;
-        checkpoint::save(&checkpoint::path(self.settings.root, identity), identity, block)
+        let path = checkpoint::path(self.settings.root, identity);
+        checkpoint::save_passes(&path, identity, &running.start, &running.done)
     }
 
     fn progress(&self, job: usize) {
         if let Some(gone) = self.settings.show.and_then(|show| show.live.complaint()) {
             self.settings.progress.say(&gone);
         }
-        let share = |r: &Running| r.done.next_pass() as f64 / r.passes as f64;
-        let under_way: f64 = self.running.values().map(share).sum();
-        let message = match self.running.get(&job) {
-            Some(running) => format!("{}: {} passes", self.jobs[job].label, running.passes),
+        let share = |r: &UnderWay| r.done.next_pass() as f64 / r.start.passes as f64;
+        let under_way: f64 = self.under_way.values().map(share).sum();
+        let message = match self.under_way.get(&job) {
+            Some(running) => format!("{}: {} passes", self.jobs[job].label, running.start.passes),
             None => self.jobs[job].label.clone(),
         };
-        self.settings.progress.update(self.finished.len() as f64 + under_way, message);
+        self.settings.progress.update(self.completed.len() as f64 + under_way, message);
     }
 }
 
@@ -394,17 +489,17 @@ mod tests {
     use super::*;
 
     /// (job, first pass, last) of a quadruple.
-    fn order(arms: &[Arm], number: u64) -> (Vec<(usize, u64, u64)>, bool) {
-        let (spans, is_whole) = quadruple(arms, number);
+    fn order(lanes: &[Lane], number: u64) -> (Vec<(usize, u64, u64)>, bool) {
+        let (spans, is_whole) = quadruple(lanes, number);
         (spans.iter().map(|s| (s.job, s.start, s.end)).collect(), is_whole)
     }
 
     #[test]
-    fn rivals_are_played_in_an_order_that_cancels_drift() {
-        let arm = |job, next| Arm { job, passes: 300, next };
+    fn rivals_run_in_an_order_that_cancels_drift() {
+        let lane = |job, next| Lane { job, passes: 300, next };
         // 300 passes: batches of 4.
-        let arms = [arm(3, 0), arm(5, 0), arm(8, 0)];
-        let (spans, is_whole) = order(&arms, 1);
+        let lanes = [lane(3, 0), lane(5, 0), lane(8, 0)];
+        let (spans, is_whole) = order(&lanes, 1);
         assert!(is_whole);
         let expected = [(3, 8, 12), (5, 8, 12), (8, 8, 12), (8, 12, 16), (5, 12, 16), (3, 12, 16)];
         assert_eq!(spans, expected);
@@ -416,14 +511,14 @@ mod tests {
     }
 
     #[test]
-    fn what_was_played_is_not_played_again() {
-        let arm = |job, next| Arm { job, passes: 300, next };
-        let arms = [arm(0, 10), arm(1, 16)];
-        assert_eq!(order(&arms, 0), (vec![], false));
-        assert_eq!(order(&arms, 1), (vec![(0, 10, 12), (0, 12, 16)], false));
-        assert!(order(&arms, 2).1);
+    fn what_was_run_is_not_run_again() {
+        let lane = |job, next| Lane { job, passes: 300, next };
+        let lanes = [lane(0, 10), lane(1, 16)];
+        assert_eq!(order(&lanes, 0), (vec![], false));
+        assert_eq!(order(&lanes, 1), (vec![(0, 10, 12), (0, 12, 16)], false));
+        assert!(order(&lanes, 2).1);
         // 75 batches: the last quadruple is a half.
-        assert_eq!(order(&arms, 37), (vec![(0, 296, 300), (1, 296, 300)], false));
-        assert!(order(&arms, 38).0.is_empty());
+        assert_eq!(order(&lanes, 37), (vec![(0, 296, 300), (1, 296, 300)], false));
+        assert!(order(&lanes, 38).0.is_empty());
     }
 }

@@ -15,7 +15,7 @@ use super::means::evidence_of_means;
 use super::verdict::known;
 use super::weights;
 use crate::results::csv_text;
-use crate::results::record::{Bias, Cell, CostMeasure, EstimatorRun, Observable, Quantity};
+use crate::results::record::{Cell, CostMeasure, EstimatorRun, Observable, Quantity, StatedBias};
 use crate::results::store::Stored;
 use crate::stats::tree::total;
 
@@ -197,8 +197,8 @@ fn ratio(baseline: Option<f64>, candidate: Option<f64>) -> Option<f64> {
 /// A biased estimator's variance is not its error.
 fn bias_objection(runs: &[&EstimatorRun]) -> Option<String> {
     runs.iter().find_map(|run| match &run.bias {
-        Bias::Biased(why) => Some(format!("{} is biased: {why}", run.estimator)),
-        Bias::Unbiased | Bias::Consistent => None,
+        StatedBias::Biased(why) => Some(format!("{} is biased: {why}", run.estimator)),
+        StatedBias::Unbiased | StatedBias::Consistent => None,
     })
 }
 

@@ -3,7 +3,9 @@
 use super::super::judge::judge_alone;
 use super::super::verdict::Outcome;
 use super::*;
-use crate::results::record::{Against, Bias, Claim, ClaimKind, Comparison, ExpectedOutcome, Observable};
+use crate::results::record::{
+    Against, Claim, ClaimKind, Comparison, ExpectedOutcome, Observable, StatedBias,
+};
 use crate::results::sample::{claim, pairs, quantity, set_observables, set_spread, stored, uniform};
 use crate::results::store::observables_path;
 use crate::results::timing::{Batches, Timing};
@@ -87,7 +89,7 @@ fn energy_that_is_missing_is_no_efficiency() {
 #[test]
 fn what_an_efficiency_cannot_rest_on_is_invalid() {
     let mut biased = scored(0.1, 0.05);
-    biased.record.cells[0].runs[1].bias = Bias::Biased("a cut".into());
+    biased.record.cells[0].runs[1].bias = StatedBias::Biased("a cut".into());
     assert_invalid(&by_counters(biased, 1.5), "no mean test: snee is biased");
 
     let mut exact = scored(0.1, 0.05);
@@ -137,7 +139,7 @@ fn timed(mut s: Stored, seconds: impl Fn(&str, usize) -> f64) -> Stored {
     let mut control = s.record.cells[0].runs[0].clone();
     control.estimator = "mis (control)".into();
     control.control_of = Some("mis".into());
-    control.moments = observables_path(0, "mis (control)");
+    control.moments = observables_path(0, 2);
     s.record.cells[0].runs.push(control);
     set_observables(&mut s, "mis (control)", |i, o, b| {
         1.0 + 0.1 * uniform(i + (50_000 + 1000 * (2 * o + b)) as u64)

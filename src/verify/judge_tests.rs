@@ -4,7 +4,9 @@ use serde_json::json;
 
 use super::super::verdict::{exit_code, to_csv};
 use super::*;
-use crate::results::record::{Against, Bias, Claim, ClaimKind, Comparison, ExpectedOutcome, Quantity};
+use crate::results::record::{
+    Against, Claim, ClaimKind, Comparison, ExpectedOutcome, Quantity, StatedBias,
+};
 use crate::results::sample::{PASSES, claim, judged, quantity, set_observables, stored, uniform};
 
 /// A record with one claim, of this kind and expectation, and one comparison.
@@ -206,7 +208,7 @@ fn heavy_tails_are_invalid() {
 #[test]
 fn a_biased_estimator_agrees_with_nothing() {
     let mut s = stored(0.1);
-    s.record.cells[0].runs[1].bias = Bias::Biased("diffusion".into());
+    s.record.cells[0].runs[1].bias = StatedBias::Biased("diffusion".into());
     let agree = |s: &Stored, expects| {
         one(&with_claim(s.clone(), ClaimKind::Agree, expects, other(false), Some(0.1)))
     };

@@ -4,7 +4,7 @@ use super::evidence::Evidence;
 use super::levels::SHARED_ERROR;
 use super::verdict::TestKind;
 use crate::results::record::{
-    Bias, Claim, ClaimKind, EstimatorRun, ExpectedOutcome, HeavyTail, Quantity,
+    Claim, ClaimKind, EstimatorRun, ExpectedOutcome, Quantity, StatedBias, StatedTail,
 };
 use crate::results::store::Stored;
 use crate::stats::hypothesis::{Estimate, Spread};
@@ -68,7 +68,7 @@ impl<'a> QuantityMean<'a> {
     fn known_tail(&self, quantity: &Quantity) -> Option<String> {
         let class = &quantity.observable.class;
         let concerns =
-            |tail: &&HeavyTail| tail.band == quantity.band && (class == "all" || *class == tail.class);
+            |tail: &&StatedTail| tail.band == quantity.band && (class == "all" || *class == tail.class);
         let tail = self.run.heavy_tails.iter().find(concerns)?;
         Some(format!("heavy tail, known beforehand: {}: {}", self.run.estimator, tail.reason))
     }
@@ -240,8 +240,8 @@ fn bias_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
         return None;
     }
     means.iter().find_map(|mean| match &mean.run.bias {
-        Bias::Biased(why) => Some(format!("{} is biased: {why}", mean.run.estimator)),
-        Bias::Unbiased | Bias::Consistent => None,
+        StatedBias::Biased(why) => Some(format!("{} is biased: {why}", mean.run.estimator)),
+        StatedBias::Unbiased | StatedBias::Consistent => None,
     })
 }
 

@@ -3,23 +3,23 @@
 use std::collections::BTreeSet;
 
 use super::At;
-use crate::experiment::schema::{Bands, ExplicitBand};
+use crate::experiment::schema::{BandsEntry, ExplicitBand};
 
 /// Bins are named by their limits to thousandths of a nm.
 const NARROWEST_NM: f64 = 0.01;
 
 /// Ranges run upwards, names are unique.
-pub fn bands(at: At, bands: &Bands) {
+pub fn bands(at: At, bands: &BandsEntry) {
     match bands {
-        Bands::Rgb {} => {}
-        Bands::Spectral { from_nm, to_nm, count } => {
+        BandsEntry::Rgb {} => {}
+        BandsEntry::Spectral { from_nm, to_nm, count } => {
             let at = at.to("spectral");
             upwards(at.to("from_nm"), *from_nm, *to_nm);
             if (0.0..NARROWEST_NM * *count as f64).contains(&(to_nm - from_nm)) && from_nm != to_nm {
                 at.to("count").report(format!("bins must be at least {NARROWEST_NM} nm wide"));
             }
         }
-        Bands::Explicit(list) => {
+        BandsEntry::Explicit(list) => {
             let mut names = BTreeSet::new();
             for (i, band) in list.iter().enumerate() {
                 let at = at.to("explicit").item(i);

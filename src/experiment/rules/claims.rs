@@ -2,15 +2,21 @@
 
 use std::collections::BTreeMap;
 
-use super::At;
-use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure, Duel, Equals, Expect};
+use super::{At, ExperimentParts};
+use crate::experiment::schema::{
+    Budget, CONTROL, ClaimEntry, CostMeasure, Duel, Equals, Expect, SamplerClaim,
+};
 use crate::experiment::suggest;
 use crate::experiment::sweep::SweepAxis;
 
 /// The names that claims may use.
 pub struct Known<'a> {
+    /// What the experiment is made of.
+    pub parts: ExperimentParts,
     /// Names of estimators.
     pub estimators: Vec<&'a str>,
+    /// Names of samplers.
+    pub samplers: Vec<&'a str>,
     /// Names of bands; none where they could not be read.
     pub bands: Option<Vec<String>>,
     /// The sweep; none where it could not be read.
@@ -21,6 +27,15 @@ pub struct Known<'a> {
 
 /// The rules of one claim.
 pub fn claim(at: At, claim: &ClaimEntry, known: &Known) {
+    if let Some(words) = &claim.sampler {
+        return samplers(at.to("sampler"), words, known);
+    }
+    if !known.parts.scene {
+        return at.report_help(
+            "the claim is about estimators, and there are none",
+            "with samplers alone a claim is `sampler = {}`",
+        );
+    }
     let equals = claim.equals.as_ref().and_then(|words| Some(("equals", words.band.as_ref()?)));
     let agree = claim.agree.as_ref().and_then(|words| Some(("agree", words.band.as_ref()?)));
     let differs = claim.differs.as_ref().and_then(|words| Some(("differs", words.band.as_ref()?)));
@@ -55,7 +70,27 @@ pub fn claim(at: At, claim: &ClaimEntry, known: &Known) {
     }
 }
 
-/// A candidate and a baseline; what is compared by CPU time is played side by side, pass for pass.
+/// The samplers are there, each named once.
+fn samplers(at: At, claim: &SamplerClaim, known: &Known) {
+    if !known.parts.samplers {
+        return at.report_help(
+            "the claim is about samplers, and there are none",
+            "give `samples` and `[[sampler]]`",
+        );
+    }
+    let names = claim.samplers.as_deref().unwrap_or_default();
+    let at = at.to("samplers");
+    for (i, name) in names.iter().enumerate() {
+        if !known.samplers.contains(&name.as_str()) {
+            let help = suggest::help(name, &known.samplers, "samplers");
+            at.item(i).report_help(format!("unknown sampler `{name}`"), help);
+        } else if names[..i].contains(name) {
+            at.item(i).report(format!("`{name}` stands twice"));
+        }
+    }
+}
+
+/// A candidate and a baseline; what is compared by CPU time runs side by side, pass for pass.
 fn duel(at: At, duel: &Duel, known: &Known) {
     estimator(at.to("candidate"), duel.candidate, known);
     estimator(at.to("baseline"), duel.baseline, known);

@@ -5,16 +5,82 @@ use crate::experiment::document::Node;
 use crate::experiment::suggest;
 use crate::experiment::validate::grammar::Grammar;
 
-/// The `name`s of a list's entries are unique; `what` they are, in words: `estimators`.
-pub fn unique_names(at: At, entries: &Node, what: &str) {
+/// The name of an experiment is that of its folder.
+pub fn experiment_name(at: At, name: &str) {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+    let begins_well = name.starts_with(|c: char| c.is_ascii_alphanumeric());
+    if !name.is_empty() && !(begins_well && name.chars().all(is_plain)) {
+        at.report_help(
+            format!("`{name}` cannot name a folder"),
+            "take letters, digits, `-` and `_` only, the first of them a letter or a digit",
+        );
+    }
+}
+
+/// The names of a list's entries are unique and of printable signs; `what` they are, in words:
+/// `estimators`.
+pub fn names(at: At, entries: &Node, what: &str) {
     let mut seen = Vec::new();
     for (i, entry) in entries.items().iter().enumerate() {
         let Some(name) = entry.get("name").and_then(Node::as_str) else { continue };
         if seen.contains(&name) {
             at.item(i).to("name").report(format!("two {what} are named `{name}`"));
         }
+        if let Some(sign) = name.chars().find(|c| "/\\".contains(*c) || c.is_control()) {
+            at.item(i).to("name").report_help(
+                format!("the name {name:?} contains {sign:?}"),
+                "pictures and tables carry the name: leave out `/`, `\\` and control characters",
+            );
+        }
         seen.push(name);
     }
+}
+
+/// Keys of a scene with estimators, which are all needed where one of them is there.
+pub const SCENE_KEYS: [&str; 6] = ["bands", "object", "sensor", "light", "estimator", "budget"];
+
+/// Keys of samplers, likewise.
+pub const SAMPLER_KEYS: [&str; 2] = ["samples", "sampler"];
+
+/// Keys that say more of a scene.
+const MORE_OF_SCENES: [&str; 3] = ["sweep", "pair", "picture"];
+
+/// What an experiment is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct ExperimentParts {
+    /// A scene with estimators.
+    pub scene: bool,
+    /// Samplers.
+    pub samplers: bool,
+}
+
+impl ExperimentParts {
+    /// The keys that must be there, except those that a sweep may supply.
+    pub fn required(self) -> Vec<&'static str> {
+        let of_scene = SCENE_KEYS.into_iter().filter(|key| self.scene && !CELL_KEYS.contains(key));
+        of_scene.chain(SAMPLER_KEYS.into_iter().filter(|_| self.samplers)).collect()
+    }
+}
+
+/// What the experiment `root` is made of: of something, and what says more of a scene needs one.
+pub fn parts(at: At, root: &Node) -> ExperimentParts {
+    let has = |keys: &[&str]| keys.iter().any(|key| root.get(key).is_some());
+    let parts = ExperimentParts { scene: has(&SCENE_KEYS), samplers: has(&SAMPLER_KEYS) };
+    let quoted = [suggest::quoted(&SCENE_KEYS), suggest::quoted(&SAMPLER_KEYS)];
+    if !parts.scene && !parts.samplers {
+        at.report_help(
+            "nothing is measured: there is neither a scene with estimators nor are there samplers",
+            format!("a scene takes {}; samplers take {}", quoted[0], quoted[1]),
+        );
+    } else if !parts.scene {
+        for key in MORE_OF_SCENES.iter().filter(|key| root.get(key).is_some()) {
+            at.to(key).key().report_help(
+                format!("`{key}` says more of a scene, and there is none"),
+                format!("leave it out, or give the scene: {}", quoted[0]),
+            );
+        }
+    }
+    parts
 }
 
 /// The first words of keys that cells may differ in.

@@ -18,7 +18,9 @@ mod sensor;
 
 pub use bands::bands;
 pub use claims::{Known, claim};
-pub use entries::{CELL_KEYS, pair, unique_names};
+pub use entries::{
+    CELL_KEYS, ExperimentParts, SAMPLER_KEYS, SCENE_KEYS, experiment_name, names, pair, parts,
+};
 pub use lights::lights;
 pub use object::object;
 pub use pictures::{has_pixels, picture};

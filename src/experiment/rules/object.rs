@@ -1,16 +1,16 @@
 //! Rules of the body: shape, boundary, medium.
 
 use super::{At, one_per_band, spectrum, value_rule};
-use crate::experiment::resolve::{Band, BandMedium, eta_materials};
+use crate::experiment::resolve::{BandInterval, BandMedium, eta_materials};
 use crate::experiment::schema::{
-    Bands, BoundaryEntry, Coefficients, Eta, EtaFormula, MediumEntry, ShapeEntry, SkinFractions,
+    BandsEntry, BoundaryEntry, Coefficients, Eta, EtaFormula, MediumEntry, ShapeEntry, SkinFractions,
     Spectrum,
 };
 use crate::experiment::suggest;
 use crate::optics::materials;
 
 /// The rules of the body in the bands.
-pub fn object(at: At, bands: &Bands) {
+pub fn object(at: At, bands: &BandsEntry) {
     let list = bands.list();
     let body: Option<ShapeEntry> = at.typed("shape");
     if let Some(body) = &body {
@@ -55,7 +55,7 @@ fn positive(at: At, values: &[f64]) {
     }
 }
 
-fn boundary(at: At, boundary: &BoundaryEntry, bands: &[Band]) {
+fn boundary(at: At, boundary: &BoundaryEntry, bands: &[BandInterval]) {
     match boundary {
         BoundaryEntry::Smooth { eta: index } => eta(at.to("smooth").to("eta"), index, bands),
         BoundaryEntry::Rough { eta: index, .. } => {
@@ -71,7 +71,7 @@ fn boundary(at: At, boundary: &BoundaryEntry, bands: &[Band]) {
     }
 }
 
-fn eta(at: At, index: &Eta, bands: &[Band]) {
+fn eta(at: At, index: &Eta, bands: &[BandInterval]) {
     match index {
         Eta::Grey(value) => value_rule(at, *value, "greater than 0", |x| x > 0.0),
         Eta::PerBand(values) => {
@@ -94,7 +94,7 @@ fn eta(at: At, index: &Eta, bands: &[Band]) {
     }
 }
 
-fn medium(at: At, medium: &MediumEntry, bands: &Bands) {
+fn medium(at: At, medium: &MediumEntry, bands: &BandsEntry) {
     match medium {
         MediumEntry::Coefficients(given) => {
             coefficients(at.to("coefficients"), given, bands.list().len())
@@ -106,7 +106,7 @@ fn medium(at: At, medium: &MediumEntry, bands: &Bands) {
                 let help = suggest::help(name, &materials::names(), "materials");
                 at.to("name").report_help(format!("unknown material `{name}`"), help);
             }
-            if !matches!(bands, Bands::Rgb {}) {
+            if !matches!(bands, BandsEntry::Rgb {}) {
                 let help = "use `bands = { rgb = {} }`, or `medium.coefficients` with numbers per band";
                 at.report_help("built-in materials are measured in rgb bands only", help);
             }
@@ -114,12 +114,12 @@ fn medium(at: At, medium: &MediumEntry, bands: &Bands) {
     }
 }
 
-fn skin(at: At, words: &SkinFractions, bands: &[Band]) {
+fn skin(at: At, words: &SkinFractions, bands: &[BandInterval]) {
     if words.melanin + words.blood > 1.0 {
         at.to("blood").report("`melanin` and `blood` are volume fractions: their sum is at most 1");
     }
     let [from, to] = crate::optics::skin::RANGE_NM;
-    let is_known = |band: &Band| band.range_nm.is_some_and(|[a, b]| a >= from && b <= to);
+    let is_known = |band: &BandInterval| band.range_nm.is_some_and(|[a, b]| a >= from && b <= to);
     if let Some(band) = bands.iter().find(|band| !is_known(band)) {
         at.key().report_help(
             format!("skin is known from {from} to {to} nm, and band `{}` is not within", band.name),
@@ -162,13 +162,13 @@ fn coefficients(at: At, given: &Coefficients, bands: usize) {
 }
 
 /// Without absorption a walk in a half-space returns surely, but after infinitely many steps on average.
-fn conservative(at: At, medium: &MediumEntry, bands: &[Band]) {
+fn conservative(at: At, medium: &MediumEntry, bands: &[BandInterval]) {
     let key = match medium {
         MediumEntry::Coefficients(given) if given.albedo.is_some() => "albedo",
         _ => "sigma_a_per_mm",
     };
     let Some(coefficients) = medium.per_band(bands) else { return };
-    let lossless = |(c, _): &(&BandMedium, &Band)| c.sigma_a == 0.0 && c.sigma_s > 0.0;
+    let lossless = |(c, _): &(&BandMedium, &BandInterval)| c.sigma_a == 0.0 && c.sigma_s > 0.0;
     if let Some((_, band)) = coefficients.iter().zip(bands).find(lossless) {
         at.to("coefficients").to(key).report_help(
             "a conservative half-space has walks of infinite mean length",

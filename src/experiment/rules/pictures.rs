@@ -2,7 +2,7 @@
 
 use super::At;
 use super::claims::{Known, axis, band, estimator};
-use crate::experiment::picture::{PictureEntry, Split};
+use crate::experiment::picture::{PictureEntry, SplitEntry};
 use crate::experiment::schema::SensorEntry;
 
 /// The rules of one picture.
@@ -19,7 +19,7 @@ pub fn picture(at: At, picture: &PictureEntry, known: &Known) {
     }
 }
 
-fn split(at: At, words: &Split, known: &Known) {
+fn split(at: At, words: &SplitEntry, known: &Known) {
     estimator(at.to("left"), &words.left, known);
     estimator(at.to("right"), &words.right, known);
     if words.left == words.right {

@@ -9,7 +9,8 @@ key = "object.medium.coefficients.g"
 values = [0.0, 0.8]
 "#;
 
-/// The good experiment with pixels, two estimators, a sweep over `g` and one picture, which begins at line 20.
+/// The good experiment with pixels, two estimators, a sweep over `g` and one picture, which begins at
+/// line 20.
 fn text(picture: &str) -> String {
     let pixels = "sensor.orthographic = { resolution = [8, 8], center_mm = [0, 0, 0], toward = [0, 0, -1], \
                   up = [0, 1, 0], width_mm = 2 }";

@@ -3,7 +3,7 @@
 use super::*;
 use crate::experiment::schema_json::json_schema;
 use crate::experiment::validate::grammar::Grammar;
-use crate::experiment::validate::{Walk, unsupported_keywords};
+use crate::experiment::validate::{SchemaWalk, unsupported_keywords};
 
 #[test]
 fn unknown_keys_are_named_with_what_was_meant() {
@@ -89,7 +89,7 @@ fn arrays_and_texts_have_their_form() {
     let none = GOOD.replace("[[light]]\ndirectional = { toward = [1, 1, 1], irradiance = 1.0 }\n", "");
     let message = errors(&none.replace("seed = 1", "seed = 1\nlight = []"));
     holds(&message, "`light` is empty, it must have at least 1 entry", "3:9", "");
-    holds(&refused("\"good\"", "\"a b\""), "`a b` has a wrong form", "1:8", "letters, digits");
+    holds(&refused("\"good\"", "\"a b\""), "`a b` cannot name a folder", "1:8", "letters, digits");
     holds(&refused("\"mis\"", "\"\""), "must not be empty", "12:8", "");
 }
 
@@ -176,8 +176,8 @@ fn the_schema_holds_the_registered_kinds() {
     let grammar = Grammar::new(schema);
     let findings = |text: &str| {
         let root = crate::experiment::document::parse("x.toml", text).expect("it is TOML");
-        let mut walk = Walk::new(&grammar, false);
-        walk.root(&root, &[]);
+        let mut walk = SchemaWalk::new(&grammar, false);
+        walk.root(&root, &[], &[]);
         walk.into_findings()
     };
     assert_eq!(findings(GOOD), []);

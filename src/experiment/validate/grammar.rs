@@ -8,7 +8,7 @@ pub struct Grammar {
 }
 
 /// What a schema asks for.
-pub enum Form<'a> {
+pub enum SchemaForm<'a> {
     /// Any value at all.
     Anything,
     /// One of several alternatives of different types.
@@ -41,22 +41,22 @@ impl Grammar {
     }
 
     /// What `schema` asks for, references followed.
-    pub fn form<'a>(&'a self, schema: &'a Json) -> Form<'a> {
+    pub fn form<'a>(&'a self, schema: &'a Json) -> SchemaForm<'a> {
         let schema = self.resolve(schema);
         if let Some(alternatives) = schema.get("anyOf").and_then(Json::as_array) {
             let alternatives: Vec<&Json> = alternatives.iter().filter(|a| !is_null(a)).collect();
             return match alternatives[..] {
                 [only] => self.form(only),
-                _ => Form::Choice(alternatives),
+                _ => SchemaForm::Choice(alternatives),
             };
         }
         if schema.get("properties").is_none() && schema.get("oneOf").is_some() {
-            return Form::Variants(variants(schema));
+            return SchemaForm::Variants(variants(schema));
         }
         if schema.get("enum").is_some() || schema.get("const").is_some() {
-            return Form::Variants(bare_variants(schema));
+            return SchemaForm::Variants(bare_variants(schema));
         }
-        if schema.get("type").is_none() { Form::Anything } else { Form::Plain(schema) }
+        if schema.get("type").is_none() { SchemaForm::Anything } else { SchemaForm::Plain(schema) }
     }
 
     /// The schema at a path of keys and indices, if the grammar knows it.
@@ -69,7 +69,7 @@ impl Grammar {
     pub fn is_variant(&self, path: &[&str]) -> bool {
         let Some((last, parents)) = path.split_last() else { return false };
         match self.at(parents).map(|parent| self.form(parent)) {
-            Some(Form::Variants(variants)) => variants.iter().any(|v| v.name == *last),
+            Some(SchemaForm::Variants(variants)) => variants.iter().any(|v| v.name == *last),
             _ => false,
         }
     }
@@ -81,19 +81,21 @@ impl Grammar {
 
     fn names<'a>(&'a self, schema: &'a Json) -> Vec<&'a str> {
         match self.form(schema) {
-            Form::Anything => Vec::new(),
-            Form::Choice(alternatives) => alternatives.iter().flat_map(|a| self.names(a)).collect(),
-            Form::Variants(variants) => variants.iter().map(|v| v.name).collect(),
-            Form::Plain(plain) => keys(plain),
+            SchemaForm::Anything => Vec::new(),
+            SchemaForm::Choice(alternatives) => {
+                alternatives.iter().flat_map(|a| self.names(a)).collect()
+            }
+            SchemaForm::Variants(variants) => variants.iter().map(|v| v.name).collect(),
+            SchemaForm::Plain(plain) => keys(plain),
         }
     }
 
     fn step<'a>(&'a self, schema: &'a Json, word: &str) -> Option<&'a Json> {
         match self.form(schema) {
-            Form::Anything => None,
-            Form::Choice(alternatives) => alternatives.iter().find_map(|a| self.step(a, word)),
-            Form::Variants(variants) => variants.iter().find(|v| v.name == word)?.content,
-            Form::Plain(plain) => match plain.get("properties").and_then(|p| p.get(word)) {
+            SchemaForm::Anything => None,
+            SchemaForm::Choice(alternatives) => alternatives.iter().find_map(|a| self.step(a, word)),
+            SchemaForm::Variants(variants) => variants.iter().find(|v| v.name == word)?.content,
+            SchemaForm::Plain(plain) => match plain.get("properties").and_then(|p| p.get(word)) {
                 Some(property) => Some(property),
                 None if word.parse::<usize>().is_ok() => plain.get("items"),
                 None => plain.get("additionalProperties").filter(|rest| rest.is_object()),

@@ -12,12 +12,10 @@ use crate::error::{Diagnostic, Place};
 /// A JSON Schema as the grammar of a file.
 pub mod grammar;
 
-/// The regular expressions that schemas use.
-mod pattern;
+use grammar::{Grammar, SchemaForm, Variant};
 
-use grammar::{Form, Grammar, Variant};
-
-/// The keywords of JSON Schema that the walk understands, and those that carry no rule.
+/// The keywords of JSON Schema that the walk understands, and those that carry no rule for it: `pattern`
+/// is of names, of which the rules say more than a pattern can.
 const KEYWORDS: [&str; 24] = [
     "$defs",
     "$ref",
@@ -46,17 +44,17 @@ const KEYWORDS: [&str; 24] = [
 ];
 
 /// The findings of a walk.
-pub struct Walk<'a> {
+pub struct SchemaWalk<'a> {
     grammar: &'a Grammar,
     findings: Vec<Diagnostic>,
     /// Whether keys may be missing (where a sweep that is itself at fault might supply them).
     lenient: bool,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> SchemaWalk<'a> {
     /// A walk along `grammar`; `lenient` walks let required keys be missing.
-    pub fn new(grammar: &'a Grammar, lenient: bool) -> Walk<'a> {
-        Walk { grammar, findings: Vec::new(), lenient }
+    pub fn new(grammar: &'a Grammar, lenient: bool) -> SchemaWalk<'a> {
+        SchemaWalk { grammar, findings: Vec::new(), lenient }
     }
 
     /// Everything found so far.
@@ -64,14 +62,14 @@ impl<'a> Walk<'a> {
         self.findings
     }
 
-    /// Checks the whole document but its entries `except`.
-    pub fn root(&mut self, node: &Node, except: &[&str]) {
+    /// Checks the whole document except its entries `except`; the keys `required` must be there.
+    pub fn root(&mut self, node: &Node, except: &[&str], required: &[&str]) {
         let mut schema = self.grammar.root().clone();
         if let Some(properties) = schema["properties"].as_object_mut() {
             except.iter().for_each(|key| properties[*key] = Json::Bool(true));
         }
-        if let Some(required) = schema["required"].as_array_mut() {
-            required.retain(|key| !except.iter().any(|e| key == e));
+        if let Some(keys) = schema["required"].as_array_mut() {
+            keys.extend(required.iter().map(|key| Json::from(*key)));
         }
         if let Value::Table(entries) = &node.value {
             self.table(node, entries, &schema, "");
@@ -90,16 +88,18 @@ impl<'a> Walk<'a> {
     /// Checks `node`, which stands at the dotted `path`, along `schema`.
     pub fn node(&mut self, node: &Node, schema: &Json, path: &str) {
         match self.grammar.form(schema) {
-            Form::Anything => self.finite(node),
-            Form::Choice(alternatives) => {
+            SchemaForm::Anything => self.finite(node),
+            SchemaForm::Choice(alternatives) => {
                 match alternatives.iter().find(|a| self.accepts(a, &node.value)) {
                     Some(alternative) => self.node(node, alternative, path),
                     None => self.wrong_type(node, schema),
                 }
             }
-            Form::Variants(variants) => self.variants(node, schema, &variants, path),
-            Form::Plain(plain) if !self.accepts(plain, &node.value) => self.wrong_type(node, plain),
-            Form::Plain(plain) => match &node.value {
+            SchemaForm::Variants(variants) => self.variants(node, schema, &variants, path),
+            SchemaForm::Plain(plain) if !self.accepts(plain, &node.value) => {
+                self.wrong_type(node, plain)
+            }
+            SchemaForm::Plain(plain) => match &node.value {
                 Value::Table(entries) => self.table(node, entries, plain, path),
                 Value::Array(items) => self.array(node, items, plain, path),
                 Value::String(text) => self.string(node, text, plain),
@@ -129,9 +129,11 @@ impl<'a> Walk<'a> {
     /// The JSON types that a schema accepts.
     fn types<'b>(&'b self, schema: &'b Json) -> Vec<&'b str> {
         match self.grammar.form(schema) {
-            Form::Anything => vec!["boolean", "integer", "number", "string", "array", "object"],
-            Form::Choice(alternatives) => alternatives.iter().flat_map(|a| self.types(a)).collect(),
-            Form::Variants(variants) => {
+            SchemaForm::Anything => vec!["boolean", "integer", "number", "string", "array", "object"],
+            SchemaForm::Choice(alternatives) => {
+                alternatives.iter().flat_map(|a| self.types(a)).collect()
+            }
+            SchemaForm::Variants(variants) => {
                 let mut types = Vec::new();
                 if variants.iter().any(|v| v.content.is_none()) {
                     types.push("string");
@@ -141,7 +143,7 @@ impl<'a> Walk<'a> {
                 }
                 types
             }
-            Form::Plain(plain) => match &plain["type"] {
+            SchemaForm::Plain(plain) => match &plain["type"] {
                 Json::String(name) => vec![name],
                 list => grammar::strings(Some(list)),
             },
@@ -237,12 +239,7 @@ impl<'a> Walk<'a> {
     fn string(&mut self, node: &Node, text: &str, schema: &Json) {
         let doc = Some(grammar::doc(schema)).filter(|doc| !doc.is_empty()).map(String::from);
         if text.is_empty() && schema["minLength"].as_u64().is_some_and(|least| least > 0) {
-            self.report(node.place(), "must not be empty".into(), doc.clone());
-        }
-        if let Some(pattern) = schema["pattern"].as_str()
-            && !pattern::matches(pattern, text)
-        {
-            self.report(node.place(), format!("`{text}` has a wrong form"), doc);
+            self.report(node.place(), "must not be empty".into(), doc);
         }
     }
 
@@ -250,8 +247,8 @@ impl<'a> Walk<'a> {
         if !number.is_finite() {
             return self.finite(node);
         }
-        type Rule = (&'static str, &'static str, fn(f64, f64) -> bool);
-        let rules: [Rule; 4] = [
+        type Bound = (&'static str, &'static str, fn(f64, f64) -> bool);
+        let rules: [Bound; 4] = [
             ("minimum", "at least", |x, bound| x >= bound),
             ("maximum", "at most", |x, bound| x <= bound),
             ("exclusiveMinimum", "greater than", |x, bound| x > bound),

@@ -10,7 +10,7 @@ use super::number::significant;
 use super::pictures::{RunPicture, few_bands};
 use crate::error::Result;
 use crate::results::image::{Picture, to_byte_png, to_linear_png};
-use crate::results::record::{Bias, Cell, EstimatorRun};
+use crate::results::record::{Cell, EstimatorRun, StatedBias};
 use crate::results::store::Stored;
 use crate::stats::tails::student_two_sided;
 
@@ -311,7 +311,7 @@ fn beyond(z: &[f64], passes: u64) -> String {
 fn caution(runs: &[&EstimatorRun], band: usize) -> String {
     let mut text = String::new();
     for run in runs {
-        if let Bias::Biased(why) = &run.bias {
+        if let StatedBias::Biased(why) = &run.bias {
             text += &format!(" {} is biased: {why}.", run.estimator);
         }
         let tails = run.heavy_tails.iter().filter(|tail| tail.band == band);

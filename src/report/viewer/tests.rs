@@ -113,7 +113,7 @@ fn models_are_not_compared_by_z() {
 #[test]
 fn what_stands_against_a_score_is_said() {
     let mut stored = sample::stored(0.5);
-    stored.record.cells[0].runs[1].bias = Bias::Biased("a cut".into());
+    stored.record.cells[0].runs[1].bias = StatedBias::Biased("a cut".into());
     let note = data(&stored).1["pictures"][1]["z"]["notes"][1].to_string();
     assert!(note.contains("snee is biased: a cut."), "{note}");
 }

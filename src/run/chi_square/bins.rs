@@ -1,11 +1,11 @@
 //! Bins in which a sampler's draws are counted, chosen by the density alone and never by the draws.
 //!
 //! A piece of two dimensions starts as a grid whose resolution follows the piece's mass; boxes that hold
-//! more than four times their share are quartered, again and again; those that would expect fewer than 25
-//! draws are joined with neighbours. Periodic axes begin at an irrational offset, so that symmetry planes
-//! are no edges. A piece of one dimension has bins of equal mass, and in its upper tail at 1 - 2^-k, and
-//! at both ends of 1e-4. Coarse bins are unions of fine ones; both are unions of leaves, whose masses are
-//! integrated.
+//! more than four times their share are quartered, again and again; those that would expect fewer than
+//! 25 draws are joined with neighbours. Periodic axes begin at an irrational offset, so that symmetry
+//! planes are no edges. A piece of one dimension has bins of equal mass, and in its upper tail at 1 -
+//! 2^-k, and at both ends of 1e-4. Coarse bins are unions of fine ones; both are unions of leaves, whose
+//! masses are integrated.
 
 use super::quadrature::{Area, Mass, Quadrature, wrap};
 use crate::samplers::Coordinate;
@@ -33,7 +33,7 @@ pub enum Extra {
 /// Leaves, and the bins that they are joined to.
 #[derive(Clone, Debug)]
 pub struct Partition {
-    maps: Vec<Map>,
+    maps: Vec<LeafMap>,
     /// Areas of the leaves.
     pub leaves: Vec<Area>,
     /// Coarse bin of each leaf, then of each extra.
@@ -48,7 +48,7 @@ pub struct Partition {
 
 /// From points of a piece to leaves.
 #[derive(Clone, Debug)]
-enum Map {
+enum LeafMap {
     Line { range: [f64; 2], edges: Vec<f64>, first: usize },
     Plane(Plane),
 }
@@ -71,7 +71,7 @@ enum Node {
 
 /// A square block of a plane's grid, or a box within one of its boxes.
 #[derive(Clone, Copy)]
-enum Block {
+enum Patch {
     Grid { at: [usize; 2], size: [usize; 2] },
     Node(usize),
 }
@@ -81,7 +81,7 @@ impl Partition {
     pub fn new(quadrature: &mut Quadrature, samples: u64, extras: &[(Extra, f64)]) -> Partition {
         let n = samples as f64;
         let shares = shares(quadrature);
-        let mut builder = Builder { n, quadrature, leaves: Vec::new(), masses: Vec::new() };
+        let mut builder = PartitionBuilder { n, quadrature, leaves: Vec::new(), masses: Vec::new() };
         let mut maps = Vec::new();
         let (mut coarse, mut thin): (Vec<Vec<usize>>, Vec<usize>) = (Vec::new(), Vec::new());
         for (piece, share) in shares.into_iter().enumerate() {
@@ -93,7 +93,7 @@ impl Partition {
             coarse.extend(bins);
             thin.extend(rest);
         }
-        let Builder { leaves, mut masses, .. } = builder;
+        let PartitionBuilder { leaves, mut masses, .. } = builder;
         let count = leaves.len();
         // Within a coarse bin: the leaves one by one, thin ones joined.
         let mass = |bin: &[usize], masses: &[f64]| bin.iter().map(|&i| masses[i]).sum::<f64>();
@@ -136,12 +136,12 @@ impl Partition {
     #[inline]
     pub fn leaf(&self, piece: usize, at: [f64; 2]) -> Option<usize> {
         match self.maps.get(piece)? {
-            Map::Line { range, edges, first } => {
+            LeafMap::Line { range, edges, first } => {
                 let inside = at[0] >= range[0] && at[0] <= range[1];
                 let inner = &edges[1..edges.len() - 1];
                 inside.then(|| first + inner.partition_point(|edge| *edge <= at[0]))
             }
-            Map::Plane(plane) => plane.leaf(at),
+            LeafMap::Plane(plane) => plane.leaf(at),
         }
     }
 }
@@ -172,14 +172,14 @@ pub fn shares(quadrature: &mut Quadrature) -> Vec<f64> {
     sums
 }
 
-struct Builder<'q, 's> {
+struct PartitionBuilder<'q, 's> {
     n: f64,
     quadrature: &'q mut Quadrature<'s>,
     leaves: Vec<Area>,
     masses: Vec<f64>,
 }
 
-impl Builder<'_, '_> {
+impl PartitionBuilder<'_, '_> {
     /// How many times finer the fine bins are than `coarse` bins, along a coordinate of two: 4, 2 or 1.
     fn finer(&self, coarse: f64) -> usize {
         let fits = |f: &usize| self.n >= 2.0 * LEAST * coarse * (f * f) as f64;
@@ -195,7 +195,7 @@ impl Builder<'_, '_> {
     }
 
     /// Stretches of a line, and the blocks of them that are coarse bins.
-    fn line(&mut self, piece: usize, share: f64) -> (Map, Vec<Vec<usize>>) {
+    fn line(&mut self, piece: usize, share: f64) -> (LeafMap, Vec<Vec<usize>>) {
         let range = self.quadrature.pieces()[piece].axes[0].range;
         let bins = (COARSE_LINE * share).min(self.n * share / (2.0 * LEAST)).round().max(1.0);
         let finer = self.finer(bins / share.max(1e-300));
@@ -233,10 +233,11 @@ impl Builder<'_, '_> {
                 _ => blocks.push(vec![leaf]),
             }
         }
-        (Map::Line { range, edges, first }, blocks)
+        (LeafMap::Line { range, edges, first }, blocks)
     }
 
-    /// Points below which the piece has these parts of its mass, each to within a part in 1e9 of the range.
+    /// Points below which the piece has these parts of its mass, each to within a part in 1e9 of the
+    /// range.
     fn quantiles(&mut self, piece: usize, range: [f64; 2], marks: &[(f64, bool)]) -> Vec<f64> {
         let steps = 1024;
         let edge = |i: usize| range[0] + (range[1] - range[0]) * i as f64 / steps as f64;
@@ -266,7 +267,7 @@ impl Builder<'_, '_> {
     }
 
     /// Boxes of a plane, and the blocks of them that are coarse bins, in serpentines.
-    fn plane(&mut self, piece: usize, share: f64) -> (Map, Vec<Vec<usize>>) {
+    fn plane(&mut self, piece: usize, share: f64) -> (LeafMap, Vec<Vec<usize>>) {
         let axes = self.quadrature.pieces()[piece].axes.clone();
         let bins = COARSE.min(self.n / (2.0 * LEAST)) * share;
         let side = (bins.sqrt().round() as usize).max(1);
@@ -290,7 +291,7 @@ impl Builder<'_, '_> {
             self.quarter(&mut plane.nodes, node, most, DEPTH);
         }
         let blocks = self.blocks(&plane, side, finer, 4.0 / total);
-        (Map::Plane(plane), blocks)
+        (LeafMap::Plane(plane), blocks)
     }
 
     /// Quarters a leaf that holds more than `most`, and its quarters likewise.
@@ -332,14 +333,14 @@ impl Builder<'_, '_> {
         for i in 0..side {
             for j in 0..side {
                 let j = if i % 2 == 0 { j } else { side - 1 - j };
-                let block = Block::Grid { at: [i * finer, j * finer], size: [finer; 2] };
+                let block = Patch::Grid { at: [i * finer, j * finer], size: [finer; 2] };
                 self.split(plane, block, most, &mut blocks);
             }
         }
         blocks
     }
 
-    fn split(&self, plane: &Plane, block: Block, most: f64, blocks: &mut Vec<Vec<usize>>) {
+    fn split(&self, plane: &Plane, block: Patch, most: f64, blocks: &mut Vec<Vec<usize>>) {
         let leaves = plane.leaves_of(block);
         let mass: f64 = leaves.iter().map(|&leaf| self.masses[leaf]).sum();
         match plane.parts(block) {
@@ -355,8 +356,8 @@ impl Builder<'_, '_> {
     }
 }
 
-/// Joins blocks that expect too few draws with the next such ones in order, and the last of them with the
-/// one joined before, or with the block before. What is thin as a whole comes back as the rest.
+/// Joins blocks that expect too few draws with the next such ones in order, and the last of them with
+/// the one joined before, or with the block before. What is thin as a whole comes back as the rest.
 fn join(blocks: Vec<Vec<usize>>, n: f64, masses: &[f64]) -> (Vec<Vec<usize>>, Vec<usize>) {
     let expected = |block: &[usize]| n * block.iter().map(|&i| masses[i]).sum::<f64>();
     let mut bins: Vec<Vec<usize>> = Vec::new();
@@ -414,29 +415,29 @@ impl Plane {
     }
 
     /// The quarters of a block, where it has any.
-    fn parts(&self, block: Block) -> Option<Vec<Block>> {
+    fn parts(&self, block: Patch) -> Option<Vec<Patch>> {
         match block {
-            Block::Grid { at, size: [1, 1] } => self.parts(Block::Node(at[0] * self.grid[1] + at[1])),
-            Block::Grid { at, size } => {
+            Patch::Grid { at, size: [1, 1] } => self.parts(Patch::Node(at[0] * self.grid[1] + at[1])),
+            Patch::Grid { at, size } => {
                 let half = size.map(|s| s / 2);
-                let quarter = |q: usize| Block::Grid {
+                let quarter = |q: usize| Patch::Grid {
                     at: [at[0] + half[0] * (q / 2), at[1] + half[1] * (q % 2)],
                     size: half,
                 };
                 Some((0..4).map(quarter).collect())
             }
-            Block::Node(node) => match self.nodes[node] {
+            Patch::Node(node) => match self.nodes[node] {
                 Node::Leaf(_) => None,
-                Node::Quarters(first) => Some((first..first + 4).map(Block::Node).collect()),
+                Node::Quarters(first) => Some((first..first + 4).map(Patch::Node).collect()),
             },
         }
     }
 
-    fn leaves_of(&self, block: Block) -> Vec<usize> {
+    fn leaves_of(&self, block: Patch) -> Vec<usize> {
         match (block, self.parts(block)) {
             (_, Some(parts)) => parts.into_iter().flat_map(|part| self.leaves_of(part)).collect(),
-            (Block::Node(node), None) => self.leaf_at(node),
-            (Block::Grid { at, .. }, None) => self.leaf_at(at[0] * self.grid[1] + at[1]),
+            (Patch::Node(node), None) => self.leaf_at(node),
+            (Patch::Grid { at, .. }, None) => self.leaf_at(at[0] * self.grid[1] + at[1]),
         }
     }
 

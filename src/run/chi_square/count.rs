@@ -41,9 +41,9 @@ pub struct Counting<'a> {
     pub key: StreamKey,
 }
 
-/// Counts.
+/// What the draws counted.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Counts {
+pub struct DrawCounts {
     /// By leaf, then extra.
     pub leaves: Vec<u64>,
     /// By discrete outcome.
@@ -66,18 +66,18 @@ pub struct Counts {
     pub cpu_seconds: f64,
 }
 
-impl Counts {
-    fn new(counting: &Counting, deltas: usize) -> Counts {
-        Counts {
+impl DrawCounts {
+    fn new(counting: &Counting, deltas: usize) -> DrawCounts {
+        DrawCounts {
             leaves: vec![0; counting.partition.coarse.len()],
             deltas: vec![0; deltas],
             inexact: vec![0; deltas],
             pairs: vec![0; counting.group_count * counting.group_count],
-            ..Counts::default()
+            ..DrawCounts::default()
         }
     }
 
-    fn add(&mut self, other: &Counts) {
+    fn add(&mut self, other: &DrawCounts) {
         let sum = |a: &mut Vec<u64>, b: &Vec<u64>| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         sum(&mut self.leaves, &other.leaves);
         sum(&mut self.deltas, &other.deltas);
@@ -93,24 +93,24 @@ impl Counts {
 }
 
 impl Counting<'_> {
-    /// Counts `samples` draws on a number of threads; nothing where it was interrupted. Returns the counts
-    /// and the moments of each contrast.
+    /// Counts `samples` draws on a number of threads; nothing where it was interrupted. Returns the
+    /// counts and the moments of each contrast.
     pub fn count(
         &self,
         samples: u64,
         threads: usize,
         interrupt: &Interrupt,
-    ) -> Option<(Counts, Vec<Moments>)> {
+    ) -> Option<(DrawCounts, Vec<Moments>)> {
         debug_assert!(self.group_count <= MOST_GROUPS);
         let deltas = self.sampler.deltas().len();
         let chunks = samples.div_ceil(CHUNK);
-        let mut counts = Counts::new(self, deltas);
+        let mut counts = DrawCounts::new(self, deltas);
         let mut tree = Counter::new(0, Counter::<Vec<Moments>>::MERGE_ALL);
         for start in (0..chunks).step_by(ROUND as usize) {
             let end = chunks.min(start + ROUND);
             let next = AtomicU64::new(start);
             let worker = || {
-                let (mut own, mut moments) = (Counts::new(self, deltas), Vec::new());
+                let (mut own, mut moments) = (DrawCounts::new(self, deltas), Vec::new());
                 let before = thread_cpu_time();
                 loop {
                     let chunk = next.fetch_add(1, Ordering::Relaxed);
@@ -147,7 +147,7 @@ impl Counting<'_> {
         Some((counts, tree.finish().unwrap_or_default()))
     }
 
-    fn chunk(&self, chunk: u64, draws: u64, counts: &mut Counts) -> Vec<Moments> {
+    fn chunk(&self, chunk: u64, draws: u64, counts: &mut DrawCounts) -> Vec<Moments> {
         let mut stream = self.key.pass(chunk).stream(0, Purpose::Walk);
         let mut moments = vec![Moments::default(); self.contrasts.len()];
         let mut previous = None;
@@ -164,7 +164,12 @@ impl Counting<'_> {
 
     /// One draw; the group of its bin, where it is in one.
     #[inline]
-    fn draw(&self, stream: &mut Stream, counts: &mut Counts, moments: &mut [Moments]) -> Option<usize> {
+    fn draw(
+        &self,
+        stream: &mut Stream,
+        counts: &mut DrawCounts,
+        moments: &mut [Moments],
+    ) -> Option<usize> {
         let (bin, point) = match self.sampler.draw(stream) {
             Draw::Null => {
                 counts.nulls += 1;
@@ -200,7 +205,7 @@ impl Counting<'_> {
 
     /// The leaf of a point where the density is positive.
     #[inline]
-    fn point(&self, piece: usize, at: [f64; 2], own: f64, counts: &mut Counts) -> Option<usize> {
+    fn point(&self, piece: usize, at: [f64; 2], own: f64, counts: &mut DrawCounts) -> Option<usize> {
         let leaf = self.partition.leaf(piece, at)?;
         let density = self.sampler.density(piece, at);
         let difference = (own - density).abs();

@@ -1,10 +1,10 @@
 //! Integrals of a sampler's density over boxes of its charts, with bounds of their errors.
 //!
 //! Tensor products of the Gauss-Kronrod pair (7, 15). The bound of a box is what replacing the Kronrod
-//! rule by the Gauss rule along either coordinate changes, summed over both: it measures the error of the
-//! 7-point rule and so overstates that of the 15-point one. Boxes are cut at the stated kinks; then the
-//! box with the largest bound is halved, along the coordinate that contributes more, until all bounds
-//! together are small enough or the budget of evaluations is spent.
+//! rule by the Gauss rule along either coordinate changes, summed over both: it measures the error of
+//! the 7-point rule and so overstates that of the 15-point one. Boxes are cut at the stated kinks; then
+//! the box with the largest bound is halved, along the coordinate that contributes more, until all
+//! bounds together are small enough or the budget of evaluations is spent.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -38,7 +38,8 @@ impl Mass {
     }
 }
 
-/// A box in the chart of a piece. Along a periodic axis it may reach beyond the range: points are wrapped.
+/// A box in the chart of a piece. Along a periodic axis it may reach beyond the range: points are
+/// wrapped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
     /// The piece.
@@ -51,7 +52,7 @@ pub struct Area {
 
 /// Part of an area.
 #[derive(Clone, Copy, Debug)]
-struct Region {
+struct SubArea {
     owner: usize,
     area: Area,
     mass: Mass,
@@ -61,18 +62,18 @@ struct Region {
 
 /// The largest bound first; of equal ones the first region.
 #[derive(PartialEq)]
-struct Worst(f64, usize);
+struct LargestBound(f64, usize);
 
-impl Eq for Worst {}
+impl Eq for LargestBound {}
 
-impl PartialOrd for Worst {
-    fn partial_cmp(&self, other: &Worst) -> Option<Ordering> {
+impl PartialOrd for LargestBound {
+    fn partial_cmp(&self, other: &LargestBound) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Worst {
-    fn cmp(&self, other: &Worst) -> Ordering {
+impl Ord for LargestBound {
+    fn cmp(&self, other: &LargestBound) -> Ordering {
         self.0.total_cmp(&other.0).then(other.1.cmp(&self.1))
     }
 }
@@ -82,7 +83,7 @@ pub struct Quadrature<'a> {
     sampler: &'a dyn Sampler,
     pieces: Vec<Piece>,
     nodes: [(f64, f64, f64); 15],
-    regions: Vec<Region>,
+    regions: Vec<SubArea>,
     /// Evaluations so far.
     pub evaluations: u64,
     /// Evaluations that were negative or not finite; they count as 0.
@@ -138,15 +139,16 @@ impl<'a> Quadrature<'a> {
         self.regions.retain(|region| region.owner != owner);
     }
 
-    /// Halves the worst regions until the bounds sum to the target or the budget is spent; whether it was.
+    /// Halves the worst regions until the bounds sum to the target or the budget is spent; whether it
+    /// was.
     pub fn refine(&mut self) -> bool {
-        let worst = |(i, region): (usize, &Region)| Worst(region.mass.bound, i);
-        let mut heap: BinaryHeap<Worst> = self.regions.iter().enumerate().map(worst).collect();
+        let worst = |(i, region): (usize, &SubArea)| LargestBound(region.mass.bound, i);
+        let mut heap: BinaryHeap<LargestBound> = self.regions.iter().enumerate().map(worst).collect();
         let mut total: f64 = self.regions.iter().map(|region| region.mass.bound).sum();
         let end = self.evaluations + BUDGET;
         while total > TARGET && self.evaluations < end {
-            let Some(Worst(bound, i)) = heap.pop() else { break };
-            let Region { owner, area, axis, .. } = self.regions[i];
+            let Some(LargestBound(bound, i)) = heap.pop() else { break };
+            let SubArea { owner, area, axis, .. } = self.regions[i];
             let middle = 0.5 * (area.low[axis] + area.high[axis]);
             let (mut first, mut second) = (area, area);
             (first.high[axis], second.low[axis]) = (middle, middle);
@@ -154,7 +156,7 @@ impl<'a> Quadrature<'a> {
             for (slot, half) in [(i, first), (self.regions.len(), second)] {
                 let region = self.region(owner, half);
                 total += region.mass.bound;
-                heap.push(Worst(region.mass.bound, slot));
+                heap.push(LargestBound(region.mass.bound, slot));
                 if slot == i { self.regions[i] = region } else { self.regions.push(region) }
             }
         }
@@ -173,7 +175,7 @@ impl<'a> Quadrature<'a> {
     pub fn contrast(&mut self, contrast: &Contrast) -> Mass {
         let mut sum = Mass::default();
         for i in 0..self.regions.len() {
-            let Region { area, .. } = self.regions[i];
+            let SubArea { area, .. } = self.regions[i];
             let region = self.integrate(0, area, &|at| (contrast.of)(area.piece, at));
             sum.add(region.mass);
         }
@@ -182,12 +184,12 @@ impl<'a> Quadrature<'a> {
         sum
     }
 
-    fn region(&mut self, owner: usize, area: Area) -> Region {
+    fn region(&mut self, owner: usize, area: Area) -> SubArea {
         self.integrate(owner, area, &|_| 1.0)
     }
 
     /// The rule on one box, of the density times `factor`.
-    fn integrate(&mut self, owner: usize, area: Area, factor: &dyn Fn([f64; 2]) -> f64) -> Region {
+    fn integrate(&mut self, owner: usize, area: Area, factor: &dyn Fn([f64; 2]) -> f64) -> SubArea {
         let piece = &self.pieces[area.piece];
         let is_line = piece.dimensions == 1;
         let middle = |k: usize| 0.5 * (area.low[k] + area.high[k]);
@@ -219,7 +221,7 @@ impl<'a> Quadrature<'a> {
         let size = half(0) * half(1);
         let (along_x, along_y) = ((kk - gk).abs(), (kk - kg).abs());
         let mass = Mass { value: size * kk, bound: size * (along_x + along_y) };
-        Region { owner, area, mass, axis: usize::from(along_y > along_x) }
+        SubArea { owner, area, mass, axis: usize::from(along_y > along_x) }
     }
 }
 
@@ -229,7 +231,8 @@ pub fn wrap(axis: &Coordinate, x: f64) -> f64 {
     if !axis.periodic || (low..=high).contains(&x) { x } else { low + (x - low).rem_euclid(high - low) }
 }
 
-/// The ends of a stretch and the kinks within it; where it reaches beyond a periodic range, the seam is one.
+/// The ends of a stretch and the kinks within it; where it reaches beyond a periodic range, the seam is
+/// one.
 fn cuts(axis: &Coordinate, low: f64, high: f64) -> Vec<f64> {
     let [from, to] = axis.range;
     let mut cuts = vec![low, high];

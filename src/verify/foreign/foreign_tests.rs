@@ -6,7 +6,7 @@ use super::images::planes;
 use super::*;
 use crate::results::exr_file::ExrImage;
 use crate::results::npy::Array;
-use crate::results::record::{Bias, Image, Tile};
+use crate::results::record::{Image, StatedBias, Tile};
 use crate::results::sample;
 use crate::results::store::{Arrays, costs_path, observables_path, pixels_path, spread_path};
 use crate::stats::moments::{ImageMoments, Moments};
@@ -67,10 +67,10 @@ fn stored(seed: u64, noise: f64) -> Stored {
     let batches = moments.batches();
     let data = batches.iter().flatten().flat_map(Moments::to_array).collect();
     let mut arrays = Arrays::new();
-    arrays.insert(observables_path(0, "mis"), Array::new(vec![batches.len(), names.len(), 1, 5], data));
-    arrays.insert(pixels_path(0, "mis"), Array::new(vec![2, SIDE, SIDE, 1], both));
-    arrays.insert(spread_path(0, "mis"), Array::new(vec![0, 1, 5], vec![]));
-    arrays.insert(costs_path(0, "mis"), Array::new(vec![batches.len(), 0], vec![]));
+    arrays.insert(observables_path(0, 0), Array::new(vec![batches.len(), names.len(), 1, 5], data));
+    arrays.insert(pixels_path(0, 0), Array::new(vec![2, SIDE, SIDE, 1], both));
+    arrays.insert(spread_path(0, 0), Array::new(vec![0, 1, 5], vec![]));
+    arrays.insert(costs_path(0, 0), Array::new(vec![batches.len(), 0], vec![]));
     let mut stored = sample::stored(0.1);
     stored.record.bands.truncate(1);
     stored.record.cells[0].regions = observed;
@@ -78,19 +78,19 @@ fn stored(seed: u64, noise: f64) -> Stored {
         estimator: "mis".into(),
         control_of: None,
         kind: "path".into(),
-        bias: Bias::Unbiased,
+        bias: StatedBias::Unbiased,
         model: None,
         heavy_tails: vec![],
         notes: vec![],
         passes: PASSES,
         observables: names.into_iter().map(|name| Observable { name, class: "all".into() }).collect(),
-        moments: observables_path(0, "mis"),
-        costs: costs_path(0, "mis"),
+        moments: observables_path(0, 0),
+        costs: costs_path(0, 0),
         image: Some(Image {
             width: SIDE,
             height: SIDE,
-            pixels: pixels_path(0, "mis"),
-            spread: spread_path(0, "mis"),
+            pixels: pixels_path(0, 0),
+            spread: spread_path(0, 0),
         }),
         cost: BTreeMap::new(),
         anomalies: BTreeMap::new(),
@@ -255,7 +255,7 @@ fn what_cannot_be_judged() {
     lost.record.cells[0].runs[0].anomalies.insert("lost_ray".into(), 1);
     invalid(&lost, &clean, "lost_ray");
     let mut moved = good.clone();
-    let pixels = moved.arrays.get_mut(&pixels_path(0, "mis")).expect("pixels");
+    let pixels = moved.arrays.get_mut(&pixels_path(0, 0)).expect("pixels");
     pixels.data[3] += 1.0;
     invalid(&moved, &clean, "do not add up");
 }
