@@ -208,7 +208,7 @@ fn usage() {
     work.run("rum x.toml").complains("'run'");
     work.run("run x.toml --threads 0").exits(2).complains("--threads").complains("0 is not in 1..");
     work.run("--version").exits(0).says(concat!("scatterproof ", env!("CARGO_PKG_VERSION")));
-    work.run("--help").exits(0).says("Exit codes: 0 all well, 1 a claim failed").says("130 interrupted");
+    work.run("--help").exits(0).says("Exit codes: 0 success, 1 a claim failed").says("130 interrupted");
     let commands = ["run", "verify", "report", "plan", "check", "init", "list", "schema", "completions"];
     for command in commands {
         work.run("--help").says(&format!("\n  {command} "));
@@ -233,7 +233,8 @@ fn plan_check_list_schema_completions() {
     work.run("list estimators").exits(0).says("path").says("roulette");
     let ran = work.run("schema");
     let schema: serde_json::Value = serde_json::from_str(&ran.exits(0).stdout()).expect("JSON");
-    assert!(schema["else"]["properties"]["object"].is_object(), "{schema:#}");
+    assert!(schema["properties"]["object"].is_object(), "{schema:#}");
+    assert!(schema["properties"]["sampler"].is_object(), "{schema:#}");
     let ran = work.run("completions bash");
     std::fs::write(work.path("completions"), ran.exits(0).stdout()).expect("a file");
     work.shell("bash -n completions && source ./completions && complete -p scatterproof").exits(0);
@@ -287,7 +288,7 @@ fn reproduce_refuses_what_is_not_published() {
         .complains("`nothing` is not published")
         .complains("snee-matrix");
     work.shell(&format!("'{script}' --fast")).exits(2).complains("no option --fast");
-    work.shell(&format!("'{script}' --help")).exits(0).says("whether the record is byte-identical");
+    work.shell(&format!("'{script}' --help")).exits(0).says("every array is byte-identical");
 }
 
 /// A name is never a path: separators and control characters are refused, and a record's files are numbered.

@@ -513,7 +513,7 @@ fn files_are_held_to_their_schema() {
 #[test]
 fn every_command_knows_samplers() {
     let work = Work::with(FILE);
-    work.run("list samplers").exits(0).says("henyey_greenstein").says("g  Mean cosine.");
+    work.run("list samplers").exits(0).says("henyey_greenstein").says("g  Mean cosine");
     work.run("plan x.toml --dry --setting more").exits(0).says("1 sampler, 30000 draws each");
     work.run("run x.toml -q --set samples=25000").exits(0).says("25000").says("report: ");
     let ran = work.run("verify x.toml -q --setting more --verbose");

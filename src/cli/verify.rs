@@ -53,6 +53,9 @@ pub struct Args {
     /// Write the verdicts as a Markdown table.
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
+    /// Write no reports into the results folders; `scatterproof report DIR` makes one later.
+    #[arg(long)]
+    no_report: bool,
     /// Print every verdict; default: those that are not green and the summaries of tables.
     #[arg(long, short)]
     verbose: bool,
@@ -109,7 +112,7 @@ pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
     for (index, subject) in subjects.into_iter().enumerate() {
         let of = judgement.verdicts.iter().zip(&judgement.case_of);
         let own = of.filter(|(_, case)| **case == index).map(|(v, _)| v.clone()).collect();
-        if subject.experiment.is_some() {
+        if subject.experiment.is_some() && !args.no_report {
             report::write_judged(&subject.folder, subject.main, own)?;
         }
     }

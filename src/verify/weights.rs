@@ -143,7 +143,7 @@ fn least_squares(runs: &[TimedRun], free: &[usize]) -> Vec<f64> {
 /// for fewer runs than counters.
 pub fn drift(runs: &[TimedRun]) -> Option<f64> {
     let counted = (0..WEIGHTS.len()).filter(|&k| runs.iter().any(|run| run.counts[k] > 0.0)).count();
-    if runs.len() < counted {
+    if runs.is_empty() || runs.len() < counted {
         return None;
     }
     let fitted = fit(runs);

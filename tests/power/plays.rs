@@ -127,7 +127,7 @@ fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
     let mut command = Command::new(std::env::current_exe().expect("this program"));
     command.args(["defect", row.name]);
     if row.family != Family::Verifier {
-        command.args(["verify", "--quiet", "--threads", "1", "--out"]).arg(&out);
+        command.args(["verify", "--quiet", "--no-report", "--threads", "1", "--out"]).arg(&out);
         command.arg("--csv").arg(&verdicts).arg("--fresh-seed").arg(format!("{}/{number}", row.name));
         let mine = |family| row.family == Family::Sham || row.family == family;
         let files = EXPERIMENTS.iter().filter(|(family, ..)| mine(*family));

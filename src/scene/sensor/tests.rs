@@ -1,3 +1,5 @@
+//! Rays, regions and reception of every sensor.
+
 use std::f64::consts::PI;
 
 use super::*;
