@@ -104,7 +104,7 @@ fn row(name: &str, radius: f64, count: usize) {
 }
 
 impl Bench {
-    /// Nanoseconds a query.
+    /// Time of a query, ns.
     fn time(&mut self, by_tree: bool, evaluate: bool) -> (f64, ThinningWork) {
         let Bench { tree, rule, models, at, stream } = self;
         let mut work = ThinningWork::default();

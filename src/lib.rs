@@ -18,7 +18,7 @@
 //! stored moments and counts into verdicts, tables and plots, and knows no ray. Data flows one way:
 //! `experiments/x.toml` -> schema -> validated experiment -> scene + estimators -> blocks of passes
 //! -> moments -> `results/x/` -> `verify` and `report`, which read only `results/`.
-//! A module uses only what stands before it in this picture; `tests/layering.rs` reads the sources
+//! A module uses only what comes before it in this picture; `tests/layering.rs` reads the sources
 //! and fails on any other edge.
 //!
 //! # Words

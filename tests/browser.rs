@@ -187,7 +187,7 @@ fn expected(root: &Path) -> Value {
     json!({ "width": size.0, "height": size.1, "cells": cells, "limits": limits, "bands": names })
 }
 
-/// A pixel each of the split picture of two tiles of 12 x 12 pixels: they stand there as squares of 16 x 16, with a seam of
+/// A pixel each of the split picture of two tiles of 12 x 12 pixels: they are shown as squares of 16 x 16, with a seam of
 /// one pixel and a gap of six.
 fn grid(path: &Path) -> Vec<u8> {
     let (sheet, mut pixels) = (png(path), Vec::new());

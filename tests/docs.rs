@@ -46,7 +46,7 @@ fn text(path: &str) -> String {
 /// A fenced block of a page.
 #[derive(Debug)]
 struct Block<'a> {
-    /// What stands behind the opening fence.
+    /// The info string behind the opening fence.
     tag: &'a str,
     /// The lines between the fences, numbered as in the page.
     lines: Vec<(usize, &'a str)>,
@@ -137,7 +137,7 @@ fn experiments(page: &str) -> Vec<(usize, Table)> {
     files
 }
 
-/// A closed body.
+/// A closed body, as an OBJ file.
 const OCTAHEDRON: &str = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n\
     f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
 
@@ -307,7 +307,7 @@ fn wrong(work: &Work, command: &str) -> Option<String> {
     if !folder.join(file).is_file() {
         return Some(format!("no file {file}"));
     }
-    // Of the estimator of one's own the program at hand knows nothing.
+    // The program under test does not know the reader's own estimator.
     let overrides_only = rest.iter().filter(is_flag).all(|flag| ["--set", "--setting"].contains(flag));
     if !overrides_only || file.starts_with("examples/") {
         return None;

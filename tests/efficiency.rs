@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::work::{IMAGE, Work, probe, replaced, same};
 
-/// A claim by CPU time, so that both estimators are played side by side and `mis` twice.
+/// A claim by CPU time, so that both estimators are run side by side and `mis` twice.
 const BY_TIME: &str =
     "[[claim]]\nfaster = { candidate = \"analog\", baseline = \"mis\", cost = \"cpu\" }\n";
 

@@ -1,5 +1,5 @@
 //! What neither the compiler nor clippy can say of the sources: who uses whom (the picture in `src/lib.rs`), which module is
-//! the door of which crate, that one name stands for one type, and how long a file may be. Functions that differ between
+//! the door of which crate, that one name denotes one type, and how long a file may be. Functions that differ between
 //! machines are in `clippy.toml`.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -115,7 +115,7 @@ const SERDE: [&str; 11] = [
 const JSON: [&str; 8] =
     ["samplers", "estimators", "stats", "results", "verify", "report", "experiment", "run"];
 
-/// Type names that may stand for several types: clap's arguments of each subcommand, and nodes of trees.
+/// Type names that may denote several types: clap's arguments of each subcommand, and nodes of trees.
 const SHARED_NAMES: [&str; 2] = ["Args", "Node"];
 
 /// Words that mean one thing, and where nothing may bear them: a cell is a point of a sweep, which geometry, estimators and
@@ -142,7 +142,7 @@ const WORDS: [(&str, &[&str]); 3] = [
 const LONG: [(&str, usize); 1] = [("src/experiment/schema.rs", 800)];
 const LONGEST: usize = 700;
 
-/// A source file.
+/// A source file below `src`.
 struct Source {
     /// Path from the package's folder.
     path: String,
@@ -164,13 +164,13 @@ impl Source {
         Source { path: path.into(), text: text.into(), module, is_test }
     }
 
-    /// The top module.
+    /// Name of the source's top module.
     fn top(&self) -> &str {
         let root = if self.path.ends_with("main.rs") { "main" } else { "lib" };
         self.module.first().map_or(root, String::as_str)
     }
 
-    /// What stands before the unit tests, without comments and texts.
+    /// The code before the unit tests, without comments and texts.
     fn shipped(&self) -> String {
         let text = if self.is_test {
             ""
@@ -240,7 +240,7 @@ impl Source {
             }
             let target = self.target(&used).and_then(|target| target.into_iter().next());
             let Some(target) = target else { continue };
-            // Unit tests stand one module deeper than their file.
+            // Unit tests are one module deeper than their file.
             let is_module = LAYERS.iter().any(|(name, _)| *name == target) || root == "crate";
             if is_module && target != top && target != "error" && !allowed.contains(&target.as_str()) {
                 found.push(format!("{path}:{line}: `{top}` may not use `{target}`"));
@@ -273,7 +273,7 @@ impl Source {
     }
 }
 
-/// A line without its comment, and without what stands in quotes.
+/// A line without its comment, and without the text in quotes.
 fn code(line: &str) -> String {
     let bare: Vec<&str> = line.split('"').step_by(2).collect();
     bare.join("\"\"").split("//").next().unwrap_or_default().to_string()
@@ -304,7 +304,7 @@ fn expanded(used: &str) -> Vec<String> {
     parts.flat_map(|part| expanded(part)).map(|path| format!("{head}{path}")).collect()
 }
 
-/// Every source.
+/// Every source file below `src`.
 fn sources() -> Vec<Source> {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut folders = vec![package.join("src")];
@@ -346,7 +346,7 @@ fn every_module_and_every_dependency_has_a_row() {
     assert_eq!(names.collect::<BTreeSet<String>>(), doors);
 }
 
-/// Files and folders of one folder that use each other, as `a/b -> a/c -> a/b`. A folder's `mod.rs` may use what stands in
+/// Files and folders of one folder that use each other, as `a/b -> a/c -> a/b`. A folder's `mod.rs` may use what is in
 /// it and be used by it.
 fn circles(sources: &[Source]) -> Vec<String> {
     let modules: BTreeSet<&[String]> = sources
@@ -398,7 +398,7 @@ fn no_files_of_a_folder_use_each_other() {
     assert!(found.is_empty(), "{} circles:\n{}", found.len(), found.join("\n"));
 }
 
-/// Names that stand for several types, with their places.
+/// Names that denote several types, with their places.
 fn shared(sources: &[Source]) -> Vec<String> {
     let mut places: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for source in sources {

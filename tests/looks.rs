@@ -1,4 +1,4 @@
-//! `verify` looks twice, counts nights, and plays records again.
+//! `verify` looks twice, counts nights, and runs passes of records again.
 
 use serde_json::Value;
 
@@ -38,7 +38,7 @@ fn equals(value: f64) -> String {
 }
 
 #[test]
-fn a_second_look_is_played_and_decides() {
+fn a_second_look_is_run_and_decides() {
     // A value 4.3 standard errors from what the first look is known to find: p = 6e-5, between the levels.
     let (mean, error) = measured(&grey());
     let work = Work::with(&equals(mean - 4.3 * error));
@@ -49,7 +49,7 @@ fn a_second_look_is_played_and_decides() {
         (&record["stage"], &record["cells"][0]["runs"][0]["passes"]),
         (&"retest".into(), &4096.into())
     );
-    // It stands there now: nothing is played again, the report says the same.
+    // The retest exists now: nothing is run again, the report is the same.
     let again = work.run("verify x.toml -q");
     again.exits(1).says("at both looks").check(!again.stderr().contains("second look"), "it is there");
     assert!(work.read("results/x/verdicts.csv").contains("at both looks"));
@@ -79,7 +79,7 @@ fn controls_and_each_class() {
     let same = claimed("differs = { estimators = [\"mis\", \"analog\"] }");
     same.exits(1).says("no difference found");
     let twice = "expect = \"differs\"\ndiffers = { estimators = [\"mis\", \"analog\"] }";
-    claimed(twice).exits(2).complains("`differs` says what is expected already");
+    claimed(twice).exits(2).complains("`differs` states what is expected already");
     // Each class and their sum; the power is relative to the sum.
     let each = claimed("agree = { estimators = [\"mis\", \"analog\"], class = \"each\", detect = 0.2 }");
     for class in ["all", "surface", "single ", "single_internal", "multiple ", "multiple_internal"] {

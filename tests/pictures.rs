@@ -25,7 +25,7 @@ fn a_picture_is_a_view_and_no_part_of_the_record() {
     std::fs::remove_dir_all(work.path("results/x/images")).expect("removed");
     work.run("report results/x").exits(0);
     assert!(files() == first, "another picture");
-    // And goes where nobody asks for it any more; nothing is played again.
+    // And goes where nobody asks for it any more; nothing is run again.
     work.write("x.toml", IMAGE);
     work.run("run x.toml -q").exits(0);
     assert!(!work.path("results/x/pictures.json").exists());
@@ -39,7 +39,7 @@ fn lit_evenly() -> String {
 }
 
 #[test]
-fn verification_that_plays_nothing_makes_the_pictures_asked_for_since() {
+fn verification_that_runs_nothing_makes_the_pictures_asked_for_since() {
     let claim = "[[claim]]\nagree = { estimators = [\"mis\", \"analog\"], detect = 9 }\n";
     let image = lit_evenly();
     let work = Work::with(&(image.clone() + claim));

@@ -139,7 +139,7 @@ fn every_published_record_gives_its_tables_and_plots() {
     assert!(found.is_empty(), "{}\n{HELP}", found.join("\n"));
 }
 
-/// A published number that somebody improves by hand is found: in the table, and in table and manifest where the record is
+/// A published number that is improved by hand is found: in the table, and in table and manifest where the record is
 /// published, too.
 #[test]
 fn a_changed_table_is_found() {
@@ -307,7 +307,7 @@ fn the_advice_on_rules_is_what_the_ratios_say() {
     let median = format!("median {:.1}", kernel[kernel.len() / 2]);
     let numbers = [largest("kernel"), median, largest("floor 0.001"), largest("floor 0.01")];
 
-    // The numbers stand in this order in one paragraph.
+    // The numbers occur in this order in one paragraph.
     let page = fs::read_to_string(package().join("docs/bssrdf.md")).expect("a page");
     let says = |paragraph: &str| {
         let mut rest = paragraph.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -75,7 +75,7 @@ fn a_pilots_budget_is_the_same_on_any_threads() {
 }
 
 #[test]
-fn more_passes_keep_those_that_were_played() {
+fn more_passes_keep_those_that_were_run() {
     for text in [IMAGE.to_string(), probe()] {
         let passes = |n: u64| replaced(&text, "passes = 100", &format!("passes = {n}"));
         let work = Work::with(&passes(50));
@@ -190,7 +190,7 @@ fn claims_made_after_the_run_are_not_green() {
     is_post_hoc(&work, "");
     same(&arrays(&before), &arrays(&work.record("results")), "a claim changes no number");
     assert_eq!(json(&work.record("results"))["post_hoc"].to_string(), "[0]");
-    // Nothing washes it clean but another seed: neither a second look, nor more or fewer passes.
+    // Nothing makes it valid except another seed: neither a second look, nor more or fewer passes.
     is_post_hoc(&work, "");
     for passes in [100, 64, 32, 300, 100] {
         is_post_hoc(&work, &format!("--set budget.passes={passes}"));
@@ -209,7 +209,7 @@ fn claims_made_after_the_run_are_not_green() {
     is_post_hoc(&work, "--out claimed");
 }
 
-/// A budget in seconds is turned into passes once: the same command goes on with that number instead of
+/// A budget in seconds is turned into passes once: the same command resumes with that number instead of
 /// timing itself again, and a complete run is not repeated.
 #[test]
 fn a_budget_in_seconds_is_fixed_once() {

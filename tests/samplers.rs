@@ -352,7 +352,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     files
 }
 
-/// Records without the folder that they stand in.
+/// Records without the folder that holds them.
 fn record(out: &Path, name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let root = out.join(name).join("record");
     let strip = |(path, bytes): (PathBuf, Vec<u8>)| {
@@ -493,7 +493,7 @@ fn files_are_held_to_their_schema() {
         ("{ g = 0.5 }", "{ g = 2 }", "x.toml:7:27", "must be at most 0.9999, is 2"),
         ("{ g = 0.5 }", "{ gg = 2 }", "x.toml:7:23", "unknown key `gg`"),
         ("[\"hg\"]", "[\"hgg\"]", "x.toml:9:25", "did you mean `hg`?"),
-        ("[\"hg\"]", "[\"hg\", \"hg\"]", "x.toml:9:31", "`hg` stands twice"),
+        ("[\"hg\"]", "[\"hg\", \"hg\"]", "x.toml:9:31", "`hg` occurs twice"),
         ("{ samplers = [\"hg\"] }", "{ detect = 0 }", "x.toml:9:22", "must be greater than 0"),
         (
             "[[claim]]",

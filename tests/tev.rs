@@ -243,7 +243,7 @@ fn a_viewer_shows_what_the_record_has_and_changes_nothing() {
     alone.run("run x.toml -q").exits(0);
     same(&work.record("results"), &alone.record("results"), "with and without a viewer");
 
-    // Complete already: nothing is played, all is shown.
+    // Complete already: nothing is run, all is shown.
     let viewer = Viewer::start();
     work.run(&format!("run x.toml -q --tev {}", viewer.address)).exits(0);
     shows_the_record(&work, &viewer.end());
@@ -282,7 +282,7 @@ fn several_files_have_one_connection() {
     work.write("z.toml", &replaced(&flux, "name = \"x\"", "name = \"z\""));
     let viewer = Viewer::start();
     let ran = work.run(&format!("run x.toml y.toml z.toml -q --tev {}", viewer.address));
-    ran.exits(0).complains("note: `z` has no image: tev has nothing to show of it");
+    ran.exits(0).complains("note: `z` has no image: tev cannot show it");
     ran.check(said(&ran, "tev") == 1, "and nothing else");
     let shown = viewer.end();
     assert_eq!(shown.connections, 1);

@@ -49,7 +49,7 @@ pub fn replaced(text: &str, old: &str, new: &str) -> String {
     text.replace(old, new)
 }
 
-/// The folder.
+/// A temporary folder that the program runs in.
 pub struct Work {
     folder: tempfile::TempDir,
 }
@@ -105,7 +105,7 @@ impl Work {
         self.ran(script, command.output().expect("bash starts"))
     }
 
-    /// Starts the program.
+    /// Starts the program without waiting for its end.
     pub fn start(&self, arguments: &str) -> Started<'_> {
         let mut command = self.command(arguments);
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
@@ -231,7 +231,7 @@ impl Started<'_> {
         }
     }
 
-    /// Sends a signal.
+    /// Sends a signal to the program.
     pub fn signal(&self, name: &str) {
         let id = self.child.id().to_string();
         let sent = Command::new("bash").args(["-c", "kill -\"$1\" \"$2\"", "bash", name, &id]).status();

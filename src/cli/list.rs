@@ -121,7 +121,7 @@ fn numbers(material: &materials::MeasuredMaterial) -> String {
     )
 }
 
-/// The names that may stand at a path, with the first line of their documentation.
+/// The names that may occur at a path, with the first line of their documentation.
 fn schema_names(registry: &Registry, path: &[&str]) -> Vec<(String, String)> {
     let grammar = Grammar::new(json_schema(registry));
     let Some(schema) = grammar.at(path) else { return Vec::new() };

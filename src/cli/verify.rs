@@ -314,7 +314,7 @@ fn tell_power(verdicts: &[Verdict]) {
 /// A file itself, or the experiment files of a folder in the order of their names.
 fn experiment_files(path: &Path) -> Result<Vec<PathBuf>> {
     if !path.is_dir() {
-        return Ok(vec![path.to_path_buf()]); // `load` says what is wrong with it
+        return Ok(vec![path.to_path_buf()]); // `load` reports what is wrong with it
     }
     let entries = std::fs::read_dir(path).map_err(Error::io(path, "read the folder"))?;
     let paths = entries.filter_map(|entry| entry.ok().map(|entry| entry.path()));

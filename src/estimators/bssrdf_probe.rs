@@ -36,7 +36,7 @@ use crate::scene::Scene;
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeOptions {
-    /// The model.
+    /// BSSRDF model.
     pub model: Model,
     /// Lines per refraction of a camera path.
     #[serde(default = "super::kind::one")]
@@ -103,7 +103,7 @@ impl Estimator for BssrdfProbe {
             for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
                 let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut gather = Probing { estimator: self, streams, hits: Vec::new() };
-                self.bssrdf.play(&group, index, key, scores, &mut gather);
+                self.bssrdf.trace(&group, index, key, scores, &mut gather);
             }
         }
     }

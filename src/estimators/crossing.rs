@@ -3,7 +3,7 @@
 use crate::geometry::Side;
 use crate::optics::boundary::Boundary;
 
-/// The other side.
+/// The opposite side of a boundary.
 #[inline]
 pub fn other(side: Side) -> Side {
     match side {

@@ -30,7 +30,7 @@ use crate::scene::Scene;
 #[derive(Debug)]
 pub(super) struct BssrdfScene {
     pub scene: Arc<Scene>,
-    /// Per band.
+    /// BSSRDF model of each band.
     pub models: Vec<Bssrdf>,
     /// Per band: index inside over outside.
     pub eta: Vec<f64>,
@@ -69,7 +69,7 @@ impl Emergence<'_> {
 pub(super) struct PathStreams {
     /// Of light samples at entries.
     pub lights: Stream,
-    /// Of entries.
+    /// Random numbers of entry points.
     pub entries: Stream,
     /// Of the single-scattering term, which then shifts none of the others.
     pub single: Stream,
@@ -163,7 +163,7 @@ impl BssrdfScene {
     }
 
     /// Traces path `index` of a pass for one group of bands.
-    pub fn play(
+    pub fn trace(
         &self,
         bands: &[usize],
         index: usize,

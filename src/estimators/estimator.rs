@@ -66,7 +66,7 @@ pub struct HeavyTail {
 /// What the mean of an estimator's scores is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Bias {
-    /// The integral.
+    /// Equal to the integral for any number of passes.
     Unbiased,
     /// Something that tends to the integral as passes grow.
     Consistent,

@@ -5,7 +5,7 @@
 pub enum TransportClass {
     /// Reflected at the surface, or through the body without scattering.
     Surface,
-    /// One medium vertex.
+    /// Paths with one medium vertex.
     Single,
     /// One medium vertex and an internal reflection.
     SingleInternal,

@@ -116,7 +116,7 @@ impl Estimator for LightTracer {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         for &band in bands {
             for index in 0..self.photons {
-                Photon::play(self, band, index, key, scores);
+                Photon::trace(self, band, index, key, scores);
             }
         }
     }
@@ -138,7 +138,7 @@ impl Estimator for LightTracer {
 /// Part of a body's size by which rounding may put a medium vertex outside its bounding sphere.
 const ROUNDING: f64 = 1e-9;
 
-/// One photon.
+/// State of one photon.
 struct Photon<'a> {
     scene: &'a Scene,
     bounds: Option<BoundingSphere>,
@@ -182,7 +182,7 @@ fn start(
 
 impl<'a> Photon<'a> {
     /// Traces photon `index` of a pass; returns how many numbers its walk drew.
-    fn play(
+    fn trace(
         tracer: &'a LightTracer,
         band: usize,
         index: usize,

@@ -2,7 +2,7 @@
 //! have.
 //!
 //! The walk is that of [`super::path`]; an estimator that adds techniques implements [`Rivals`]: it is
-//! called at every medium vertex, and says at every exit how densely its techniques draw the same path.
+//! called at every medium vertex, and states at every exit how densely its techniques draw the same path.
 //! Weights are those of the balance heuristic over all techniques. Their densities are written relative
 //! to U, the density with which the walk draws its medium vertices and the flight to the exit, so that U
 //! itself, which underflows in thick media, is never formed: a light sample has density p_L, a BSDF
@@ -46,7 +46,7 @@ impl Default for Roulette {
 /// What all walks of an estimator share.
 #[derive(Debug)]
 pub(super) struct Field {
-    /// The scene.
+    /// Scene that paths are traced in.
     pub scene: Arc<Scene>,
     /// Per band: probability of choosing each light.
     pub choice: Vec<Vec<f64>>,
@@ -55,7 +55,7 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// For a scene.
+    /// Prepares a scene for tracing with this roulette.
     pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Field {
         let choice = light_shares(&scene);
         Field { bounds: scene.shape.bounds(), roulette, choice, scene }
@@ -110,7 +110,7 @@ pub(super) trait Rivals: Sized {
     ) -> f64;
 }
 
-/// No techniques but the walk's own.
+/// No techniques except the walk's own.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Unrivalled;
 
@@ -179,7 +179,7 @@ struct LightDraw {
     pdf: Option<f64>,
 }
 
-/// One path.
+/// State of one path that is traced from the sensor.
 pub(super) struct CameraWalk<'a, R, B> {
     pub scene: &'a Scene,
     choice: &'a [f64],
@@ -208,7 +208,7 @@ pub(super) struct CameraWalk<'a, R, B> {
 
 impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Traces a path; returns how many numbers its walk drew.
-    pub fn play(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
+    pub fn trace(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
         let walk = CameraWalk::start(path, scores, rivals, bands);
         walk.scores.count(Cost::Rays);
         match walk.scene.shape.intersect(&walk.ray, Side::Outside, None, f64::INFINITY) {
@@ -220,7 +220,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Traces the last two segments in the medium alone: the sensor's ray is the arrival at x_i, the
     /// next flight must end in the medium, the one after it at the boundary, and what leaves there must
     /// meet a light.
-    pub fn play_two_bounces(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> Option<()> {
+    pub fn trace_two_bounces(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> Option<()> {
         let mut walk = CameraWalk::start(path, scores, rivals, bands);
         walk.history.scatter();
         R::call(&mut walk);

@@ -83,7 +83,7 @@ pub struct Equals {
     /// The transport class; `all` without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
-    /// The expected value.
+    /// Expected value of the quantity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
     /// Its stated standard error; exact without it.
@@ -135,12 +135,12 @@ pub struct Differs {
     pub only: BTreeMap<String, String>,
 }
 
-/// The first passes of every measurement, played again by one thread in blocks of another size, give the
+/// The first passes of every measurement, run again by one thread in blocks of another size, give the
 /// same bits; and, where a checksum is stated, the record's numbers are those.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Reproduces {
-    /// Passes that are played again, rounded up to whole batches.
+    /// Passes that are run again, rounded up to whole batches.
     #[schemars(range(min = 1, max = 1099511627776u64))]
     pub passes: u64,
     /// blake3 over the record's arrays, hex, as `summary.json` states it (`numbers`).

@@ -71,11 +71,11 @@ pub enum Value {
 /// A value and its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
-    /// The value.
+    /// Parsed value.
     pub value: Value,
     /// Where the value stands.
     pub origin: Origin,
-    /// Where its key stands; none for elements of arrays and for the root.
+    /// Where its key is; none for elements of arrays and for the root.
     pub key: Option<Place>,
     /// Whether it is a table written in braces, that is, as one value.
     pub inline: bool,

@@ -1,4 +1,4 @@
-//! Pictures beside those of every run: what `[[picture]]` may say.
+//! Pictures beside those of every run: what `[[picture]]` may contain.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -33,12 +33,12 @@ pub struct RunningEntry {
     /// The transport class; `all` without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
-    /// The band.
+    /// Band that is shown.
     pub band: String,
 }
 
 /// A grid of pictures, a picture a cell of the sweep: its left half by one estimator, its right half by
-/// another, shown alike. The caption says what CPU time each half took. Axes that are neither rows nor
+/// another, shown alike. The caption states what CPU time each half took. Axes that are neither rows nor
 /// columns give one grid per label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

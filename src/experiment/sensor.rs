@@ -1,4 +1,4 @@
-//! What an experiment file may say of its sensor, and the sensor that it means.
+//! The sensor in an experiment file, and how it is built.
 
 use std::f64::consts::PI;
 
@@ -65,7 +65,7 @@ pub enum SensorEntry {
     Probe {
         /// Its origin, mm; outside the body.
         point_mm: [f64; 3],
-        /// Its direction.
+        /// Direction of the ray.
         toward: Direction,
         /// Independent paths whose mean is one pass.
         #[serde(default = "default_paths_per_pass")]

@@ -18,7 +18,7 @@ pub struct Mesh {
     normals: Option<Normals>,
     bounds: BoundingSphere,
     tree: BoxTree,
-    /// The triangles in the tree's order, their corners at hand.
+    /// The triangles in the tree's order, with their corners.
     leaves: Vec<Leaf>,
     clearance: Clearance,
     /// How far rounding may put a point of the surface off it, mm: a point is a sum of three corners

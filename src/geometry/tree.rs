@@ -51,7 +51,7 @@ pub const PAD: f64 = 0.0078125;
 /// so forgets a part of the mesh, when there are more.
 const MAX_DEPTH: usize = 32;
 
-/// The normalised units.
+/// Map from mm to the units of the mesh's tree.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshFrame {
     center: DVec3,
@@ -164,7 +164,7 @@ impl BoxTree {
         });
     }
 
-    /// Whether `visit` says yes to any slot whose box the ray may meet; it is not asked again.
+    /// Whether `visit` returns true for any slot whose box the ray may meet; it is not asked again.
     pub fn any(&self, ray: &Ray, mut visit: impl FnMut(usize) -> bool) -> bool {
         let Some((cull_ray, _)) = self.frame.cull_ray(ray, f64::INFINITY) else { return false };
         // Not `ray_traverse_anyhit`, which visits all boxes on the ray.

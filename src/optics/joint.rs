@@ -381,7 +381,7 @@ mod tests {
         isotropic_mean(&frame, 6, square) / (norm * norm)
     }
 
-    /// What the head says of both ways of drawing, at 20, 90 and 160 degrees: table, mixture.
+    /// What the head states of both ways of drawing, at 20, 90 and 160 degrees: table, mixture.
     const MOMENTS: [(f64, [f64; 3], [f64; 3]); 4] = [
         (0.0, [1.0, 1.0, 1.0], [1.137, 1.137, 1.137]),
         (0.5, [1.001, 1.002, 1.001], [1.809, 1.148, 1.048]),

@@ -28,6 +28,6 @@ pub struct ReportData {
     pub viewers: Vec<ViewerBlock>,
     /// Grids of split pictures.
     pub splits: Vec<SplitFigure>,
-    /// Plots.
+    /// Sections of plots, in the report's order.
     pub plots: Vec<Section>,
 }

@@ -3,7 +3,7 @@
 use super::document::{Document, FigureBlock, PageBlock, PictureFile};
 use super::table::Table;
 
-const PREAMBLE: &str = "% pdflatex report.tex, in its own folder. Plots are SVG, and what the page folds away is long: both stand in files.
+const PREAMBLE: &str = "% pdflatex report.tex, in its own folder. Plots are SVG, and what the page folds away is long: both are in files.
 \\documentclass[a4paper,landscape]{article}
 \\usepackage[utf8]{inputenc}
 \\usepackage[T1]{fontenc}

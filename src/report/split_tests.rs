@@ -1,4 +1,4 @@
-//! Tests of split pictures: which half is whose, one white for both, and what is said of the time.
+//! Tests of split pictures: which half is whose, one white for both, and the caption's statement of times.
 
 use super::*;
 use crate::results::image::decoded;

@@ -23,7 +23,7 @@ pub struct Unshown {
 }
 
 impl Canvas {
-    /// White.
+    /// A white canvas, width by height in pixels.
     pub fn new(width: usize, height: usize) -> Canvas {
         Canvas { width, height, data: vec![255; 3 * width * height] }
     }

@@ -96,7 +96,7 @@ fn arrays(record: &Record, run: &EstimatorRun) -> BTreeMap<String, String> {
 }
 
 impl RecordFolder {
-    /// Writes `manifest.json` of a record and of the views that stand beside it.
+    /// Writes `manifest.json` of a record and of the views beside it.
     pub fn write_manifest(&self, record: &Record) -> Result<()> {
         let mut manifest = Manifest::of(record);
         for (folder, extension) in VIEWS {
@@ -105,7 +105,7 @@ impl RecordFolder {
         self.write_view(MANIFEST, canonical(&manifest).as_bytes())
     }
 
-    /// What the record here says of itself, or where there is none `manifest.json`.
+    /// The manifest of the record here, or `manifest.json` where there is none.
     ///
     /// # Errors
     /// Neither is there, or what is there is damaged or of another version.

@@ -1,4 +1,4 @@
-//! `pictures.json`: the pictures that an experiment asks for beside those of every run. It stands beside
+//! `pictures.json`: the pictures that an experiment asks for beside those of every run. It is stored beside
 //! the record and not in it: how a record is shown changes none of its bits.
 
 use serde::{Deserialize, Serialize};
@@ -38,8 +38,8 @@ pub struct Running {
     pub estimators: Option<Vec<String>>,
     /// The observable; the sensor's first one without it.
     pub observable: Option<String>,
-    /// The transport class.
+    /// Transport class that is shown.
     pub class: String,
-    /// The band.
+    /// Band that is shown.
     pub band: String,
 }

@@ -22,7 +22,7 @@ const NOTED_CRATES: [&str; 10] =
 
 const LOCK: &str = include_str!("../../Cargo.lock");
 
-/// `provenance.json`.
+/// Content of `provenance.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
@@ -32,7 +32,7 @@ pub struct Provenance {
     pub fingerprint: String,
     /// blake3 of the program itself, hex: what another build has left is not gone on with.
     pub build: String,
-    /// Commit of the source tree the program was built from, as it stood when it ran.
+    /// Commit of the source tree the program was built from, as it was when it ran.
     pub commit: Option<String>,
     /// True where that tree had uncommitted changes.
     pub dirty: Option<bool>,
@@ -46,7 +46,7 @@ pub struct Provenance {
     pub target_features: Vec<String>,
     /// The processor's name.
     pub cpu: String,
-    /// Worker threads.
+    /// Number of worker threads.
     pub threads: usize,
     /// When the run ended, UTC, ISO 8601.
     pub date: String,
@@ -110,7 +110,7 @@ pub fn fingerprint() -> String {
 /// Version of a crate that this one depends on; `absent` where the lock file does not have it.
 ///
 /// Where the lock file holds several versions, this package's own entry names the one it uses
-/// (`"glam 0.34.2"`); otherwise that entry says `"libm"` and there is one to find.
+/// (`"glam 0.34.2"`); otherwise that entry is `"libm"` and there is one to find.
 fn locked_version(name: &str) -> &'static str {
     let after = |text: &'static str, mark: String| text.split_once(&mark).map(|(_, rest)| rest);
     let own = after(LOCK, format!("name = \"{}\"\n", env!("CARGO_PKG_NAME")));

@@ -10,7 +10,7 @@ use super::sampler::SamplerRun;
 /// Version of this layout; a reader refuses others.
 pub const SCHEMA_VERSION: u32 = 4;
 
-/// `record.json`: everything but the arrays, which stand in `.npy` files beside it.
+/// `record.json`: everything except the arrays, which are in `.npy` files beside it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
@@ -32,15 +32,15 @@ pub struct Record {
     pub claims: serde_json::Value,
     /// What verification needs of each of `claims`, in their order.
     pub statements: Vec<Claim>,
-    /// Indices of claims that were changed or added when passes had already been played: they are not
+    /// Indices of claims that were changed or added when passes had already been run: they are not
     /// evidence.
     pub post_hoc: Vec<usize>,
-    /// The claims expanded over cells, bands and tables, with the values they are held against.
+    /// The claims expanded over cells, bands and tables, with the values they are compared with.
     pub comparisons: Vec<Comparison>,
     /// The claims on samplers expanded: one entry for each sampler that a claim speaks of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sampler_comparisons: Vec<SamplerComparison>,
-    /// What `reproduces` claims had played again.
+    /// Passes run again for `reproduces` claims.
     pub replays: Vec<Replay>,
     /// The bands, in the order of every array's band axis.
     pub bands: Vec<Band>,
@@ -53,7 +53,7 @@ pub struct Record {
     pub checksums: BTreeMap<String, String>,
 }
 
-/// The first passes of one measurement, played again.
+/// The first passes of one measurement, run again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Replay {
@@ -61,11 +61,11 @@ pub struct Replay {
     pub cell: usize,
     /// Estimator name.
     pub estimator: String,
-    /// Passes that were played again.
+    /// Passes that were run again.
     pub passes: u64,
     /// blake3 of their moments as recorded, hex.
     pub recorded: String,
-    /// blake3 of their moments as replayed, hex.
+    /// blake3 of the moments of the second run, hex.
     pub replayed: String,
 }
 
@@ -182,7 +182,7 @@ pub struct StatedTail {
     pub band: usize,
     /// In this class, and in `all`.
     pub class: String,
-    /// Why.
+    /// Why the estimator does not run in this cell.
     pub reason: String,
 }
 
@@ -209,8 +209,8 @@ pub struct Observable {
     pub class: String,
 }
 
-/// The observable of claims of efficiency that stands for all pixels at once: its variance is that of a
-/// pixel, averaged over the pixels. It has no mean; that of the sensor's first observable stands for it.
+/// The observable of claims of efficiency that denotes all pixels at once: its variance is that of a
+/// pixel, averaged over the pixels. It has no mean; that of the sensor's first observable is reported for it.
 pub const PIXELS: &str = "pixels";
 
 impl Observable {
@@ -219,7 +219,7 @@ impl Observable {
         Observable { name: PIXELS.into(), class: "all".into() }
     }
 
-    /// Is it [`Observable::pixels`]?
+    /// Whether this is [`Observable::pixels`].
     pub fn is_pixels(&self) -> bool {
         self.name == PIXELS
     }
@@ -250,19 +250,19 @@ pub struct Quantity {
     pub cell: usize,
     /// Estimator name.
     pub estimator: String,
-    /// The observable.
+    /// Observable that is measured.
     pub observable: Observable,
     /// Index into [`Record::bands`].
     pub band: usize,
 }
 
-/// What a claim says of itself.
+/// What a claim states.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Claim {
     /// Its name, or its kind and place in the file.
     pub label: String,
-    /// What it states.
+    /// Kind of statement.
     pub kind: ClaimKind,
     /// The outcome that makes it green.
     pub expects: ExpectedOutcome,
@@ -270,7 +270,7 @@ pub struct Claim {
     pub each: bool,
 }
 
-/// Kinds of claims.
+/// Kinds of statements that claims make.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ClaimKind {
@@ -308,7 +308,7 @@ impl ClaimKind {
     }
 }
 
-/// The outcome that makes a claim green; any but a pass makes it a control.
+/// The outcome that makes a claim green; any except a pass makes it a control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExpectedOutcome {
@@ -342,21 +342,21 @@ pub struct Comparison {
     pub claim: usize,
     /// The number under test.
     pub quantity: Quantity,
-    /// What it is held against.
+    /// What it is compared with.
     pub against: Against,
     /// The largest relative defect that may go unseen; a coarser test is underpowered.
     pub detect: Option<f64>,
 }
 
-/// What a quantity is held against.
+/// What a quantity is compared with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Against {
     /// A published or computed value with its stated error (one standard error; 0 = exact).
     Value {
-        /// The expected value.
+        /// Expected value.
         value: f64,
-        /// Its stated error.
+        /// Stated error of the expected value.
         error: f64,
         /// Where it comes from.
         source: String,
@@ -365,7 +365,7 @@ pub enum Against {
     Quantity {
         /// The other quantity.
         other: Quantity,
-        /// True where both were played on the same random streams, pass by pass.
+        /// True where both were run on the same random streams, pass by pass.
         paired: bool,
     },
     /// Another estimator of the same integral, by efficiency: the baseline's variance times cost over
@@ -375,7 +375,7 @@ pub enum Against {
         baseline: Quantity,
         /// The bound of the ratio.
         exceeds: f64,
-        /// What costs.
+        /// Measure of cost.
         cost: CostMeasure,
     },
 }

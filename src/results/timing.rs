@@ -19,7 +19,7 @@ pub struct Timing {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Batches {
-    /// Number of processes that played them: more than one where a run was stopped and went on.
+    /// Number of processes that ran them: more than one where a run was stopped and resumed.
     pub processes: u64,
     /// CPU seconds of a batch.
     pub cpu_seconds: Vec<f64>,

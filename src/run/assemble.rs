@@ -27,9 +27,9 @@ use crate::scene::sensor::{PixelRectangle, SensorRegion};
 pub struct Assembled {
     /// The record; checksums are filled in when it is written.
     pub record: Record,
-    /// Its arrays.
+    /// Arrays of the record.
     pub arrays: Arrays,
-    /// What it cost.
+    /// Seconds and processes, `timing.json`.
     pub timing: Timing,
 }
 

@@ -1,5 +1,5 @@
-//! Claims expanded: every elementary statement, with the value that it is held against. Expected values
-//! come into the record here, so that verification needs nothing but the record.
+//! Claims expanded: every elementary statement, with the value that it is compared with. Expected values
+//! come into the record here, so that verification needs only the record.
 
 use std::collections::BTreeMap;
 
@@ -50,7 +50,7 @@ pub fn expand_samplers(claims: &[ClaimEntry], drawn: &[SamplerRun]) -> Vec<Sampl
     claims.flat_map(of_claim).collect()
 }
 
-/// What claims say of themselves.
+/// What claims state.
 pub fn statements(claims: &[ClaimEntry]) -> Vec<Claim> {
     let of_claim = |(index, entry): (usize, &ClaimEntry)| {
         let each = |word: &Option<String>| word.as_deref() == Some(EACH);

@@ -71,11 +71,11 @@ pub struct Passes {
     pub arm: Arm,
     /// What its passes are for.
     pub stage: Stage,
-    /// Their number, where it is not the budget's to say.
+    /// Their number, where the budget does not state it.
     pub count: Option<u64>,
-    /// Runs passes.
+    /// Estimator that runs the passes.
     pub estimator: Box<dyn Estimator>,
-    /// Its observables.
+    /// Observables and bands of the scores.
     pub layout: Layout,
     /// Bands that one call runs together, with their streams.
     pub groups: Vec<Group>,
@@ -85,7 +85,7 @@ pub struct Passes {
 
 /// Bands that one call runs together.
 pub struct Group {
-    /// Their indices.
+    /// Indices of the bands.
     pub bands: Vec<usize>,
     /// Key of the run, or of the second look.
     pub main: StreamKey,
@@ -128,7 +128,7 @@ pub struct Start {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Work {
-    /// By [`Cost`].
+    /// Work counted, indexed by [`Cost`].
     pub cost: [u64; Cost::ALL.len()],
     /// CPU time of the passes alone, seconds.
     pub cpu_seconds: f64,
@@ -149,7 +149,7 @@ impl Merge for Work {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tally {
-    /// By [`Anomaly`].
+    /// Anomalies counted, indexed by [`Anomaly`].
     pub anomalies: [u64; Anomaly::ALL.len()],
     /// Wall time, seconds.
     pub wall_seconds: f64,
@@ -354,7 +354,7 @@ mod tests {
     }
 
     /// Passes of images of 3 pixels in 2 bands.
-    fn played(start: u64, end: u64, keep_level: u32) -> Block {
+    fn run(start: u64, end: u64, keep_level: u32) -> Block {
         let mut block = Block { bands: 2, ..Block::empty(start, keep_level) };
         for pass in start..end {
             block.pair_with(&image(pass));
@@ -373,16 +373,16 @@ mod tests {
         assert_eq!(spread(&[], &[], 2), []);
     }
 
-    // Pairs are of passes 2i and 2i + 1, whatever blocks these stood in; a last pass alone is in none.
+    // Pairs are of passes 2i and 2i + 1, whatever blocks these were in; a last pass alone is in none.
     #[test]
     fn pairs_do_not_know_of_blocks() {
         for (cuts, keep_level) in
             [(vec![0, 1, 2, 3, 4, 5], 0), (vec![0, 3, 4, 9, 16], 1), (vec![0, 7, 8, 15, 29], 2)]
         {
             let end = cuts[cuts.len() - 1];
-            let whole = played(0, end, keep_level);
+            let whole = run(0, end, keep_level);
             let mut joined = Block::empty(0, keep_level);
-            cuts.windows(2).for_each(|cut| joined.append(played(cut[0], cut[1], keep_level)));
+            cuts.windows(2).for_each(|cut| joined.append(run(cut[0], cut[1], keep_level)));
             assert_eq!((&joined.spread, &joined.pixels), (&whole.spread, &whole.pixels), "{cuts:?}");
             let batches = joined.spread.batches();
             let pairs: u64 = batches.iter().map(|batch| batch[0].n).sum();

@@ -26,7 +26,7 @@ use crate::scene::Scene;
 
 /// What a run will do.
 pub struct Plan {
-    /// The bands.
+    /// Bands of the experiment.
     pub bands: Vec<Band>,
     /// One job per cell and arm of an estimator, cells outermost; then one per sampler.
     pub jobs: Vec<Job>,
@@ -35,7 +35,7 @@ pub struct Plan {
     /// What the passes are for.
     pub stage: Stage,
     scene_bytes: usize,
-    /// Passes per job, where the budget says them.
+    /// Passes per job, where the budget states them.
     passes: Option<u64>,
 }
 
@@ -93,7 +93,7 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
     Ok(Plan { jobs, comparisons, stage, scene_bytes: builder.memory_bytes(), passes, bands })
 }
 
-/// A cell, built.
+/// A cell with its scene.
 struct BuiltCell<'a> {
     spec: &'a CellSpec,
     scene: Arc<Scene>,
@@ -108,7 +108,7 @@ fn cells<'a>(experiment: &'a Experiment, builder: &mut Builder) -> Result<Vec<Bu
         if let Some(twin) = known.insert(hash_json(&spec.content()), &spec.label) {
             return Err(Error::input_help(
                 format!("cells `{twin}` and `{}` are the same scene", spec.label),
-                "equal scenes run on equal streams, so one says nothing about the other: drop one",
+                "equal scenes run on equal streams, so neither is evidence about the other: drop one",
             ));
         }
         let scene = Arc::new(builder.scene(spec)?);

@@ -13,7 +13,7 @@ pub const KEY_VERSION: u32 = 1;
 pub enum Stage {
     /// The short run that turns a budget into passes.
     Pilot,
-    /// The run itself.
+    /// Passes of the run.
     Main,
     /// The second look at what failed in the first.
     Retest,
@@ -46,7 +46,7 @@ pub struct StreamName<'a> {
     pub bands: &'a [&'a str],
     /// Name of the estimator.
     pub estimator: &'a str,
-    /// Stage.
+    /// Stage that the streams belong to.
     pub stage: Stage,
 }
 

@@ -3,7 +3,7 @@
 //! The collector makes an image of what it has in order, from a copy: nothing here reaches a record. It
 //! does so at most twice a second, only where the one before is on its way, and for a twentieth of its
 //! time. A thread of its own sends, and one image waits at most: a viewer that is slow or hangs stalls
-//! nothing. A job's last image that finds the place taken is sent when all jobs are played.
+//! nothing. A job's last image that finds the place taken is sent when all jobs are done.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -21,7 +21,7 @@ use crate::stats::moments::ImageMoments;
 const EVERY: Duration = Duration::from_millis(500);
 /// An image is due when this many times what the last one took has passed.
 const SHARE: u32 = 20;
-/// What a run that is played waits at most for a viewer to take its last images.
+/// How long a finished run waits at most for a viewer to take its last images.
 const LAST_WAIT: Duration = Duration::from_secs(10);
 
 /// A viewer that is there, for all experiments of one call.
@@ -66,7 +66,7 @@ impl Live {
     pub fn connect(address: &Address) -> Result<Live, String> {
         let connection = Connection::open(address).map_err(|error| {
             let why = reason(&error);
-            format!("no tev viewer at {address} ({why}): start tev, or leave --tev out; the run goes on without")
+            format!("no tev viewer at {address} ({why}): start tev, or leave --tev out; the run continues without")
         })?;
         let shared = Arc::new(Shared::default());
         let sending = Arc::clone(&shared);
@@ -77,7 +77,7 @@ impl Live {
     /// What is there to be told: that the viewer has gone, once.
     pub fn complaint(&self) -> Option<String> {
         let why = self.shared.post().lost.take()?;
-        Some(format!("tev at {} takes no more images ({why}): the run goes on without", self.address))
+        Some(format!("tev at {} takes no more images ({why}): the run continues without", self.address))
     }
 
     /// Puts an image where it is taken from, unless another one waits there.
@@ -166,13 +166,13 @@ fn reason(error: &io::Error) -> String {
 /// The images of one experiment on show.
 #[derive(Clone, Copy)]
 pub struct Show<'a> {
-    /// Where.
+    /// Connection to the viewer.
     pub live: &'a Live,
     /// The experiment's name.
     pub experiment: &'a str,
-    /// Its bands.
+    /// Bands of the experiment.
     pub bands: &'a [Band],
-    /// Its jobs.
+    /// Jobs whose images are shown.
     pub jobs: &'a [Job],
 }
 
@@ -205,7 +205,7 @@ impl Show<'_> {
             .is_none_or(|size| self.live.offer(|| self.frame(job, size, &finished.image)))
     }
 
-    /// All jobs are played: sends the images of those that are `owed`. What there is to say, where some
+    /// All jobs are done: sends the images of those that are `owed`. Returns a message where some
     /// were not sent.
     pub fn close(&self, owed: &[(usize, &Finished)]) -> Option<String> {
         let until = Instant::now() + LAST_WAIT;

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 /// Estimate of a run's largest memory, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MemoryEstimate {
-    /// Meshes and maps.
+    /// Meshes and maps, bytes.
     pub shapes: usize,
     /// Moments of observables and images of everything measured, kept until the record is written.
     pub results: usize,
@@ -40,7 +40,7 @@ impl MemoryEstimate {
         }
     }
 
-    /// All of it.
+    /// Total, bytes.
     pub fn total(&self) -> usize {
         self.shapes + self.results + self.working
     }
@@ -65,7 +65,7 @@ impl MemoryEstimate {
     }
 }
 
-/// Memory that the system can give without swapping, bytes; `None` where it does not say.
+/// Memory that the system can give without swapping, bytes; `None` where it does not report it.
 pub fn available() -> Option<usize> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;

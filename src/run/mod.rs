@@ -51,9 +51,9 @@ pub struct Options {
     pub threads: usize,
     /// Passes per block; chosen by time without it.
     pub block_passes: Option<u64>,
-    /// No progress bar.
+    /// Do not show a progress bar.
     pub quiet: bool,
-    /// Folder that holds a results folder per experiment, whose records say how many passes are run;
+    /// Folder that holds a results folder per experiment, whose records state how many passes are run;
     /// without it the budget does. A budget in seconds gives another number of passes each time that it
     /// is measured anew: this is how such a record is reproduced bit for bit.
     pub passes_of: Option<PathBuf>,
@@ -85,7 +85,7 @@ impl Options {
 ///
 /// # Errors
 /// Bad input found while building; a run that does not fit in memory; I/O; an interruption, after which
-/// the same call goes on where this one stopped.
+/// the same call resumes where this one stopped.
 pub fn run(
     experiment: &Experiment,
     registry: &Registry,
@@ -108,13 +108,13 @@ fn take_passes(plan: &mut Plan, experiment: &Experiment, from: &RecordFolder) ->
         let name = &experiment.file.name;
         return Err(Error::input_help(
             format!("`{name}` draws from samplers: it has no passes to take from a record"),
-            "leave --passes-of out: its file says how many draws",
+            "leave --passes-of out: its file states how many draws",
         ));
     }
     let manifest = from.manifest()?;
     if manifest.experiment_hash != assemble::experiment_hash(experiment) {
         let words = "the record there is of another experiment than the file";
-        let help = "`scatterproof compare` of the two results says what was changed; run without --passes-of to take the \
+        let help = "`scatterproof compare` of the two results reports what was changed; run without --passes-of to take the \
                     passes from the budget";
         return Err(Error::record(from.root(), format!("{words}; {help}")));
     }
@@ -141,7 +141,7 @@ fn execute(
     let show = options.live.as_deref();
     let show = show.map(|live| Show { live, experiment: name, bands: &plan.bands, jobs: &plan.jobs });
     if show.is_some_and(|show| !show.has_images()) {
-        progress.say(&format!("note: `{name}` has no image: tev has nothing to show of it"));
+        progress.say(&format!("note: `{name}` has no image: tev cannot show it"));
     }
     let settings = workers::Settings {
         threads: options.threads.max(1),
@@ -182,7 +182,7 @@ fn replays(
         .map(|(job, finished)| replay::replay(job, finished, count, &|| interrupt.raised()))
         .collect();
     replays.ok_or_else(|| {
-        Error::Interrupted("all passes are done and kept; the same command goes on from there".into())
+        Error::Interrupted("all passes are done and kept; the same command resumes from there".into())
     })
 }
 

@@ -23,7 +23,7 @@ pub struct Remeasured<'a> {
     pub factor: u64,
 }
 
-/// Measures again what `look` says, and writes the record into `retest/` beside the first. What an
+/// Measures again what `look` lists, and writes the record into `retest/` beside the first. What an
 /// earlier call has measured is not measured again.
 ///
 /// # Errors

@@ -47,7 +47,7 @@ impl FromStr for Address {
             Some((host, port)) if !host.is_empty() && !host.contains(['[', ']', '/']) => {
                 Ok(Address { host: host.into(), port })
             }
-            _ => Err(format!("HOST:PORT is needed, as {}; files stand before --tev", Address::USUAL)),
+            _ => Err(format!("HOST:PORT is needed, as {}; files come before --tev", Address::USUAL)),
         }
     }
 }
@@ -191,7 +191,7 @@ impl Connection {
         })
     }
 
-    /// What is written after the viewer has gone is lost without a word, at first; that it has gone can
+    /// What is written after the viewer has gone is lost silently, at first; that it has gone can
     /// be read.
     ///
     /// # Errors

@@ -8,7 +8,7 @@
 //! Jobs that are timed side by side run by quadruples: one worker runs two batches of every arm in the
 //! order A B .. B A, so that whatever drifts steadily (clock rate, temperature, other load) adds the
 //! same to each arm. A worker's first quadruple of a group warms it up, and one of which an earlier
-//! process had played a part is not in that order: neither counts as timed (`Work::settled`).
+//! process had run a part is not in that order: neither counts as timed (`Work::settled`).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -33,7 +33,7 @@ pub struct Settings<'a> {
     pub threads: usize,
     /// Passes per block, where the user sets them.
     pub block_passes: Option<u64>,
-    /// The stop flag.
+    /// Flag that asks to stop.
     pub interrupt: &'a Interrupt,
     /// Folder of the experiment's results.
     pub root: &'a Path,
@@ -47,19 +47,19 @@ pub struct Settings<'a> {
     pub claims: &'a [String],
 }
 
-/// What a job gave, and what stood before its first pass or draw.
+/// What a job gave, and the claims made before its first pass or draw.
 pub struct Completed {
     /// What was fixed beforehand.
     pub start: Start,
-    /// What came out.
+    /// Result of the job.
     pub output: Output,
 }
 
 /// What came out of a job.
 pub enum Output {
-    /// Of an estimator.
+    /// Passes of an estimator.
     Passes(Box<Finished>),
-    /// Of a sampler.
+    /// Counts of a sampler's draws.
     Draws(Box<Sampled>),
 }
 
@@ -195,7 +195,7 @@ fn quadruple(lanes: &[Lane], number: u64) -> (Vec<Span>, bool) {
     (spans.into_iter().filter(|span| span.start < span.end).collect(), is_whole)
 }
 
-/// Stops the other threads where one panics: the run is lost, and they should not go on to its end.
+/// Stops the other threads where one panics: the run is lost, and they should not continue to its end.
 struct StopOnPanic<'a>(&'a Interrupt);
 
 impl Drop for StopOnPanic<'_> {
@@ -263,8 +263,8 @@ impl Pool<'_> {
         sender.send(Message::Sampled { job: index, start, sampled, is_new }).ok()
     }
 
-    /// The claims that stood before the first pass or draw: those of an earlier state, whether or not
-    /// the job goes on from it.
+    /// The claims made before the first pass or draw: those of an earlier state, whether or not
+    /// the job resumes from it.
     fn claims(&self, earlier: Option<&Start>) -> Vec<String> {
         earlier.map_or_else(|| self.settings.claims.to_vec(), |start| start.claims.clone())
     }
@@ -425,7 +425,7 @@ impl<'a> Collector<'a> {
         let done = self.completed.len();
         Err(Error::Interrupted(format!(
             "{done} of {} measurements are complete and the passes done of the others are kept in {}; the \
-             same command goes on from there",
+             same command resumes from there",
             self.jobs.len(),
             self.settings.root.display()
         )))

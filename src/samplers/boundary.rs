@@ -152,13 +152,13 @@ pub struct RoughSampler {
 #[derive(Clone, Copy)]
 struct SlopeRegion {
     slopes: Slopes,
-    /// r.
+    /// Relative refractive index r.
     relative: f64,
     /// m_c^2; 0 where nothing is reflected totally.
     critical2: f64,
 }
 
-/// One piece.
+/// One piece of the chart of slopes.
 #[derive(Clone, Copy)]
 struct SlopePiece {
     name: &'static str,
@@ -317,14 +317,14 @@ impl RoughSampler {
         self.parts.iter().position(|part| part.reach == reach)
     }
 
-    /// A direction with its event and the density that the code says it has.
+    /// A direction with its event and the density that the code claims.
     fn drawn(&self, stream: &mut Stream) -> Option<(Event, DVec3, f64)> {
         if self.is_forced {
             let wi = self.boundary.sample_refraction(self.wo, stream.draw2())?;
             return Some((Event::Refract, wi, self.boundary.pdf_refraction(self.wo, wi)));
         }
         let BoundarySample { wi, density, event, .. } = self.boundary.sample(self.wo, stream.draw3())?;
-        // The rough surface has no delta lobe: a density that says so is wrong.
+        // The rough surface has no delta lobe: a density that claims one is wrong.
         let pdf = if let Density::Finite(pdf) = density { pdf } else { f64::NAN };
         Some((event, wi, pdf))
     }

@@ -94,7 +94,7 @@ fn area(Triangle([a, b, c]): &Triangle) -> f64 {
     0.25 * ((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))).sqrt()
 }
 
-/// One triangle.
+/// Sampler of uniform points on one triangle.
 pub struct TriangleSampler {
     triangle: Triangle,
 }

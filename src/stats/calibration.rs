@@ -1,4 +1,4 @@
-//! The verifier verified: every kind of test plays null hypotheses that are true by construction, and its
+//! The verifier verified: every kind of test is run on null hypotheses that are true by construction, and its
 //! p-values must be uniform (or conservative, where that is all it promises). Driven by ChaCha, a generator
 //! of another family than the program's; seeds are hashes of names.
 //!

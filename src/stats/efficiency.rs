@@ -100,7 +100,7 @@ impl fmt::Display for NoRatio {
         f.write_str(match self {
             NoRatio::TooFewBlocks => "an arm has too few blocks, or an empty one",
             NoRatio::NotFinite => "a moment or a cost is not finite, or a cost is not positive",
-            NoRatio::ZeroVariance => "an arm has no variance, at least without one of its blocks",
+            NoRatio::ZeroVariance => "an arm has zero variance, at least without one of its blocks",
         })
     }
 }
@@ -113,7 +113,7 @@ pub struct LogRatio {
 }
 
 impl LogRatio {
-    /// The ratio itself.
+    /// Estimate of the ratio.
     pub fn ratio(&self) -> f64 {
         exp(self.log.value)
     }
@@ -157,13 +157,13 @@ pub struct ArmSummary {
 pub struct Efficiency {
     /// V_A c_A / (V_B c_B): below 1 where A is the more efficient.
     pub work: LogRatio,
-    /// V_A / V_B.
+    /// Ratio of the variances, V_A / V_B.
     pub variance: LogRatio,
-    /// c_A / c_B.
+    /// Ratio of the costs per pass, c_A / c_B.
     pub cost: LogRatio,
-    /// Arm A.
+    /// Variance and cost of arm A.
     pub a: ArmSummary,
-    /// Arm B.
+    /// Variance and cost of arm B.
     pub b: ArmSummary,
     /// Were the blocks deleted in pairs?
     pub is_joint: bool,
@@ -369,7 +369,7 @@ pub fn jackknife_log_error(without_one: &[f64]) -> f64 {
     ((n - 1.0) / n * logs.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>()).sqrt()
 }
 
-/// All blocks but one, for each: merged prefixes with merged suffixes, because taking a block out again by
+/// All blocks except one, for each: merged prefixes with merged suffixes, because taking a block out again by
 /// subtraction would cancel.
 fn without_each(blocks: &[JackknifeBlock]) -> Vec<Totals> {
     let mut after = vec![Totals::default()];

@@ -33,7 +33,7 @@ pub const LARGEST_SHIFT: f64 = 0.02;
 /// skewed values at the level 1e-3 rejected 2.5 times too often.
 pub const LARGEST_SKEW: f64 = 0.1;
 
-/// Why a test says nothing: never a pass.
+/// Why a test is void: never a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
     /// No samples, or fewer than two bins that can hold any.
@@ -54,12 +54,12 @@ pub enum Refusal {
     Thin {
         /// The bin, counted from 0.
         bin: usize,
-        /// Its expected count.
+        /// Expected count of the bin.
         expected: f64,
     },
     /// The probabilities do not sum to 1.
     NotNormalised {
-        /// Their sum.
+        /// Sum over the bins.
         sum: f64,
         /// How far from 1 their errors allow it to be.
         bound: f64,
@@ -106,7 +106,7 @@ impl fmt::Display for Refusal {
 /// One bin of a goodness-of-fit test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bin {
-    /// Its probability.
+    /// Probability of the bin.
     pub mass: f64,
     /// A bound of the error of `mass`; 0 with `mass` 0 for a bin that nothing may enter.
     pub error: f64,
@@ -125,7 +125,7 @@ pub struct Goodness {
     pub p_value: f64,
     /// The largest noncentrality that errors of the expectations cause.
     pub lambda_err: f64,
-    /// Samples in all.
+    /// Number of samples in all bins.
     pub samples: u64,
 }
 
@@ -150,7 +150,7 @@ impl Goodness {
 ///
 /// # Errors
 ///
-/// Every [`Refusal`] but those of means. A sample in an impossible bin is an outcome and comes first.
+/// Every [`Refusal`] except those of means. A sample in an impossible bin is an outcome and comes first.
 pub fn pearson(bins: &[Bin]) -> Result<Goodness, Refusal> {
     let is_probability = |x: f64| (0.0..=1.0).contains(&x);
     if let Some(bin) = bins.iter().position(|c| !is_probability(c.mass) || !is_probability(c.error)) {
@@ -193,9 +193,9 @@ fn resolved(lambda: f64, dof: f64) -> Result<(), Refusal> {
 /// The outcome of a test of one probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proportion {
-    /// Successes.
+    /// Number of successes.
     pub count: u64,
-    /// Trials.
+    /// Number of trials.
     pub samples: u64,
     /// The probability under test.
     pub mass: f64,
@@ -291,7 +291,7 @@ pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<ContrastT
 pub struct ContrastTest {
     /// The difference from the expected mean; its `detectable` is the contrast's.
     pub estimate: Estimate,
-    /// Its test.
+    /// Name, p-value and power of the test.
     pub test: Test,
     /// The largest noncentrality that the error of the expectation causes.
     pub lambda_err: f64,

@@ -8,9 +8,9 @@ pub use super::tails::{chi_square_sf, critical_value};
 /// error is known).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// The estimate.
+    /// Estimate of the mean.
     pub value: f64,
-    /// Its standard error.
+    /// Standard error of the estimate.
     pub std_error: f64,
     /// Degrees of freedom of the error.
     pub dof: f64,

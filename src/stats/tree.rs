@@ -36,7 +36,7 @@ impl<A: Merge, B: Merge> Merge for (A, B) {
 pub struct Node<T> {
     /// Logarithm of the number of passes.
     pub level: u32,
-    /// Their value.
+    /// Merged value of the node's passes.
     pub value: T,
 }
 

@@ -5,7 +5,7 @@
 //! quoted where the means agree, by the test that an `agree` claim would make, at a level of 1e-3 over the
 //! whole table (Bonferroni); its interval is for the reader, at 95 %. Whether it is resolved is judged as
 //! for claims (`verify::efficiency`). The metric is the sensor's first observable, by class; where it has pixels,
-//! `pixels` beside it: the variance of a pixel, averaged over the image. Controls stand in the table as candidates, by CPU time alone.
+//! `pixels` beside it: the variance of a pixel, averaged over the image. Controls are in the table as candidates, by CPU time alone.
 
 use serde::Serialize;
 
@@ -38,15 +38,15 @@ pub struct EfficiencyRow {
     pub class: String,
     /// Observable name; its variance is that of one pass. `pixels` for the variance of a pixel.
     pub metric: String,
-    /// The estimator that the other is held against.
+    /// The estimator that the other is compared with.
     pub baseline: String,
-    /// The other.
+    /// Estimator that is compared with the baseline.
     pub candidate: String,
     /// Variance times cost of the baseline over that of the candidate.
     pub efficiency_ratio: Option<f64>,
     /// Lower end of its interval.
     pub ci_low: Option<f64>,
-    /// Upper end.
+    /// Upper end of the confidence interval.
     pub ci_high: Option<f64>,
     /// Confidence of the interval.
     pub confidence: f64,
@@ -202,7 +202,7 @@ fn bias_objection(runs: &[&EstimatorRun]) -> Option<String> {
     })
 }
 
-/// Why the two cannot be said to estimate one number.
+/// Why the two cannot be taken to estimate one number.
 fn means_objection(
     stored: &Stored,
     candidate: &Quantity,
@@ -216,7 +216,7 @@ fn means_objection(
             (p < level || p.is_nan()).then(|| format!("the means differ, p = {p:.1e}"))
         }
         Evidence::Nothing(reason) => Some(format!("no mean test: {reason}")),
-        _ => Some("no variance".into()),
+        _ => Some("zero variance".into()),
     }
 }
 

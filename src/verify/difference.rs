@@ -2,7 +2,7 @@
 //!
 //! A quantity that both records hold is compared in one of four ways:
 //! - `identical`: the moments of every batch are the same bits. Nothing is left to test.
-//! - `paired t`: pass k of both was played on the same random numbers, so that the differences pass by pass
+//! - `paired t`: pass k of both was run on the same random numbers, so that the differences pass by pass
 //!   are what is left of a change in the program. They are independent from pass to pass, whatever a change
 //!   does to the numbers' use within one, so the t test of their batch means is valid, and sharper the more
 //!   alike the two programs are. Welch's test would take the shared noise for two noises.
@@ -126,7 +126,7 @@ struct RunPair<'a> {
 /// The random numbers of two runs of one name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Streams {
-    /// Pass k of both was played on the same ones.
+    /// Pass k of both was run on the same ones.
     Same,
     /// Each has its own.
     Others,
@@ -134,7 +134,7 @@ enum Streams {
     Unknown,
 }
 
-/// What names the random numbers of a pass: experiment, seed, bands, and the cell's physics but for what
+/// What names the random numbers of a pass: experiment, seed, bands, and the cell's physics except what
 /// the experiment pairs over. Neither claims nor budget.
 fn streams(a: &Stored, b: &Stored, cell_a: usize, cell_b: usize) -> Streams {
     let (a, b) = (&a.record, &b.record);
@@ -303,13 +303,13 @@ impl RunPair<'_> {
     }
 }
 
-/// The same bits.
+/// Whether two runs have the same bits.
 fn identical(a: &[Moments], b: &[Moments]) -> bool {
     let bits = |m: &Moments| m.to_array().map(f64::to_bits);
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| bits(a) == bits(b))
 }
 
-/// What the two records say differently of themselves, cells and runs that only one of them has included.
+/// Differences between the two records' descriptions, cells and runs that only one of them has included.
 fn changed_words(a: &Record, b: &Record) -> Vec<String> {
     let mut changes = Vec::new();
     let mut words = |what: &str, a: &str, b: &str| {

@@ -1,7 +1,7 @@
 //! Claims of efficiency: `faster` and `not_slower`.
 //!
 //! With V the variance of a pass and c its cost (all bands together: what a pass costs, whatever it scores),
-//! the efficiency ratio of a candidate A against a baseline B is E = V_B c_B / (V_A c_A). Both claims say
+//! the efficiency ratio of a candidate A against a baseline B is E = V_B c_B / (V_A c_A). Both claims state
 //! that E exceeds a bound e: `faster` e = ratio, `not_slower` e = 1 / margin, because the ratio of inverse
 //! efficiencies is 1 / E. ln E has a Student interval from a jackknife over blocks (`stats::efficiency`).
 //!
@@ -15,9 +15,9 @@
 //!   the two means agree: the test that an `agree` claim would make. An objection to it voids the claim;
 //!   E is resolved: it moved by no more than its 99.9 % interval when the passes doubled, and no pass may
 //!   hold more than 5 % of an arm's sum of squares;
-//!   by CPU time, the blocks are quadruples played side by side, A B .. B A, and the baseline against its own
+//!   by CPU time, the blocks are quadruples run side by side, A B .. B A, and the baseline against its own
 //!   control arm has 1 in the 99.9 % intervals of both E and the cost ratio. Quadruples that warmed a worker
-//!   up or were played in parts are left out whole: which ones they are has nothing to do with the scores.
+//!   up or were run in parts are left out whole: which ones these are does not depend on the scores.
 //!
 //! Then the claim
 //!   fails, where the p-value 2 min(p_mean, p_slow) is rejected in the family of all tests (Holm), with
@@ -82,7 +82,7 @@ pub fn contest(
     Ok(Contest { efficiency, side_by_side })
 }
 
-/// The quantity whose mean stands for that of `quantity`: itself, or the sensor's first observable for `pixels`.
+/// The quantity whose mean is reported for that of `quantity`: itself, or the sensor's first observable for `pixels`.
 pub(super) fn mean_of(stored: &Stored, quantity: &Quantity) -> Quantity {
     let first = stored.run(quantity).and_then(|run| run.observables.first());
     match first.filter(|_| quantity.observable.is_pixels()) {
@@ -217,7 +217,7 @@ fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<Effici
         Evidence::Difference { difference, .. } => difference,
         Evidence::Nothing(reason) => return Err(format!("no mean test: {reason}")),
         Evidence::Exact { holds: true, .. } => {
-            return Err("no variance: there is nothing to compare".into());
+            return Err("zero variance: there is nothing to compare".into());
         }
         _ => return Err("the means differ, without sampling error".into()),
     };
@@ -264,12 +264,12 @@ fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<Effici
     })
 }
 
-/// What the baseline against itself says of the machine.
+/// What the baseline against itself shows of the machine.
 fn control_objection(stored: &Stored, baseline: &Quantity) -> Option<String> {
     let runs = &stored.record.cells.get(baseline.cell)?.runs;
     let is_control = |run: &&EstimatorRun| run.control_of.as_deref() == Some(&*baseline.estimator);
     let Some(control) = runs.iter().find(is_control) else {
-        return Some(format!("no control: {} was not played twice", baseline.estimator));
+        return Some(format!("no control: {} was not run twice", baseline.estimator));
     };
     let control = Quantity { estimator: control.estimator.clone(), ..baseline.clone() };
     let contest = match contest(stored, &control, baseline, CostMeasure::Cpu) {

@@ -1,4 +1,4 @@
-//! What the numbers of one test show by themselves, before they are held against those of other tests.
+//! What the numbers of one test show by themselves, before they are adjusted for those of other tests.
 
 use super::levels::POWER;
 use super::verdict::{Outcome, Verdict};
@@ -102,9 +102,9 @@ fn test_of(difference: &Estimate, times: f64) -> Test {
 /// Counts against probabilities: what knows the smallest defect that it would have found.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum CountsFit {
-    /// Of many bins.
+    /// Chi-square over many bins.
     Bins(Goodness),
-    /// Of one outcome.
+    /// Exact binomial test of one outcome.
     Share(Proportion),
 }
 
@@ -141,7 +141,7 @@ pub(super) struct EfficiencyTest {
 }
 
 impl EfficiencyTest {
-    /// What it says, where the p-value adjusted over the family is `adjusted_p` and a test fails below
+    /// The outcome, where the p-value adjusted over the family is `adjusted_p` and a test fails below
     /// `level`; `own_level` is the level of this test alone. A control that expects failure wants it of E.
     pub fn outcome(
         &self,

@@ -38,7 +38,7 @@ impl Finding {
     }
 }
 
-/// What a family says.
+/// The verdicts of a family.
 pub(super) struct Concluded {
     /// One verdict a finding.
     pub verdicts: Vec<Verdict>,
@@ -109,7 +109,7 @@ fn state(
     tests: f64,
 ) -> Verdict {
     let Finding { evidence, relative_to, detect, one_look, mut verdict } = finding;
-    // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
+    // The hardest of Holm's steps, so that `detectable` holds whatever the outcomes of the other tests.
     let own_level = looks.first(one_look) / tests;
     if let Some(test) = evidence.test() {
         verdict.statistic = known(test.statistic);

@@ -18,13 +18,13 @@ const TABLE: usize = 10;
 /// A record to judge.
 #[derive(Clone, Copy, Debug)]
 pub struct Case<'a> {
-    /// What was measured.
+    /// Record of the main run.
     pub main: &'a Stored,
     /// What was measured again for a second look, where there was one.
     pub retest: Option<&'a Stored>,
 }
 
-/// What a verification says.
+/// The result of a verification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
     /// One verdict a comparison, case by case.
@@ -38,7 +38,7 @@ pub struct Judgement {
 /// What wants a second look.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookAgain {
-    /// The case.
+    /// Index of the case.
     pub case: usize,
     /// What is to be measured again.
     pub subject: Measured,
@@ -199,7 +199,7 @@ fn expect(verdict: &mut Verdict, main: &Stored, claim: usize) {
     let expects = main.record.statements[claim].expects;
     verdict.outcome = expected_outcome(expects, found, &mut verdict.note);
     if main.record.post_hoc.contains(&claim) {
-        let reason = "post hoc: claimed when passes had been played; another seed makes it evidence";
+        let reason = "post hoc: claimed when passes had been run; another seed makes it evidence";
         verdict.note = reason.into();
         verdict.outcome = Outcome::Invalid(reason.into());
     }

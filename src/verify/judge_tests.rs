@@ -135,7 +135,7 @@ fn estimators_agree_and_differ() {
     let good = agree(stored(0.1), false);
     assert_eq!((good.outcome, good.test), (Outcome::Pass, Some(TestKind::WelchT)));
     assert_eq!(good.estimators, "mis vs snee");
-    // A defect of 2 % that only pairing can see: both play the same noise.
+    // A defect of 2 % that only pairing can see: both have the same noise.
     let mut s = stored(0.1);
     set_observables(&mut s, "mis", |i, _, _| 1.0 + 0.1 * uniform(i));
     set_observables(&mut s, "snee", |i, _, _| 1.02 + 0.1 * uniform(i) + 0.01 * uniform(i + 9999));

@@ -24,7 +24,7 @@ pub fn to_junit(verdicts: &[Verdict]) -> String {
 }
 
 fn case(v: &Verdict) -> String {
-    // Of a sampler, the test says what is tested.
+    // Of a sampler, the test's name states what is tested.
     let what = if v.observable.is_empty() { v.test_name() } else { v.observable.clone() };
     let parts = [&v.cell, &v.band, &what, &v.class, &v.estimators];
     let name: Vec<&str> =

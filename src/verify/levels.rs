@@ -50,7 +50,7 @@ pub enum Looks {
         /// The probability of any false failure.
         level: f64,
     },
-    /// Second looks are, or can be, at hand.
+    /// Second looks exist or can be run.
     Two,
 }
 

@@ -1,4 +1,4 @@
-//! A mean held against a value or against another mean, and why that may mean nothing.
+//! A mean compared with a value or with another mean, and why the comparison may be void.
 
 use super::evidence::Evidence;
 use super::levels::SHARED_ERROR;
@@ -98,7 +98,7 @@ impl<'a> QuantityMean<'a> {
 /// What a claim asks of the means that it is about.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asked {
-    /// They are to be equal: an estimator with a bias cannot say so.
+    /// They are to be equal: an estimator with a bias cannot claim that.
     agreement: bool,
     /// A difference is to be found, so that a reason for one is no objection.
     difference: bool,
@@ -120,19 +120,19 @@ impl Asked {
     }
 }
 
-/// What a mean is held against.
+/// What a mean is compared with.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Reference<'a> {
     /// A value with its stated error.
     Value(Estimate),
-    /// Another mean; `paired` where both were played on the same random streams.
+    /// Another mean; `paired` where both were run on the same random streams.
     Mean { quantity: &'a Quantity, paired: bool },
 }
 
 /// What holding a mean against its reference shows.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Held {
-    /// The evidence.
+    /// Evidence of the comparison.
     pub evidence: Evidence,
     /// The test, where it came to one.
     pub test: Option<TestKind>,
@@ -140,7 +140,7 @@ pub(super) struct Held {
     pub deviation: Option<f64>,
     /// The mean, where the record holds it.
     pub value: Option<Estimate>,
-    /// What it was held against, where that is known.
+    /// What it was compared with, where that is known.
     pub expected: Option<Estimate>,
     /// A second look would share this one's errors.
     pub one_look: bool,
@@ -234,7 +234,7 @@ fn objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Opti
         .or_else(|| silence_objection(quantity, means, asked))
 }
 
-/// A biased estimator agrees with nothing by right; a control may say that it differs.
+/// A biased estimator may not claim to agree; a control may state that it differs.
 fn bias_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
     if !asked.agreement || asked.difference {
         return None;
@@ -245,7 +245,7 @@ fn bias_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
     })
 }
 
-/// Estimators of different integrals owe each other nothing; a control may say that they differ.
+/// Estimators of different integrals need not agree; a control may state that they differ.
 fn model_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
     let [a, b] = means else { return None };
     if asked.difference || a.run.model == b.run.model {

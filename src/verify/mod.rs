@@ -12,7 +12,7 @@ pub mod levels;
 
 /// Verdicts for continuous integration.
 pub mod junit;
-/// What verification says.
+/// Verdicts: the outcome of every test, as it is shown.
 pub mod verdict;
 
 /// Efficiencies of all pairs of estimators.

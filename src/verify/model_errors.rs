@@ -16,17 +16,17 @@ pub struct ModelError {
     pub cell: String,
     /// Band name.
     pub band: String,
-    /// What was measured.
+    /// Observable that is compared.
     pub observable: Observable,
     /// The estimator of the model.
     pub estimator: String,
-    /// The model.
+    /// Name of the model.
     pub model: String,
-    /// Its mean.
+    /// Mean of the model's estimator.
     pub value: Estimate,
     /// The estimator of the truth.
     pub truth: String,
-    /// Its mean.
+    /// Mean of the transport estimator.
     pub expected: Estimate,
     /// (value - expected) / expected, with its error by the delta method.
     pub relative: Estimate,

@@ -30,7 +30,7 @@ pub struct Nights {
     pub tests: BTreeMap<String, Accumulated>,
 }
 
-/// What the nights say against one statement.
+/// The evidence of the nights against one statement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Accumulated {
@@ -45,7 +45,7 @@ pub struct Accumulated {
 }
 
 impl Nights {
-    /// Adds a night of verdicts played on the streams `token`; `code` says of an experiment what fixes its
+    /// Adds a night of verdicts obtained on the streams `token`; `code` gives of an experiment what fixes its
     /// numbers. False where that night had been counted before: nothing is added then.
     pub fn add(&mut self, token: &str, verdicts: &[Verdict], code: impl Fn(&str) -> String) -> bool {
         if self.tokens.iter().any(|t| t == token) {

@@ -21,9 +21,9 @@ const HALF_WIDTH: f64 = 1.96;
 /// One pair of estimators in both records.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimingRatio {
-    /// The first record's.
+    /// Row of the first record.
     pub before: EfficiencyRow,
-    /// The second record's.
+    /// Row of the second record.
     pub after: EfficiencyRow,
     /// The second's ratio over the first's.
     pub change: f64,

@@ -40,7 +40,7 @@ impl Trial {
     }
 }
 
-/// A verdict on a claim of which nothing is said yet.
+/// A verdict on a claim that is not judged yet.
 pub(super) fn blank(record: &Record, claim: &Claim) -> Verdict {
     Verdict {
         experiment: record.experiment.clone(),

@@ -1,4 +1,4 @@
-//! What verification says.
+//! Verdicts of verification.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 use crate::results::csv_text;
 use crate::results::record::CostMeasure;
 
-/// What verification says of one comparison. Only a pass is green.
+/// The verdict on one comparison. Only a pass is green.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The claim holds, as far as the test can see.
@@ -60,7 +60,7 @@ pub enum TestKind {
     SumOfSquares,
     /// Variance times cost.
     Efficiency(CostMeasure),
-    /// Passes that were played again.
+    /// Passes that were run again.
     Replay,
     /// The checksum of a record's numbers.
     Checksum,
@@ -152,7 +152,7 @@ impl Serialize for TestKind {
     }
 }
 
-/// One comparison's verdict; as it stands here, a row of `verdicts.csv`.
+/// One comparison's verdict; a row of `verdicts.csv`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Verdict {
     /// Experiment name.
@@ -182,11 +182,11 @@ pub struct Verdict {
     pub outcome: Outcome,
     /// Observable name.
     pub observable: String,
-    /// What was measured.
+    /// Measured value.
     pub value: Option<f64>,
     /// Its standard error, from the spread of the batches.
     pub std_error: Option<f64>,
-    /// What it was held against.
+    /// What it was compared with.
     pub expected: Option<f64>,
     /// The stated or measured standard error of that.
     pub expected_error: Option<f64>,

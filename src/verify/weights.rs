@@ -13,7 +13,7 @@ use crate::results::store::Stored;
 /// ```
 ///
 /// What they are worth: they predicted the CPU time of each of those 27 runs to 15 %; a rough boundary under
-/// a sky costs more than they say, because light samples below the horizon are not counted. They predict
+/// a sky costs more than they predict, because light samples below the horizon are not counted. They predict
 /// together; one by one they mean little, because in a path tracer rays are paths, medium events and
 /// boundary events together: of the fits that are equally good this one charges the rays. They are those of
 /// the unit sphere: a ray costs more in a mesh of many triangles. The last five are what a point of a cloud costs, what a
@@ -77,9 +77,9 @@ fn weight(name: &str) -> Option<f64> {
 /// Counts of one run in the order of [`WEIGHTS`], and what it took, CPU nanoseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedRun {
-    /// The counts.
+    /// Work per path, by kind.
     pub counts: [f64; WEIGHTS.len()],
-    /// The time.
+    /// CPU time per path, ns.
     pub nanoseconds: f64,
 }
 

@@ -1,5 +1,5 @@
 //! Acceptance by distance a second time, with places for defects: a point at distance d is accepted with
-//! p = e^(-m d) and weighs 1/p, alone or in a cloud of two nodes.
+//! p = e^(-m d) and has weight 1/p, alone or in a cloud of two nodes.
 //!
 //! | view | one draw | the law |
 //! |---|---|---|
@@ -53,7 +53,7 @@ const NODE: usize = POINTS / 2;
 /// The first 24 bits of a number that has them all 0: it is below 2^-24.
 const BITS: i32 = 24;
 
-/// The sampler.
+/// Sampler of accepted points, with planted defects.
 pub struct Acceptance {
     view: View,
     defect: Defect,
@@ -250,12 +250,12 @@ const fn acceptance(
     of(Family::Acceptance, row(name, defect, what, expected))
 }
 
-/// Every defect here.
+/// Defects that this sampler plants.
 pub const ROWS: &[Planted] = &[
     acceptance(
         "accept-exponent",
         Defect::ExponentOff,
-        "points are accepted with e^(-1.01 m d) and weigh e^(m d)",
+        "points are accepted with e^(-1.01 m d) and have weight e^(m d)",
         &["acceptance.null", "acceptance.chi2 coarse"],
     ),
     acceptance(
@@ -267,13 +267,13 @@ pub const ROWS: &[Planted] = &[
     acceptance(
         "accept-weight-of-mean",
         Defect::WeightOfMean,
-        "points are accepted with red's coefficient and weigh by the mean's",
+        "points are accepted with red's coefficient and have the weight of the mean's",
         &["acceptance.null", "acceptance.chi2 coarse"],
     ),
     acceptance(
         "accept-coarse-uniform",
         Defect::CoarseUniform,
-        "the number that decides has 24 bits: it cannot be below p < 2^-24, but for 0",
+        "the number that decides has 24 bits: it cannot be below p < 2^-24, except for 0",
         &["thinning.null"],
     ),
     acceptance(

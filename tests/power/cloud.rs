@@ -3,7 +3,7 @@
 //! that one direction with the density cos / pi brings, and camera paths that are refracted into the body with
 //! probability T21 and find there
 //!   L = 1/M sum_p K(d_p) Phi_p B_p / p(d_p),   B_p = 1 with probability p(d_p),
-//! K = R_d / pi of the classical dipole (Jensen, Marschner, Levoy & Hanrahan 2001). Nothing but multiple scattering is scored; a
+//! K = R_d / pi of the classical dipole (Jensen, Marschner, Levoy & Hanrahan 2001). Only multiple scattering is scored; a
 //! convex body shades nothing of itself.
 
 use std::f64::consts::PI;
@@ -23,11 +23,11 @@ use serde::{Deserialize, Serialize};
 
 use super::defects::{Defect, Family, Planted, of, row};
 
-/// p(d).
+/// Forms of the acceptance probability p(d).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Rule {
-    /// 1.
+    /// All points: p = 1.
     All,
     /// e^(-sigma_tr d) with each band's own, bands apart.
     Band,
@@ -185,7 +185,7 @@ impl Cloud {
         Lit { point, flux: std::array::from_fn(|band| scale * self.scene.lights[0].eval(band, wi).0) }
     }
 
-    /// What an accepted point weighs that was accepted with e^(-sigma d).
+    /// Weight of a point that was accepted with e^(-sigma d).
     fn weight(&self, sigma: f64, d: f64) -> f64 {
         match self.defect {
             Defect::NoReweighting => 1.0,
@@ -269,7 +269,7 @@ const fn cloud(
     of(Family::Cloud, row(name, defect, what, expected))
 }
 
-/// Every defect here.
+/// Defects that this estimator plants.
 pub const ROWS: &[Planted] = &[
     cloud(
         "cloud-face-count-missing",
@@ -292,13 +292,13 @@ pub const ROWS: &[Planted] = &[
     cloud(
         "cloud-mean-weighs-band",
         Defect::MeanWeighsBand,
-        "bands accept by their own coefficients and weigh by the mean's",
+        "bands accept by their own coefficients and have the weight of the mean's",
         &["cloud.red", "cloud.blue", "cloud.rules agree"],
     ),
     cloud(
         "cloud-no-reweighting",
         Defect::NoReweighting,
-        "accepted points weigh 1",
+        "accepted points have weight 1",
         &["cloud.red", "cloud.green", "cloud.blue", "cloud.rules agree"],
     ),
     cloud(

@@ -62,16 +62,16 @@ pub struct Ends {
     pub start: Vertex,
     pub x_j: DVec3,
     pub exit: Hit,
-    /// w_L.
+    /// Unit direction w_L towards the light.
     pub to_light: DVec3,
     pub light: usize,
 }
 
 /// What an interface does between w_kj and w_L.
 struct Through {
-    /// f_t |n.w_L|.
+    /// Value of the integrand, f_t |n.w_L|.
     value: f64,
-    /// 1 - F.
+    /// Probability 1 - F of refraction.
     select: f64,
     /// p(w_L | w_kj) and p(w_kj | w_L), refraction being certain.
     fwd: f64,
@@ -128,9 +128,9 @@ impl Model<'_> {
     }
 
     /// The integrand without the light's radiance, and the densities; those of calls are left out where they do
-    /// not play. `is_first_hit` says that x_k was found from x_i; else it is looked for. `p_light` is the
-    /// light's density, chance of the light included, and that chance alone for parallel light. What stands
-    /// between x_i and x_j, x_j and x_k, x_k and the light is for the caller to ask.
+    /// not take part. `is_first_hit` states that x_k was found from x_i; else it is searched. `p_light` is the
+    /// light's density, chance of the light included, and that chance alone for parallel light. The caller
+    /// tests occlusion between x_i and x_j, x_j and x_k, x_k and the light.
     pub fn evaluate(
         &self,
         ends: &Ends,
@@ -173,10 +173,10 @@ impl Model<'_> {
         let bsdf = if is_parallel { 0.0 } else { prefix * select * through.fwd };
         let lit = if self.is_smooth() { 0.0 } else { prefix * p_light };
 
-        let [plays_top, plays_bottom] =
-            [TOP_TO_BOTTOM, BOTTOM_TO_TOP].map(|index| technique.plays(index, self));
+        let [uses_top, uses_bottom] =
+            [TOP_TO_BOTTOM, BOTTOM_TO_TOP].map(|index| technique.uses(index, self));
         let cos_ik = w_ik.dot(exit.normal);
-        let is_called = plays_top || plays_bottom;
+        let is_called = uses_top || uses_bottom;
         let is_seen = |scores: &mut Scores| {
             let ignored = self.defect == Defect::FirstHitIgnored;
             cos_ik > 0.0 && (ignored || self.is_clear(x_k, start.point, Some(&exit), scores))
@@ -196,11 +196,11 @@ impl Model<'_> {
             _ => 1.0 / (d_jk * d_jk),
         };
         let mut densities = [bsdf, lit, 0.0, 0.0];
-        if plays_top {
+        if uses_top {
             let down = self.pdf_down(-ik, -w_jk, d_jk) * at_j_from_k;
             densities[TOP_TO_BOTTOM] = probe * p_light * through.rev * down;
         }
-        if plays_bottom && !is_parallel {
+        if uses_bottom && !is_parallel {
             let towards = TowardsPoint::new(ik).map_or(0.0, |towards| towards.pdf(w_ij));
             let along = equiangular(ik, w_ij, f64::INFINITY, d_ij);
             let bottom = probe * (0.5 * h_i + 0.5 * towards) * along * at_j * through.fwd;

@@ -1,4 +1,4 @@
-//! The catalogue of planted defects: where each stands, and which tests are expected to see it.
+//! The catalogue of planted defects: where each is planted, and which tests are expected to see it.
 
 use std::sync::OnceLock;
 
@@ -105,14 +105,14 @@ pub enum Defect {
     PixelsForPasses,
 }
 
-/// Where a defect stands, and so what is played to find it.
+/// Where a defect is planted, and so what is run to find it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// In the path tracer.
     Tracer,
     /// In subdivision next-event estimation.
     Subdivision,
-    /// In a sampler.
+    /// In a sampler of the catalogue.
     Sampler,
     /// In the acceptance of points by distance.
     Acceptance,
@@ -120,7 +120,7 @@ pub enum Family {
     Cloud,
     /// In the verifier's arithmetic.
     Verifier,
-    /// Nowhere.
+    /// In no part: a control.
     Sham,
 }
 
@@ -129,9 +129,9 @@ pub enum Family {
 pub struct Planted {
     /// Its name on the command line and in tables.
     pub name: &'static str,
-    /// The defect.
+    /// Defect that is planted.
     pub defect: Defect,
-    /// Where it stands.
+    /// Part of the program that it is planted in.
     pub family: Family,
     /// What is wrong, in one line.
     pub what: &'static str,
@@ -225,7 +225,7 @@ pub const TRACER: &[Planted] = &[
     row(
         "mis-sample-count",
         Defect::MisSampleCountWrong,
-        "MIS weighs interface samples as if one light sample were drawn, not two",
+        "MIS weights interface samples as if one light sample were drawn, not two",
         &["rough.lamp", "matched.sky", "furnace.matched"],
     ),
     row(
@@ -305,7 +305,7 @@ pub const TRACER: &[Planted] = &[
         &["matched.single"],
     ),
     row("other-band", Defect::OtherBand, "every band has the albedo of the first", &["rough.multiple"]),
-    row("band-missing", Defect::BandMissing, "the last of several bands is not played", &["rough.sun"]),
+    row("band-missing", Defect::BandMissing, "the last of several bands is not traced", &["rough.sun"]),
     row(
         "sine-missing",
         Defect::SineMissing,
@@ -613,7 +613,7 @@ const fn verifier(
     of(Family::Verifier, row(name, defect, what, expected))
 }
 
-/// Defects that stand where this program cannot plant them, and the test of the library that holds the code
+/// Defects in places where this program cannot plant them, and the test of the library that holds the code
 /// to the opposite.
 pub const UNIT_TESTED: &[(&str, &str)] = &[
     (
@@ -652,7 +652,7 @@ pub fn all() -> Vec<Planted> {
     std::iter::once(SHAM).chain(planted.copied()).collect()
 }
 
-/// All names.
+/// Names of all defects.
 pub fn names() -> Vec<&'static str> {
     all().iter().map(|row| row.name).collect()
 }

@@ -25,7 +25,7 @@ mod defects;
 mod identities;
 mod lobes;
 mod matrix;
-mod plays;
+mod runs;
 mod samplers;
 mod subdivision;
 mod surface;
@@ -169,9 +169,9 @@ fn tests(words: &[String]) -> ExitCode {
     if rows.is_empty() || has("--ignored") {
         return ExitCode::SUCCESS;
     }
-    let plays: Vec<_> = rows.iter().map(|row| (*row, 0)).collect();
+    let runs: Vec<_> = rows.iter().map(|row| (*row, 0)).collect();
     let mut survived = 0;
-    plays::all(&plays, |row, _, outcome| {
+    runs::all(&runs, |row, _, outcome| {
         let found = matrix::judge(row, outcome);
         survived += usize::from(found.is_err());
         let (verdict, text) = match found {

@@ -1,4 +1,4 @@
-//! Whole paths with subdivision next-event estimation, and an analog light tracer to hold them against:
+//! Whole paths with subdivision next-event estimation, and an analog light tracer to compare them with:
 //! both the test's own. Where a path ends in two scatterings and an exit, `connection`'s four techniques
 //! share it; the rest has interface and light samples alone. Survival at every medium vertex is albedo, so
 //! that the throughput on arrival at a vertex is albedo times what came in through the surface.
@@ -41,7 +41,7 @@ impl Estimator for Subdivision {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         for &band in bands {
             for index in 0..self.scene.sensor.rays_per_pass() {
-                self.play(band, index, key, scores);
+                self.trace(band, index, key, scores);
             }
         }
     }
@@ -61,7 +61,7 @@ struct Path<'a> {
 }
 
 impl Subdivision {
-    fn play(&self, band: usize, index: usize, key: &PassKey, scores: &mut Scores) {
+    fn trace(&self, band: usize, index: usize, key: &PassKey, scores: &mut Scores) {
         let mut sensor = key.stream(index as u64, Purpose::Sensor);
         let ([a, b], [c, d]) = (sensor.draw2(), sensor.draw2());
         let seen = self.scene.sensor.ray(index, [a, b, c, d]);
@@ -214,7 +214,7 @@ impl Path<'_> {
     }
 }
 
-/// Photons from the lights: everything is drawn as nature draws it, but for the facets' shadowing, which
+/// Photons from the lights: everything is drawn as nature draws it, except the facets' shadowing, which
 /// weighs (light has no eta^2: that is radiance's).
 pub struct Photons {
     pub scene: Arc<Scene>,
@@ -227,7 +227,7 @@ impl Estimator for Photons {
             for index in 0..self.scene.sensor.rays_per_pass() {
                 let mut stream = key.stream(index as u64, Purpose::Walk);
                 scores.count(Cost::Paths);
-                self.play(band, &mut stream, scores);
+                self.trace(band, &mut stream, scores);
             }
         }
     }
@@ -235,7 +235,7 @@ impl Estimator for Photons {
 
 impl Photons {
     /// One photon: power = radiance / density times the disc of the body's sphere across the direction.
-    fn play(&self, band: usize, stream: &mut Stream, scores: &mut Scores) -> Option<()> {
+    fn trace(&self, band: usize, stream: &mut Stream, scores: &mut Scores) -> Option<()> {
         let scene = &*self.scene;
         let Sensor::BodyFlux(BodyFlux { bounds, frame, bins, paths }) = &scene.sensor else {
             return None;

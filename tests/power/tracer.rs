@@ -45,10 +45,10 @@ impl Estimator for Tracer {
             Defect::PassesShareStream => self.first_pass.get_or_init(|| *key),
             _ => key,
         };
-        let played = self.scene.bands();
+        let count = self.scene.bands();
         let mut sums = BTreeMap::new();
         for &band in bands {
-            if self.defect == Defect::BandMissing && played > 1 && band == played - 1 {
+            if self.defect == Defect::BandMissing && count > 1 && band == count - 1 {
                 continue;
             }
             for index in 0..self.scene.sensor.rays_per_pass() {
@@ -58,7 +58,7 @@ impl Estimator for Tracer {
                     Defect::PathTwice if index == 0 => 2.0,
                     _ => 1.0,
                 };
-                Path::play(self, band, index, key, times, &mut sums, scores);
+                Path::trace(self, band, index, key, times, &mut sums, scores);
             }
         }
     }
@@ -67,7 +67,7 @@ impl Estimator for Tracer {
 /// f32 sums by slot, band, class and light, of [`Defect::SinglePrecision`].
 type Sums = BTreeMap<(usize, usize, TransportClass, usize), f32>;
 
-/// One path.
+/// State of one path.
 struct Path<'a> {
     scene: &'a Scene,
     defect: Defect,
@@ -89,7 +89,7 @@ struct Path<'a> {
 }
 
 impl<'a> Path<'a> {
-    fn play(
+    fn trace(
         tracer: &'a Tracer,
         band: usize,
         index: usize,
@@ -197,7 +197,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// A scattering event.
+    /// Samples a scattering event.
     fn scatter(&mut self) -> Option<()> {
         self.scores.count(Cost::MediumEvents);
         self.events += 1;

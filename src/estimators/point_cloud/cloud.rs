@@ -1,7 +1,7 @@
 //! Phase one: points of the surface with the flux that enters there, in the order of their hierarchy.
 //!
 //! A point's random numbers are those of its index, so the flux is computed after the hierarchy has put
-//! the points in order, from the same numbers again: nothing but positions is ever moved.
+//! the points in order, from the same numbers again: only positions are ever moved.
 
 use crate::estimators::emergence::BssrdfScene;
 use crate::geometry::{BodyPoint, BodySampler, Ray};
@@ -36,7 +36,7 @@ struct Incidence {
 }
 
 impl Cloud {
-    /// Draws `count` points.
+    /// Draws `count` points on the surface of the body.
     pub fn new(bssrdf: &BssrdfScene, sampler: &BodySampler, count: usize, key: &PassKey) -> Cloud {
         let scene = &*bssrdf.scene;
         let point = |index: u32| {
@@ -111,7 +111,7 @@ impl Cloud {
         Some(Incidence { light, wi: sample.wi, cos, scale: 1.0 / density })
     }
 
-    /// Number of points.
+    /// Number of surface points M.
     pub fn len(&self) -> usize {
         self.tree.len()
     }

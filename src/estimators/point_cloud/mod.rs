@@ -40,7 +40,7 @@ use crate::scene::Scene;
 
 pub use crate::sampling::thinning::Search;
 
-/// The probability p(d) with which a point at distance d is evaluated, and weighs 1/p.
+/// The probability p(d) with which a point at distance d is evaluated; its weight is 1/p.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum AcceptanceRule {
@@ -78,7 +78,7 @@ const HEAVY: f64 = 3.0;
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointCloudOptions {
-    /// The BSSRDF.
+    /// BSSRDF model.
     pub model: Model,
     /// Points of the surface that a pass draws.
     #[serde(default = "ten_thousand")]
@@ -87,7 +87,7 @@ pub struct PointCloudOptions {
     /// How points are drawn: faces (triangles) by area, or by index as published.
     #[serde(default)]
     pub faces: FaceChoice,
-    /// The probability p(d) with which a point at distance d is evaluated, and weighs 1/p.
+    /// The probability p(d) with which a point at distance d is evaluated; its weight is 1/p.
     #[serde(default)]
     pub acceptance: AcceptanceRule,
     /// How accepted points are found; both have the same law.
@@ -207,7 +207,7 @@ impl Estimator for PointCloud {
             for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
                 let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut sum = CloudSum { estimator: self, cloud: &cloud, streams };
-                self.bssrdf.play(&group, index, key, scores, &mut sum);
+                self.bssrdf.trace(&group, index, key, scores, &mut sum);
             }
         }
     }

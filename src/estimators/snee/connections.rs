@@ -200,7 +200,7 @@ fn score_subdivided<B: WalkBands>(
 }
 
 impl<B: WalkBands> CameraWalk<'_, Connections<'_>, B> {
-    /// Whether something stands between an exit and the light.
+    /// Whether something is between an exit and the light.
     fn is_shadowed(&mut self, exit: &WalkExit, w_l: DVec3) -> bool {
         self.scores.count(Cost::ShadowRays);
         let shadow = Ray { origin: exit.hit.point, dir: w_l };

@@ -12,7 +12,7 @@ pub(super) struct Guide {
     pub light: usize,
     /// Probability of choosing it among the guides.
     pub choice: f64,
-    /// Towards its middle.
+    /// Unit direction towards the middle of the guide's cap.
     pub axis: DVec3,
     /// Half the angle that it covers, rad; 0 for parallel light.
     pub half_angle: f64,

@@ -162,7 +162,7 @@ pub(super) struct GuidedEnd<'a> {
     pub exit: WalkExit,
     /// From x_j to x_k.
     pub leg: Leg,
-    /// Towards the light.
+    /// Unit direction towards the light.
     pub w_l: DVec3,
     /// Of the light, where it is known from the draw.
     pub radiance: Option<f64>,

@@ -145,13 +145,13 @@ impl Estimator for Snee {
                 let u = key.stream(index as u64, Purpose::Hero).draw();
                 let hero = ((u * media.len() as f64) as usize).min(media.len() - 1);
                 let path = Path { field: &self.field, band: hero, index, key };
-                self.play(0, path, scores, SharedBands::new(media, hero));
+                self.trace(0, path, scores, SharedBands::new(media, hero));
             }
         } else {
             for &band in bands {
                 for index in 0..rays {
                     let path = Path { field: &self.field, band, index, key };
-                    self.play(band, path, scores, OneBand);
+                    self.trace(band, path, scores, OneBand);
                 }
             }
         }
@@ -167,7 +167,7 @@ impl Estimator for Snee {
         if !(bsdf && light) {
             notes.push(
                 "`strategies` leaves out a part of unidirectional sampling: of paths whose last two medium vertices \
-                 follow each other, what only that part finds is missing (not dark)"
+                 follow each other, what only that part finds is excluded from this estimator's result"
                     .into(),
             );
         }
@@ -183,8 +183,8 @@ fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
     let missing = parallel.map(|light| {
         format!(
             "through a smooth boundary, directional light `{}` is found by {technique} alone: surface, single, \
-             single_internal and what has one medium vertex after its last internal reflection are missing (not \
-             dark)",
+             single_internal and what has one medium vertex after its last internal reflection are excluded from \
+             this estimator's result",
             light.name
         )
     });
@@ -192,13 +192,19 @@ fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
 }
 
 impl Snee {
-    fn play<B: super::bands::WalkBands>(&self, setup: usize, path: Path, scores: &mut Scores, bands: B) {
+    fn trace<B: super::bands::WalkBands>(
+        &self,
+        setup: usize,
+        path: Path,
+        scores: &mut Scores,
+        bands: B,
+    ) {
         let setup = &self.setups[setup];
         if setup.guides.is_empty() {
-            CameraWalk::play(path, scores, Unrivalled, bands);
+            CameraWalk::trace(path, scores, Unrivalled, bands);
         } else {
             let stream = path.key.stream(path.index as u64, Purpose::Connection);
-            CameraWalk::play(path, scores, Connections::new(setup, stream), bands);
+            CameraWalk::trace(path, scores, Connections::new(setup, stream), bands);
         }
     }
 }

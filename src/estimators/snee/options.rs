@@ -14,7 +14,7 @@ use crate::estimators::Roulette;
 pub struct SneeOptions {
     /// Russian roulette of the walk.
     pub roulette: Roulette,
-    /// What takes part.
+    /// Sampling techniques that take part.
     pub strategies: Strategies,
     /// How often an edge is subdivided.
     pub call: Call,
@@ -22,7 +22,7 @@ pub struct SneeOptions {
     pub call_alone: Call,
     /// Whether distances end at the boundary (one more ray for every density) or run on and may fail.
     pub truncated: bool,
-    /// Directions of probes.
+    /// Shares of the densities that directions of probes are drawn from.
     pub probe: ProbeShares,
     /// Directions from x_i, bottom to top.
     pub joint: JointKind,
@@ -119,7 +119,7 @@ pub enum SneePreset {
     Guided,
 }
 
-/// A technique.
+/// Technique that samples the last edge of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EdgeTechnique {
@@ -172,7 +172,7 @@ pub enum BandWalks {
 }
 
 impl SneePreset {
-    /// Its options.
+    /// Options that the preset denotes.
     pub fn options(self) -> SneeOptions {
         let all = Strategies { bsdf: true, light: true, top_to_bottom: true, bottom_to_top: true };
         match self {

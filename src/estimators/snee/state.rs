@@ -24,7 +24,7 @@ pub(super) struct WalkVertex {
 pub(super) enum Slot {
     /// The walk's last but one.
     Previous,
-    /// The walk's last.
+    /// The walk's last vertex.
     Latest,
     /// The one by which subdivision goes on from the walk's last.
     Drawn,
@@ -42,7 +42,7 @@ struct Held {
 pub(super) struct Connections<'a> {
     pub setup: &'a BandSetup,
     pub stream: Stream,
-    /// By [`Slot`].
+    /// Vertices held, indexed by [`Slot`].
     held: [Held; 3],
     /// Medium vertices since the boundary was last met.
     pub count: u32,

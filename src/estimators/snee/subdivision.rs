@@ -145,7 +145,7 @@ pub(super) struct Subdivided<'a> {
     pub x_j: DVec3,
     pub middle: Middle,
     pub exit: WalkExit,
-    /// Towards the light.
+    /// Unit direction towards the light.
     pub w_l: DVec3,
     /// Of the light, where it is known from the draw.
     pub radiance: Option<f64>,

@@ -42,7 +42,7 @@ fn claims_name_known_estimators() {
     let message = claim("agree = { estimators = [\"mis\"], detect = 0.1 }");
     holds(&message, "one estimator agrees with itself", "19:24", "`across`");
     let message = claim("agree = { estimators = [\"mis\", \"mis\"], detect = 0.1 }");
-    holds(&message, "`mis` stands twice", "19:32", "");
+    holds(&message, "`mis` occurs twice", "19:32", "");
     accepted("agree = { estimators = [\"mis\", \"snee\"], detect = 0.1 }");
 }
 

@@ -7,7 +7,7 @@
 //! Code that refracts at both ends has the transmittances in its hands (a path that is refracted with
 //! probability T21 must not multiply by it again), so what is evaluated here is K, the *kernel*.
 //!
-//! Every model but the directional dipole is reciprocal and never negative.
+//! Every model except the directional dipole is reciprocal and never negative.
 //!
 //! - *Classical dipole.* Loses the part 2 C1(1/eta) of the exitance on the way out unless it is
 //!   normalized. By its source's measure it leaves nothing out (its albedo counts all light), yet single
@@ -117,7 +117,7 @@ pub enum Model {
         /// Where its Fresnel moments come from.
         #[serde(default)]
         moments: MomentKind,
-        /// How many Gaussians.
+        /// Number of Gaussians.
         #[serde(default = "six")]
         #[schemars(range(min = 1, max = 12))]
         terms: usize,
@@ -132,9 +132,9 @@ fn six() -> usize {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FittedDipole {
-    /// The classical dipole's.
+    /// Profile of the classical dipole.
     Classical,
-    /// The better dipole's.
+    /// Profile of the better dipole.
     Better,
 }
 
@@ -394,7 +394,7 @@ impl Bssrdf {
 }
 
 impl RadialProfile {
-    /// R(r), 1/mm^2.
+    /// Exitance R(r) per unit flux, 1/mm^2.
     #[inline]
     pub fn exitance(&self, r: f64) -> f64 {
         match self {

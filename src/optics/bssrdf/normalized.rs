@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::math::exp;
 
-/// Which fit.
+/// Published fit that scales the profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scaling {
@@ -71,7 +71,7 @@ impl Normalized {
         Normalized { d, strength: albedo / (8.0 * PI * d), total: albedo }
     }
 
-    /// R(r), 1/mm^2.
+    /// Exitance R(r) per unit flux, 1/mm^2.
     #[inline]
     pub fn exitance(&self, r: f64) -> f64 {
         let slow = exp(-r / (3.0 * self.d));

@@ -13,14 +13,14 @@ mod scale;
 /// Colours with their names.
 pub mod swatches;
 
-/// A plot.
+/// A plot of named series over two axes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plot {
     /// The horizontal axis.
     pub x: PlotAxis,
     /// The vertical axis.
     pub y: PlotAxis,
-    /// The lines.
+    /// Series, in the order of the legend.
     pub series: Vec<Series>,
     /// Horizontal lines at known values, with their names.
     pub levels: Vec<(f64, String)>,
@@ -36,7 +36,7 @@ pub enum Size {
     Wide,
     /// One of several side by side.
     Small,
-    /// A strip.
+    /// A low strip.
     Flat,
 }
 
@@ -57,7 +57,7 @@ pub enum Style {
 /// A series of points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
-    /// Its name.
+    /// Name in the legend.
     pub name: String,
     /// Its points, by x.
     pub points: Vec<PlotPoint>,
@@ -75,9 +75,9 @@ impl Series {
 /// A point with an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlotPoint {
-    /// Abscissa.
+    /// Position on the horizontal axis.
     pub x: f64,
-    /// The value.
+    /// Position on the vertical axis.
     pub y: f64,
     /// Lower end of its interval.
     pub low: f64,
@@ -135,7 +135,7 @@ impl Plot {
         Plot { x, y, series, size: Size::Small, ..Plot::default() }
     }
 
-    /// The picture.
+    /// The plot as an SVG document.
     pub fn to_svg(&self) -> String {
         panels(std::slice::from_ref(self))
     }

@@ -3,7 +3,7 @@
 use crate::math::log10;
 use crate::report::number::significant;
 
-/// An axis.
+/// Label, scale and range of an axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlotAxis {
     /// What it shows, with its unit.

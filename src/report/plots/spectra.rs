@@ -111,7 +111,7 @@ mod tests {
             display_rgb: [0.1, 0.2, 0.3],
         };
         stored.record.bands = (0..4).map(band).collect();
-        // The arrays of the sample have two bands: here each stands twice.
+        // The arrays of the sample have two bands: here each occurs twice.
         for array in
             stored.arrays.values_mut().filter(|array| array.shape.len() == 4 && array.shape[3] == 5)
         {

@@ -177,7 +177,7 @@ class Controls extends Canvases {
     }
   }
 
-  // What stands at equal steps of the colour bar.
+  // Labels at equal steps of the colour bar.
   ticks(layer) {
     const { limit, z_limit: zLimit, noise_range: [low, high] } = this.data;
     const words = {

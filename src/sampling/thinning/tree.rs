@@ -1,6 +1,6 @@
 //! Thinning by a hierarchy, exact in law.
 //!
-//! Points stand in the order of their Morton codes, so that a node is a range of them, with a box around
+//! Points are in the order of their Morton codes, so that a node is a range of them, with a box around
 //! it. A query descends from the root; where it stops at a node, with p_m = p(distance to its box), it
 //! draws candidates among the node's points at a rate q >= p_m, and accepts candidate i with probability
 //! p_i / q.
@@ -39,7 +39,7 @@ const DIGITS: u32 = 8;
 pub struct PointTree {
     /// Coordinates, mm, in the order of the tree.
     axes: [Vec<f64>; 3],
-    /// Where each of them stood before.
+    /// The index that each of them had before.
     order: Vec<u32>,
     /// Depth first: a node's left child follows it.
     nodes: Vec<Node>,
@@ -73,7 +73,7 @@ impl PointTree {
         PointTree { axes, order, nodes }
     }
 
-    /// Where the point at each place of the tree stood before.
+    /// The index that the point at each place of the tree had before.
     pub fn order(&self) -> &[u32] {
         &self.order
     }

@@ -11,7 +11,7 @@ use crate::stats::hypothesis::Estimate;
 use crate::stats::moments::Moments;
 use crate::stats::tree::Merge;
 
-/// Seeds below this say nothing about a variance.
+/// Fewer seeds than this give no variance.
 const MIN_SEEDS: usize = 4;
 
 /// Confidence of the interval.
@@ -26,7 +26,7 @@ const SHARE: f64 = 0.05;
 /// The ratio of costs at equal error: how much longer the other renderer takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ratio {
-    /// BandImages name.
+    /// Name of the band.
     pub band: String,
     /// (variance of a pixel's mean x seconds) of the images over that of the record, pixels averaged.
     pub ratio: f64,
@@ -71,7 +71,7 @@ pub fn ratios(
             let unresolved = if seeds < MIN_SEEDS {
                 Some(format!("{seeds} seeds; at least {MIN_SEEDS} are needed"))
             } else if !(log.value.is_finite() && log.std_error.is_finite()) {
-                Some("a side has no variance".into())
+                Some("a side has zero variance".into())
             } else if share > SHARE + 10.0 / pixels.len() as f64 {
                 Some(format!("one pixel holds {:.0} % of the images' spread", 100.0 * share))
             } else if interval[1] > WIDEST * found.ratio() {

@@ -3,11 +3,11 @@
 //! What is tested, at one family-wise level over all bands (Holm):
 //! - the image mean and the tiles: the seeds' means against the record's batches, both with their
 //!   errors. By default a seed is one observation; where a user vouches for independent pixels, the
-//!   pixels' own spread says what a region's mean is worth, which has far more degrees of freedom;
+//!   pixels' own spread gives the error of a region's mean, which has far more degrees of freedom;
 //! - the squared bias of all pixels, from products of different seeds (`pixels::squared_bias`).
 //!
 //! Convention: row 0 is the top of the image and column 0 its left; OpenEXR files are read as their data
-//! window says, whatever the order of their lines. Values are radiance, linear, without exposure.
+//! window states, whatever the order of their lines. Values are radiance, linear, without exposure.
 
 use super::evidence::Evidence;
 use super::family::{Finding, conclude};
@@ -40,9 +40,9 @@ const FEW_PIXELS: usize = 64;
 /// The record disowns the user's word on independent pixels where their seeds' spread is less likely.
 const SPREAD_LEVEL: f64 = 1e-6;
 
-/// What the images are held against, and how.
+/// What the images are compared with, and how.
 pub struct Question<'a> {
-    /// The record.
+    /// Record that the images are compared with.
     pub stored: &'a Stored,
     /// Index of the cell.
     pub cell: usize,
@@ -54,22 +54,22 @@ pub struct Question<'a> {
     pub level: f64,
     /// The smallest bias of an image mean that must not go unseen, relative to it.
     pub detect: f64,
-    /// The user vouches that the noise of one pixel says nothing of another's.
+    /// The user vouches that the noise of one pixel is independent of another's.
     pub independent_pixels: bool,
 }
 
 /// One band's pixels for a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PixelMap {
-    /// BandImages name.
+    /// Name of the band.
     pub band: String,
     /// Scores: differences in units of their error, as normal values.
     pub z: Vec<f64>,
     /// Theirs less ours, relative to ours; NaN where ours is 0.
     pub relative: Vec<f64>,
-    /// Mean over seeds.
+    /// Mean over seeds of each pixel.
     pub mean: Vec<f64>,
-    /// Its standard error.
+    /// Standard error of each pixel's mean.
     pub std_error: Vec<f64>,
 }
 

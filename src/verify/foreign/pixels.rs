@@ -1,4 +1,4 @@
-//! Per pixel: what the seeds say, scores against a record's pixels, and one test of all of them.
+//! Per pixel: moments of the seeds, scores against a record's pixels, and one test of all of them.
 
 use super::images::Planes;
 use crate::results::image::Picture;
@@ -15,7 +15,7 @@ const LARGEST_Z: f64 = 37.0;
 pub(super) struct BandImages<'a> {
     pub width: usize,
     pub height: usize,
-    /// `[seed][pixel]`.
+    /// Values of the images, `[seed][pixel]`.
     pub theirs: Vec<&'a [f64]>,
     /// The record's mean and standard error.
     pub ours: Vec<f64>,

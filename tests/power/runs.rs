@@ -32,7 +32,7 @@ pub struct Outcome {
 /// What a test saw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Seen {
-    /// Nothing.
+    /// No test saw it.
     Green,
     /// Nothing, and too little for what its claim wants: no evidence of a defect either.
     Underpowered,
@@ -77,10 +77,10 @@ const EXPERIMENTS: [(Family, &str, &str); 15] = [
     (Family::Cloud, "faces.toml", include_str!("faces.toml")),
 ];
 
-/// Those on samplers.
+/// Names of the experiments on samplers.
 const ON_SAMPLERS: [&str; 3] = ["samplers", "acceptance", "thinning"];
 
-/// A sky of 8 x 4 texels, dim but for one next to the zenith.
+/// A sky of 8 x 4 texels, dim except one next to the zenith.
 fn write_sky(path: &Path) {
     let bands = [Band { name: "R".into(), range_nm: None, display_rgb: [1.0; 3] }];
     let mut texels = vec![0.1; 64];
@@ -88,8 +88,8 @@ fn write_sky(path: &Path) {
     write_exr(path, &Picture::new(&bands, &Array::new(vec![2, 4, 8, 1], texels)), &[]).expect("a sky");
 }
 
-/// Plays every (defect, number of the seed), and tells of each as it ends.
-pub fn all(plays: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcome)) {
+/// Runs every pair (defect, number of the seed) and reports each as it ends.
+pub fn all(runs: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcome)) {
     let folder = tempfile::tempdir().expect("a folder");
     for (_, name, text) in EXPERIMENTS {
         fs::write(folder.path().join(name), text).expect("an experiment");
@@ -106,23 +106,23 @@ pub fn all(plays: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcom
             scope.spawn(move || {
                 loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some((row, seed)) = plays.get(index) else { return };
-                    let outcome = play(row, *seed, folder, index);
-                    send.send((index, outcome)).expect("somebody listens");
+                    let Some((row, seed)) = runs.get(index) else { return };
+                    let outcome = run(row, *seed, folder, index);
+                    send.send((index, outcome)).expect("a receiver");
                 }
             });
         }
         drop(send);
         for (index, outcome) in receive {
-            let (row, seed) = &plays[index];
+            let (row, seed) = &runs[index];
             tell(row, *seed, &outcome);
         }
     });
 }
 
-/// One play: in a child process `verify` on the experiments of the defect's family, and its identities.
-fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
-    let out = folder.join(format!("play-{index}"));
+/// One run: in a child process `verify` on the experiments of the defect's family, and its identities.
+fn run(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
+    let out = folder.join(format!("run-{index}"));
     let verdicts = out.with_extension("csv");
     let mut command = Command::new(std::env::current_exe().expect("this program"));
     command.args(["defect", row.name]);
