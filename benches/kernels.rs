@@ -1,6 +1,6 @@
 //! Speed of the kernels and of whole paths, at fixed seeds: every run of a benchmark does the same
-//! work, so two builds are compared on equal terms. `cargo bench -p benches --bench kernels -- --quick` for a
-//! look, without `--quick` for figures to compare.
+//! work, so two builds are compared on equal terms. `cargo bench -p benches --bench kernels -- --quick`
+//! for a look, without `--quick` for figures to compare.
 
 use std::f64::consts::PI;
 use std::hint::black_box;

@@ -1,7 +1,8 @@
-//! The report's viewer in a real browser. A script at the end of a copy of the page acts as a reader would, and prints
-//! what it found to the browser's console, which goes to its standard error.
+//! The report's viewer in a real browser. A script at the end of a copy of the page acts as a reader
+//! would, and prints what it found to the browser's console, which goes to its standard error.
 //!
-//! The browser is `SCATTERPROOF_BROWSER`, or the first of chromium, chromium-browser and google-chrome on the path.
+//! The browser is `SCATTERPROOF_BROWSER`, or the first of chromium, chromium-browser and google-chrome
+//! on the path.
 
 use std::io::{BufRead, BufReader, Cursor};
 use std::os::unix::process::CommandExt;
@@ -187,8 +188,8 @@ fn expected(root: &Path) -> Value {
     json!({ "width": size.0, "height": size.1, "cells": cells, "limits": limits, "bands": names })
 }
 
-/// A pixel each of the split picture of two tiles of 12 x 12 pixels: they are shown as squares of 16 x 16, with a seam of
-/// one pixel and a gap of six.
+/// A pixel each of the split picture of two tiles of 12 x 12 pixels: they are shown as squares of 16 x
+/// 16, with a seam of one pixel and a gap of six.
 fn grid(path: &Path) -> Vec<u8> {
     let (sheet, mut pixels) = (png(path), Vec::new());
     let width = 2 * (12 * 16 + 1) + 6;

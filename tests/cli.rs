@@ -290,7 +290,8 @@ fn reproduce_refuses_what_is_not_published() {
     work.shell(&format!("'{script}' --help")).exits(0).says("whether the record is byte-identical");
 }
 
-/// A name is never a path: separators and control characters are refused, and a record's files are numbered.
+/// A name is never a path: separators and control characters are refused, and a record's files are
+/// numbered.
 #[test]
 fn names_of_estimators_are_no_paths() {
     for name in ["snee/guided", "a/../../../x", "a\\\\b", "a\\nb"] {

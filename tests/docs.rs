@@ -105,7 +105,8 @@ fn merged(base: &Table, snippet: Table) -> Table {
 }
 
 /// The experiments that a page by example shows: line and file. The block `toml complete` is the base
-/// of all snippets; `toml samplers` is a file of its own; in `toml one-of` each line is one; `spectral` ones have bands with wavelengths.
+/// of all snippets; `toml samplers` is a file of its own; in `toml one-of` each line is one; `spectral`
+/// ones have bands with wavelengths.
 fn experiments(page: &str) -> Vec<(usize, Table)> {
     let parse = |line: usize, text: &str| {
         toml::from_str::<Table>(text)

@@ -108,7 +108,8 @@ fn rivals_that_were_interrupted_go_on_to_the_same_bytes() {
     panic!("it was never interrupted in the middle");
 }
 
-/// Prints the weights that CPU time on this machine asks for, and fails where those of the program are off.
+/// Prints the weights that CPU time on this machine asks for, and fails where those of the program are
+/// off.
 #[test]
 #[ignore = "measures CPU time: for the night"]
 fn cpu_time_follows_the_counters() {

@@ -1,5 +1,5 @@
-//! Ctrl-C and kill -9 in the middle of a run: what was run is kept, and the same command resumes and gives
-//! the same bytes.
+//! Ctrl-C and kill -9 in the middle of a run: what was run is kept, and the same command resumes and
+//! gives the same bytes.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;

@@ -1,4 +1,5 @@
-//! `judge` on images of the program itself, made with other seeds, and `compare`; each with planted defects.
+//! `judge` on images of the program itself, made with other seeds, and `compare`; each with planted
+//! defects.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,6 +1,6 @@
-//! What neither the compiler nor clippy can say of the sources: who uses whom (the picture in `src/lib.rs`), which module is
-//! the door of which crate, that one name denotes one type, and how long a file may be. Functions that differ between
-//! machines are in `clippy.toml`.
+//! What neither the compiler nor clippy can say of the sources: who uses whom (the picture in
+//! `src/lib.rs`), which module is the door of which crate, that one name denotes one type, and how long
+//! a file may be. Functions that differ between machines are in `clippy.toml`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -118,8 +118,9 @@ const JSON: [&str; 8] =
 /// Type names that may denote several types: clap's arguments of each subcommand, and nodes of trees.
 const SHARED_NAMES: [&str; 2] = ["Args", "Node"];
 
-/// Words that mean one thing, and where nothing may bear them: a cell is a point of a sweep, which geometry, estimators and
-/// chi-square (bins) know nothing of; stored moments are of observables, and gates are those of continuous integration.
+/// Words that mean one thing, and where nothing may bear them: a cell is a point of a sweep, which
+/// geometry, estimators and chi-square (bins) know nothing of; stored moments are of observables, and
+/// gates are those of continuous integration.
 const WORDS: [(&str, &[&str]); 3] = [
     (
         "cell",
@@ -208,7 +209,8 @@ impl Source {
         paths
     }
 
-    /// Where a path leads, from the crate's root; `None` for what is of another crate or a name of this file.
+    /// Where a path leads, from the crate's root; `None` for what is of another crate or a name of this
+    /// file.
     fn target(&self, path: &str) -> Option<Vec<String>> {
         let mut words: Vec<&str> = path.split("::").collect();
         let mut from = match words.remove(0) {
@@ -346,8 +348,8 @@ fn every_module_and_every_dependency_has_a_row() {
     assert_eq!(names.collect::<BTreeSet<String>>(), doors);
 }
 
-/// Files and folders of one folder that use each other, as `a/b -> a/c -> a/b`. A folder's `mod.rs` may use what is in
-/// it and be used by it.
+/// Files and folders of one folder that use each other, as `a/b -> a/c -> a/b`. A folder's `mod.rs` may
+/// use what is in it and be used by it.
 fn circles(sources: &[Source]) -> Vec<String> {
     let modules: BTreeSet<&[String]> = sources
         .iter()
@@ -416,7 +418,8 @@ fn a_type_name_stands_for_one_type() {
     assert!(found.is_empty(), "{} names:\n{}", found.len(), found.join("\n"));
 }
 
-/// Types, fields, functions and modules that bear a word of the table where it would mean something else.
+/// Types, fields, functions and modules that bear a word of the table where it would mean something
+/// else.
 fn misused(source: &Source) -> Vec<String> {
     let mut found = Vec::new();
     for (line, number) in source.shipped().lines().zip(1..) {

@@ -39,7 +39,8 @@ fn equals(value: f64) -> String {
 
 #[test]
 fn a_second_look_is_run_and_decides() {
-    // A value 4.3 standard errors from what the first look is known to find: p = 6e-5, between the levels.
+    // A value 4.3 standard errors from what the first look is known to find: p = 6e-5, between the
+    // levels.
     let (mean, error) = measured(&grey());
     let work = Work::with(&equals(mean - 4.3 * error));
     let ran = work.run("verify x.toml -q");

@@ -32,7 +32,8 @@ fn a_picture_is_a_view_and_no_part_of_the_record() {
     assert!(!work.read("results/x/report.md").contains("split-1"));
 }
 
-/// The image under two skies: paths under parallel light have a tail that no test of a hundred means bears.
+/// The image under two skies: paths under parallel light have a tail that no test of a hundred means
+/// bears.
 fn lit_evenly() -> String {
     let sun = "directional = { toward = [1, 0, 1], irradiance = 1.0 }";
     replaced(IMAGE, sun, "environment = { radiance = 0.5, hemisphere = [1, 0, 1] }")
@@ -50,8 +51,8 @@ fn verification_that_runs_nothing_makes_the_pictures_asked_for_since() {
     assert!(work.path("results/x/images/split-1.png").exists());
 }
 
-/// The variance of a pixel as pairs of passes show it, and as all passes do: of one expectation. The first has
-/// the larger error of the two, known from its values.
+/// The variance of a pixel as pairs of passes show it, and as all passes do: of one expectation. The
+/// first has the larger error of the two, known from its values.
 #[test]
 fn pairs_show_the_variance_that_all_passes_show() {
     // 301 passes: 75 batches of 2 pairs, and a last pass without a partner.

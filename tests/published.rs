@@ -1,5 +1,5 @@
-//! What is published: tables are those of their manifests, manifests are those of their records, and every page quotes
-//! a table as it is.
+//! What is published: tables are those of their manifests, manifests are those of their records, and
+//! every page quotes a table as it is.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -139,8 +139,8 @@ fn every_published_record_gives_its_tables_and_plots() {
     assert!(found.is_empty(), "{}\n{HELP}", found.join("\n"));
 }
 
-/// A published number that is improved by hand is found: in the table, and in table and manifest where the record is
-/// published, too.
+/// A published number that is improved by hand is found: in the table, and in table and manifest where
+/// the record is published, too.
 #[test]
 fn a_changed_table_is_found() {
     let table = "tables/efficiency.md";
@@ -243,7 +243,8 @@ fn pages_quote_tables_as_they_are() {
     }
 }
 
-/// Pictures in docs/figures/NAME/ are those that were made when the experiment of that name was published.
+/// Pictures in docs/figures/NAME/ are those that were made when the experiment of that name was
+/// published.
 #[test]
 fn pictures_of_pages_are_published() {
     let copies = files(&package().join("docs/figures"));
@@ -274,8 +275,8 @@ fn what_is_published_is_small() {
     assert!(size < 4 << 20 && files.len() < 300, "{} KiB in {} files", size >> 10, files.len());
 }
 
-/// The numbers of docs/bssrdf.md on the rules of acceptance are those of the published ratios: `kernel` at most so many
-/// times behind the best rule of a band and its median, then the two floors at most.
+/// The numbers of docs/bssrdf.md on the rules of acceptance are those of the published ratios: `kernel`
+/// at most so many times behind the best rule of a band and its median, then the two floors at most.
 #[test]
 fn the_advice_on_rules_is_what_the_ratios_say() {
     let path = package().join("results/published/short/acceptance/tables/efficiency.md");

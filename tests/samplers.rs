@@ -315,8 +315,8 @@ fn a_control_passes_where_it_differs_and_detect_may_ask_too_much() {
     assert_eq!(red(&judge_alone(&ran(&fine))), ["chi2 coarse: underpowered"]);
 }
 
-/// 200 samplers that differ in name: p-values below 1/2 and below 1/50 are binomial in number, within 4.5
-/// standard deviations (7e-6).
+/// 200 samplers that differ in name: p-values below 1/2 and below 1/50 are binomial in number, within
+/// 4.5 standard deviations (7e-6).
 #[test]
 fn p_values_are_uniform() {
     let names: Vec<String> = (0..200).map(|i| format!("sampler {i}")).collect();

@@ -31,7 +31,8 @@ path = { roulette = { analog = {} } }
 "#;
 
 /// The sensor's line of [`IMAGE`].
-pub const SENSOR: &str = "sensor.orthographic = { resolution = [12, 12], center_mm = [0, 0, 3], toward = [0, 0, -1], up = [0, 1, 0], width_mm = 2.2 }";
+pub const SENSOR: &str = "sensor.orthographic = { resolution = [12, 12], center_mm = [0, 0, 3], toward = [0, 0, \
+                          -1], up = [0, 1, 0], width_mm = 2.2 }";
 
 /// The same light and body, seen along one ray.
 pub fn probe() -> String {

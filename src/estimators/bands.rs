@@ -6,7 +6,8 @@
 //! and the density of the walk in band b, the walk carries
 //!   value_b = f_b / (p_h w),   rho_b = p_b / p_h,
 //! w being the hero's throughput without its albedos. Step by step, relative to the hero,
-//!   a flight of length d that ends in the medium   rho_b *= (sigma_t,b / sigma_t,h) e^{-(sigma_t,b - sigma_t,h) d},
+//!   a flight of length d that ends in the medium   rho_b *= (sigma_t,b / sigma_t,h)
+//!                                                           e^{-(sigma_t,b - sigma_t,h) d},
 //!                                                  value_b *= the same * albedo_b / survival
 //!   one that ends at the boundary                  both *= e^{-(sigma_t,b - sigma_t,h) d}
 //!   a turn                                         both *= phase_b / phase_h

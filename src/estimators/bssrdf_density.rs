@@ -81,7 +81,8 @@ impl BssrdfDensity {
     /// For a scene.
     ///
     /// # Errors
-    /// A scene that it does not serve; a medium that the model does not fit; a model that needs directions.
+    /// A scene that it does not serve; a medium that the model does not fit; a model that needs
+    /// directions.
     pub fn new(scene: Arc<Scene>, options: &DensityOptions) -> Result<BssrdfDensity> {
         BssrdfDensity::KIND.check(&scene)?;
         let sampler = BodySampler::new(&scene.shape, FaceChoice::Area)

@@ -5,7 +5,8 @@
 //! tangents (1/4 each), it passes the exit at distance r, drawn from a technique of the model of one
 //! band of the group, in a uniform azimuth. All crossings of the line with the surface, of front and
 //! back faces, are entries. The expected number of entries per area at a point x_i is
-//!   pdf_area = sum over axes a of P(a) |n_i . a| times the mean over bands of sum over techniques of share pdf(r_a),
+//!   pdf_area = sum over axes a of P(a) |n_i . a| times the mean over bands of sum over techniques of
+//!   share pdf(r_a),
 //! r_a being the distance of x_i from the axis a through the exit: the disc's density, carried from the
 //! disc across a to the surface. All axes, bands and techniques that could have made an entry are in the
 //! sum, whichever made it (the balance heuristic), so that

@@ -40,8 +40,8 @@ pub struct RayOptions {
     pub rays: usize,
     /// How far under the exit the rays start, mm; without it the reduced mean free path.
     ///
-    /// Of bands that share a path the geometric mean of the least and the largest. At most half way to the
-    /// opposite side.
+    /// Of bands that share a path the geometric mean of the least and the largest. At most half way to
+    /// the opposite side.
     #[serde(rename = "depth_mm")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub depth: Option<f64>,

@@ -11,8 +11,9 @@
 //!
 //! Power of a photon. Light of radiance L(w) from directions w towards it, drawn with density p(w) from
 //! a light that was chosen with probability P, carries in one of N photons
-//!   finite body     L / (p P N) * pi R^2: starting points are uniform on the disc of the bounding sphere's
-//!                   radius R across the direction, through which all light that can meet the body comes
+//!   finite body     L / (p P N) * pi R^2: starting points are uniform on the disc of the bounding
+//!                   sphere's radius R across the direction, through which all light that can meet
+//!                   the body comes
 //!   planar face     L / (p P N) * |cos|: power per area of the face on which the light shines, every
 //!                   point of which is alike; it comes in at the origin of the face
 //! with the irradiance in place of L / p for parallel light. Photons that miss the body score nothing:
@@ -89,8 +90,8 @@ impl LightTracer {
     /// For a scene; `photons` per band and pass, as many as the sensor has rays without it.
     ///
     /// # Errors
-    /// A scene that it does not serve: photons hit no single point or direction; a sensor whose unit does not fit
-    /// the body; no photons.
+    /// A scene that it does not serve: photons hit no single point or direction; a sensor whose unit
+    /// does not fit the body; no photons.
     pub fn new(scene: Arc<Scene>, photons: Option<usize>) -> Result<LightTracer> {
         LightTracer::KIND.check(&scene)?;
         let bounds = scene.shape.bounds();

@@ -2,12 +2,12 @@
 //! have.
 //!
 //! The walk is that of [`super::path`]; an estimator that adds techniques implements [`Rivals`]: it is
-//! called at every medium vertex, and states at every exit how densely its techniques draw the same path.
-//! Weights are those of the balance heuristic over all techniques. Their densities are written relative
-//! to U, the density with which the walk draws its medium vertices and the flight to the exit, so that U
-//! itself, which underflows in thick media, is never formed: a light sample has density p_L, a BSDF
-//! sample p_B, a rival p_R / U. Roulette is in no density: each walk divides by its own survival, and
-//! weights without it still sum to 1.
+//! called at every medium vertex, and states at every exit how densely its techniques draw the same
+//! path. Weights are those of the balance heuristic over all techniques. Their densities are written
+//! relative to U, the density with which the walk draws its medium vertices and the flight to the exit,
+//! so that U itself, which underflows in thick media, is never formed: a light sample has density p_L, a
+//! BSDF sample p_B, a rival p_R / U. Roulette is in no density: each walk divides by its own survival,
+//! and weights without it still sum to 1.
 
 use std::sync::Arc;
 

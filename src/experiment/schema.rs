@@ -570,7 +570,7 @@ pub struct RelativeError {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SmallValues {
-    /// Upper limit.
+    /// Values below this are small.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub below: f64,
     /// Largest standard error over value below it.

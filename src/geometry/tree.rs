@@ -22,7 +22,7 @@
 //! | source | error | bound |
 //! |---|---|---|
 //! | rounding of the origin | u abs(o) | 1.1e-4 |
-//! | direction, inverse, two products, sum | 5 u (q e + abs(p - o)), q e <= 2100, abs(p - o) <= 2810 | 1.5e-3 |
+//! | direction, inverse, products | 5 u (q e + abs(p - o)), q e <= 2100, abs(p - o) <= 2810 | 1.5e-3 |
 //! | node corner and 8-bit steps from rounded differences | 2 u 2048 | 2.5e-4 |
 //! | step exponent from a rounded log2, box cut at 255 steps | 2048 3e-7 | 6e-4 |
 //! | `safe_inverse` takes components below 2^-23 as 2^-23 | 2^-22 tau, tau <= 3600 | 8.6e-4 |

@@ -1,4 +1,5 @@
-//! Tests of split pictures: which half is whose, one white for both, and the caption's statement of times.
+//! Tests of split pictures: which half is whose, one white for both, and the caption's statement of
+//! times.
 
 use super::*;
 use crate::results::image::decoded;

@@ -98,7 +98,8 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// The region that an observable measures with all lights together; none for one light's share of a region.
+    /// The region that an observable measures with all lights together; none for one light's share of a
+    /// region.
     pub fn region_of(&self, observable: &Observable) -> Option<&ObservedRegion> {
         self.regions.iter().find(|region| region.name == observable.name)
     }
@@ -110,7 +111,8 @@ impl Cell {
 pub struct ObservedRegion {
     /// The name of its observables; that of one light's share has `@light` appended.
     pub name: String,
-    /// Which part of an image it is the mean of; none where that is the whole, or where there is no image.
+    /// Which part of an image it is the mean of; none where that is the whole, or where there is no
+    /// image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tile: Option<Tile>,
 }
@@ -182,7 +184,7 @@ pub struct StatedTail {
     pub band: usize,
     /// In this class, and in `all`.
     pub class: String,
-    /// Why the estimator does not run in this cell.
+    /// Why the mean has no valid interval.
     pub reason: String,
 }
 
@@ -210,7 +212,8 @@ pub struct Observable {
 }
 
 /// The observable of claims of efficiency that denotes all pixels at once: its variance is that of a
-/// pixel, averaged over the pixels. It has no mean; that of the sensor's first observable is reported for it.
+/// pixel, averaged over the pixels. It has no mean; that of the sensor's first observable is reported
+/// for it.
 pub const PIXELS: &str = "pixels";
 
 impl Observable {

@@ -131,8 +131,8 @@ fn read<T: DeserializeOwned>(path: &Path) -> Option<(Header<T>, Vec<f64>)> {
     Some((header, numbers))
 }
 
-/// The claims made before the first passes or draws of a job's state, whether or not the job can resume from
-/// it: they were seen.
+/// The claims made before the first passes or draws of a job's state, whether or not the job can resume
+/// from it: they were seen.
 pub fn start(path: &Path, identity: &str) -> Option<Start> {
     load::<IgnoredAny>(path, identity).map(|(header, _)| header.start)
 }

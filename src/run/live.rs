@@ -166,7 +166,7 @@ fn reason(error: &io::Error) -> String {
 /// The images of one experiment on show.
 #[derive(Clone, Copy)]
 pub struct Show<'a> {
-    /// Connection to the viewer.
+    /// Viewer that images are sent to.
     pub live: &'a Live,
     /// The experiment's name.
     pub experiment: &'a str,

@@ -114,8 +114,8 @@ fn take_passes(plan: &mut Plan, experiment: &Experiment, from: &RecordFolder) ->
     let manifest = from.manifest()?;
     if manifest.experiment_hash != assemble::experiment_hash(experiment) {
         let words = "the record there is of another experiment than the file";
-        let help = "`scatterproof compare` of the two results reports what was changed; run without --passes-of to take the \
-                    passes from the budget";
+        let help = "`scatterproof compare` of the two results reports what was changed; run without --passes-of \
+                    to take the passes from the budget";
         return Err(Error::record(from.root(), format!("{words}; {help}")));
     }
     for job in &mut plan.jobs {

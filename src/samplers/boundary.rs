@@ -129,8 +129,8 @@ impl ViewSide {
 ///   total reflection    between q_c and q_r: beside the cone at both sides of it in Y, and before and
 ///                       beyond it in X, where the cone is not met.
 /// In the plane of view a facet turned by angle xi has m = cos(theta + xi): the ends in X are the
-/// tangents of -(pi/4 + theta/2) and pi/4 - theta/2 for q_r, of -theta - gamma and -theta + gamma for q_c (cos gamma
-/// = m_c), and (r - s) / c for q_w, the root of q_w = 1 + X^2.
+/// tangents of -(pi/4 + theta/2) and pi/4 - theta/2 for q_r, of -theta - gamma and -theta + gamma for
+/// q_c (cos gamma = m_c), and (r - s) / c for q_w, the root of q_w = 1 + X^2.
 ///
 /// Jacobians: about wo, h is at the polar angle g, wi at b(g) and the same azimuth, so that
 /// d omega_i / d omega_h = |sin b b'| / sin g. Reflection: b = 2g, 4 cos g. Refraction: b = pi + g -

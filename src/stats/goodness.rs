@@ -5,11 +5,11 @@
 //! levels down to 1e-6, and a test that does not meet them is refused, never passed:
 //!
 //! - *The expectations are resolved.* With p_i off by d_i, X2 of a perfect sampler is a noncentral
-//!   chi-square with noncentrality lambda = N sum d_i^2 / p_i at most. That moves its mean by lambda; one
-//!   standard deviation of X2 is sqrt(2 dof). Required: lambda <= 0.02 sqrt(2 dof), a shift that takes a
-//!   level of 1e-6 to 1.1e-6 at most.
-//! - *No bin is thin*: N p_i >= 25. At 5, the usual rule, rejections at the level 1e-3 are twice too many
-//!   where one bin dominates. The likelihood-ratio statistic G would need 100.
+//!   chi-square with noncentrality lambda = N sum d_i^2 / p_i at most. That moves its mean by lambda;
+//!   one standard deviation of X2 is sqrt(2 dof). Required: lambda <= 0.02 sqrt(2 dof), a shift that
+//!   takes a level of 1e-6 to 1.1e-6 at most.
+//! - *No bin is thin*: N p_i >= 25. At 5, the usual rule, rejections at the level 1e-3 are twice too
+//!   many where one bin dominates. The likelihood-ratio statistic G would need 100.
 //! - *The bins are everything*: sum p_i = 1 within the sum of the errors. Failed samples have a bin of
 //!   their own, and so has each discrete direction.
 //!
@@ -29,8 +29,8 @@ pub const LEAST_EXPECTED: f64 = 25.0;
 /// The largest noncentrality from errors of the expectations, in standard deviations of the statistic.
 pub const LARGEST_SHIFT: f64 = 0.02;
 
-/// The largest |skewness| / sqrt(n) at which the mean of n values is tested as a normal: at 0.26, t tests of
-/// skewed values at the level 1e-3 rejected 2.5 times too often.
+/// The largest |skewness| / sqrt(n) at which the mean of n values is tested as a normal: at 0.26, t
+/// tests of skewed values at the level 1e-3 rejected 2.5 times too often.
 pub const LARGEST_SKEW: f64 = 0.1;
 
 /// Why a test is void: never a pass.
@@ -203,9 +203,9 @@ pub struct Proportion {
     pub p_value: f64,
 }
 
-/// The exact two-sided binomial test of `count` of `samples` against the probability `mass`, known within
-/// `error`: the mass of a discrete direction, or of failed samples. A mass of 0 or 1 is refuted by a
-/// single sample on the wrong side.
+/// The exact two-sided binomial test of `count` of `samples` against the probability `mass`, known
+/// within `error`: the mass of a discrete direction, or of failed samples. A mass of 0 or 1 is refuted
+/// by a single sample on the wrong side.
 ///
 /// # Errors
 ///
@@ -226,8 +226,8 @@ pub fn proportion(count: u64, samples: u64, mass: f64, error: f64) -> Result<Pro
 }
 
 impl Proportion {
-    /// The nearest probabilities below and above that are rejected at `level` with probability `power`; 0
-    /// or 1 where there is none on that side.
+    /// The nearest probabilities below and above that are rejected at `level` with probability `power`;
+    /// 0 or 1 where there is none on that side.
     pub fn detectable(&self, level: f64, power: f64) -> (f64, f64) {
         let (n, p) = (self.samples, self.mass);
         // Rejected: counts up to `low` - 1, and from `high` on.
@@ -255,8 +255,8 @@ fn first(end: u64, holds: impl Fn(u64) -> bool) -> u64 {
     low
 }
 
-/// A test with one degree of freedom of a mean against its known value: the mean cosine, of cos(2 phi), of
-/// the forward half. The cheapest test, in samples, of a defect that moves the mean.
+/// A test with one degree of freedom of a mean against its known value: the mean cosine, of cos(2 phi),
+/// of the forward half. The cheapest test, in samples, of a defect that moves the mean.
 ///
 /// `values` are the moments of independent values of bounded spread, `expected` their mean by quadrature
 /// and a bound of its error. Student's t with n - 1 degrees of freedom.
@@ -264,8 +264,8 @@ fn first(end: u64, holds: impl Fn(u64) -> bool) -> u64 {
 /// # Errors
 ///
 /// [`Refusal::Empty`] below two values, [`Refusal::NoSpread`], [`Refusal::Skewed`] (above
-/// [`LARGEST_SKEW`]), [`Refusal::Unresolved`] where the error's noncentrality n error^2 / s^2 exceeds its
-/// bound.
+/// [`LARGEST_SKEW`]), [`Refusal::Unresolved`] where the error's noncentrality n error^2 / s^2 exceeds
+/// its bound.
 pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<ContrastTest, Refusal> {
     if values.n < 2 {
         return Err(Refusal::Empty);
@@ -291,7 +291,7 @@ pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<ContrastT
 pub struct ContrastTest {
     /// The difference from the expected mean; its `detectable` is the contrast's.
     pub estimate: Estimate,
-    /// Name, p-value and power of the test.
+    /// Statistic, degrees of freedom and p-value.
     pub test: Test,
     /// The largest noncentrality that the error of the expectation causes.
     pub lambda_err: f64,
@@ -427,8 +427,9 @@ mod tests {
         assert_eq!(contrast(&Moments::of(1.0), 1.0, 0.0), Err(Refusal::Empty));
     }
 
-    // Doses: the detectable defect, a density wrong by +-r in alternate bins, has the stated noncentrality,
-    // so that counts at their expectations under it exceed the critical value by about lambda.
+    // Doses: the detectable defect, a density wrong by +-r in alternate bins, has the stated
+    // noncentrality, so that counts at their expectations under it exceed the critical value by about
+    // lambda.
     #[test]
     fn the_detectable_defect_is_rejected() {
         let (n, k) = (1_000_000.0, 64);

@@ -46,7 +46,8 @@ impl Estimate {
         Estimate { value: self.value - other.value, std_error: (va + vb).sqrt(), dof }
     }
 
-    /// Tests that the estimate's expectation is 0: by Student's t, or the normal where the error is known.
+    /// Tests that the estimate's expectation is 0: by Student's t, or the normal where the error is
+    /// known.
     pub fn test_zero(&self) -> Test {
         let statistic = self.value / self.std_error;
         Test { statistic, dof: self.dof, p_value: student_two_sided(statistic, self.dof) }

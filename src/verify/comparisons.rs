@@ -1,11 +1,12 @@
 //! The table of efficiencies: every estimator of a cell against the first of the experiment file, by
 //! counters and by CPU time.
 //!
-//! Every ratio is the baseline's over the candidate's: above 1 the candidate is the better. An efficiency is
-//! quoted where the means agree, by the test that an `agree` claim would make, at a level of 1e-3 over the
-//! whole table (Bonferroni); its interval is for the reader, at 95 %. Whether it is resolved is judged as
-//! for claims (`verify::efficiency`). The metric is the sensor's first observable, by class; where it has pixels,
-//! `pixels` beside it: the variance of a pixel, averaged over the image. Controls are in the table as candidates, by CPU time alone.
+//! Every ratio is the baseline's over the candidate's: above 1 the candidate is the better. An
+//! efficiency is quoted where the means agree, by the test that an `agree` claim would make, at a level
+//! of 1e-3 over the whole table (Bonferroni); its interval is for the reader, at 95 %. Whether it is
+//! resolved is judged as for claims (`verify::efficiency`). The metric is the sensor's first observable,
+//! by class; where it has pixels, `pixels` beside it: the variance of a pixel, averaged over the image.
+//! Controls are in the table as candidates, by CPU time alone.
 
 use serde::Serialize;
 
@@ -56,7 +57,8 @@ pub struct EfficiencyRow {
     pub cpu_cost_ratio: Option<f64>,
     /// Rays of a pass, baseline over candidate.
     pub ray_cost_ratio: Option<f64>,
-    /// Is the ratio one that more passes would not move out of its interval, and that no single pass makes?
+    /// Is the ratio one that more passes would not move out of its interval, and that no single pass
+    /// makes?
     pub resolved: bool,
     /// What counts as cost.
     pub cost: CostMeasure,

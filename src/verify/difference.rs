@@ -3,15 +3,18 @@
 //! A quantity that both records hold is compared in one of four ways:
 //! - `identical`: the moments of every batch are the same bits. Nothing is left to test.
 //! - `paired t`: pass k of both was run on the same random numbers, so that the differences pass by pass
-//!   are what is left of a change in the program. They are independent from pass to pass, whatever a change
-//!   does to the numbers' use within one, so the t test of their batch means is valid, and sharper the more
-//!   alike the two programs are. Welch's test would take the shared noise for two noises.
-//! - `welch t`: other seeds, names or physics, hence other random numbers: independent batches. The fewer of
-//!   both sides' degrees of freedom are used, which bounds the tails for every ratio of variances (M. Mickey,
-//!   M. Brown, "Bounds on the distribution functions of the Behrens-Fisher statistic", 1966).
+//!   are what is left of a change in the program. They are independent from pass to pass, whatever a
+//!   change does to the numbers' use within one, so the t test of their batch means is valid, and
+//!   sharper the more alike the two programs are. Welch's test would take the shared noise for two
+//!   noises.
+//! - `welch t`: other seeds, names or physics, hence other random numbers: independent batches. The
+//!   fewer of both sides' degrees of freedom are used, which bounds the tails for every ratio of
+//!   variances (M. Mickey, M. Brown, "Bounds on the distribution functions of the Behrens-Fisher
+//!   statistic", 1966).
 //! - `sum of errors`: the same random numbers and another number of passes, or an experiment that pairs
-//!   cells and whose physics changed: nothing is paired, nor surely independent. |a - b| > c (e_a + e_b) needs |a - mu| > c e_a or |b - mu| > c e_b, so twice the t tail is a
-//!   p-value whatever the correlation.
+//!   cells and whose physics changed: nothing is paired, nor surely independent. |a - b| > c (e_a + e_b)
+//!   needs |a - mu| > c e_a or |b - mu| > c e_b, so twice the t tail is a p-value whatever the
+//!   correlation.
 
 use std::collections::BTreeMap;
 

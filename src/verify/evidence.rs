@@ -64,8 +64,8 @@ impl Evidence {
         self.test().map(|test| test.p_value).filter(|p| !p.is_nan())
     }
 
-    /// The smallest defect that is rejected at `level` with probability [`POWER`]: of a difference relative to
-    /// `relative_to`, or absolute where that is 0.
+    /// The smallest defect that is rejected at `level` with probability [`POWER`]: of a difference
+    /// relative to `relative_to`, or absolute where that is 0.
     pub fn detectable(&self, level: f64, relative_to: f64) -> Option<f64> {
         let scale = if relative_to == 0.0 { 1.0 } else { relative_to.abs() };
         match self {
@@ -142,7 +142,8 @@ pub(super) struct EfficiencyTest {
 
 impl EfficiencyTest {
     /// The outcome, where the p-value adjusted over the family is `adjusted_p` and a test fails below
-    /// `level`; `own_level` is the level of this test alone. A control that expects failure wants it of E.
+    /// `level`; `own_level` is the level of this test alone. A control that expects failure wants it of
+    /// E.
     pub fn outcome(
         &self,
         adjusted_p: Option<f64>,
@@ -171,8 +172,9 @@ impl EfficiencyTest {
         self.difference.detectable(own_level, POWER)
     }
 
-    /// The smallest shortfall of E below e, relative to e, that would have failed: 1 - exp(-d) with d that of
-    /// ln E. The p-value is twice the one-sided one, so that its level is that of a two-sided test.
+    /// The smallest shortfall of E below e, relative to e, that would have failed: 1 - exp(-d) with d
+    /// that of ln E. The p-value is twice the one-sided one, so that its level is that of a two-sided
+    /// test.
     fn detectable(&self, own_level: f64) -> f64 {
         let log = Estimate::known(-self.ratio.log.detectable(own_level, POWER), 0.0);
         1.0 - LogRatio { log }.ratio()

@@ -1,5 +1,5 @@
-//! Tests of one call, judged as one family: Holm's adjustment over all of them, second looks where there are
-//! two, the smallest detectable defect, and the outcome. `verify`, `judge` and `compare` share it.
+//! Tests of one call, judged as one family: Holm's adjustment over all of them, second looks where there
+//! are two, the smallest detectable defect, and the outcome. `verify`, `judge` and `compare` share it.
 
 use std::collections::BTreeMap;
 
@@ -42,7 +42,8 @@ impl Finding {
 pub(super) struct Concluded {
     /// One verdict a finding.
     pub verdicts: Vec<Verdict>,
-    /// The findings that want a second look which was not taken yet; their verdicts are `fail` until then.
+    /// The findings that want a second look which was not taken yet; their verdicts are `fail` until
+    /// then.
     pub wanted: Vec<usize>,
 }
 
@@ -81,8 +82,8 @@ pub(super) fn conclude(
     Concluded { verdicts, wanted }
 }
 
-/// Second looks with p-values adjusted over all of them. One that is still missing counts: the level of the
-/// others must not depend on it.
+/// Second looks with p-values adjusted over all of them. One that is still missing counts: the level of
+/// the others must not depend on it.
 fn second_looks(seconds: BTreeMap<usize, Option<Evidence>>) -> BTreeMap<usize, SecondLook> {
     let p_value = |second: &Option<Evidence>| second.as_ref()?.p_value();
     let p_values: Vec<f64> = seconds.values().map(|second| p_value(second).unwrap_or(1.0)).collect();

@@ -7,8 +7,8 @@
 //!   on streams of its own with `RETEST_FACTOR` times the passes has, adjusted over all second looks,
 //!   a p-value below `SECOND_LOOK`.
 //! A correct family fails at once with probability at most 5e-7. It needs any second look with
-//! probability at most 1e-3, and fails it, the streams being independent, with conditional probability at
-//! most 5e-4: together at most 5e-7 + 1e-3 * 5e-4 = 1e-6 = `FAMILY_LEVEL`.
+//! probability at most 1e-3, and fails it, the streams being independent, with conditional probability
+//! at most 5e-4: together at most 5e-7 + 1e-3 * 5e-4 = 1e-6 = `FAMILY_LEVEL`.
 //!
 //! What this buys: a defect is found with 99 % probability at the first look's critical value plus 2.33
 //! standard errors, and the second look sees it at twice that distance, so nothing is lost there. For

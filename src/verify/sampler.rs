@@ -6,7 +6,7 @@
 //! | `serial` | so do pairs of consecutive draws, with the products of masses | Pearson |
 //! | `contrast NAME` | the mean of a function of the draw | Student's t |
 //! | `delta NAME` | a discrete outcome has its probability, and its value | exact binomial |
-//! | `null` | the sampler returns nothing as often as is stated; never, where that is stated | exact binomial, or none |
+//! | `null` | the sampler returns nothing as often as is stated, or never | exact binomial, or none |
 //! | `identity D5` | each draw's own density is the density function's, to 1e-9 | none differs |
 //! | `identity D7` | density, discrete masses and stated null sum to 1 | certified quadrature |
 //! | `outside` | no draw where the density is 0, or outside the chart | there is none |
@@ -25,8 +25,8 @@ use crate::stats::goodness::{Bin, contrast, pearson, proportion};
 use crate::stats::hypothesis::Test;
 use crate::stats::moments::Moments;
 
-/// Largest bound of the error of the total mass with which its being 1 is a stricter test than counts: those of
-/// 1e6 draws see relative errors of 1e-2. The bound itself is the row's `detectable`.
+/// Largest bound of the error of the total mass with which its being 1 is a stricter test than counts:
+/// those of 1e6 draws see relative errors of 1e-2. The bound itself is the row's `detectable`.
 const TOTAL_BOUND: f64 = 1e-4;
 
 /// Sampling errors and deviations of contrasts below this, relative to the value, are rounding.

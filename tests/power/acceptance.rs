@@ -8,13 +8,14 @@
 //! | `pair` | the cloud is thinned: a random pair of neighbours | products of p and 1 - p |
 //! | `number` | the cloud is thinned: how many are accepted | Poisson-binomial |
 //!
-//! What a draw says of its own density is 1 over the weight that it gave. An event of probability 2^-24 is not
-//! met by any affordable number of draws: `tail` begins in it, by a word of random bits whose first 24 are 0.
-//! It looks where p is below 2^-24, so that a number of 24 bits (0, then) accepts everything there, each with
-//! a weight above 2^24.
+//! What a draw says of its own density is 1 over the weight that it gave. An event of probability 2^-24
+//! is not met by any affordable number of draws: `tail` begins in it, by a word of random bits whose
+//! first 24 are 0. It looks where p is below 2^-24, so that a number of 24 bits (0, then) accepts
+//! everything there, each with a weight above 2^24.
 //!
-//! The cloud is thinned as a hierarchy does it. A node of points whose nearest is at distance d_m has candidates at
-//! rate p_m = p(d_m), found by gaps floor(ln(1 - u) / ln(1 - p_m)), of which each is accepted with p_i / p_m.
+//! The cloud is thinned as a hierarchy does it. A node of points whose nearest is at distance d_m has
+//! candidates at rate p_m = p(d_m), found by gaps floor(ln(1 - u) / ln(1 - p_m)), of which each is
+//! accepted with p_i / p_m.
 
 use scatterproof::math::{exp, ln_1p};
 use scatterproof::samplers::{Coordinate, Discrete, Draw, Null, Piece, Sampler};
@@ -42,7 +43,8 @@ pub struct AcceptanceOptions {
     view: View,
 }
 
-/// Effective transport coefficients of skin1 (Jensen et al. 2001), 1/mm: the mean over three bands, and red.
+/// Effective transport coefficients of skin1 (Jensen et al. 2001), 1/mm: the mean over three bands, and
+/// red.
 const MEAN: f64 = 0.823;
 const RED: f64 = 0.272;
 

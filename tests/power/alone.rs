@@ -1,5 +1,5 @@
-//! Two bounces from one medium vertex, by each technique of `connection` alone: the mean of f / p must be
-//! the same whichever draws, so a technique whose draws and density differ is found.
+//! Two bounces from one medium vertex, by each technique of `connection` alone: the mean of f / p must
+//! be the same whichever draws, so a technique whose draws and density differ is found.
 
 use std::sync::Arc;
 
@@ -53,9 +53,10 @@ pub struct TwoBounceOptions {
     pub technique: Technique,
     /// How far beyond the first surface that the probe meets x_i lies along the probe's ray, mm.
     pub depth_mm: f64,
-    /// Only connections whose first flight is longer than this are scored, mm: a part of the integral, the same
-    /// for all. Where a ray from x_k passes x_i at the distance D, the weight of `top_to_bottom` grows as
-    /// 1 / D next to x_i: its variance diverges as a logarithm, and of such a mean no t test says anything.
+    /// Only connections whose first flight is longer than this are scored, mm: a part of the integral,
+    /// the same for all. Where a ray from x_k passes x_i at the distance D, the weight of
+    /// `top_to_bottom` grows as 1 / D next to x_i: its variance diverges as a logarithm, and of such a
+    /// mean no t test says anything.
     pub beyond_mm: f64,
 }
 

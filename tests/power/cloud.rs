@@ -1,10 +1,11 @@
-//! The point-cloud method a second time, with places for defects: M points of a convex body with the flux
+//! The point-cloud method a second time, with places for defects: M points of a convex body with the
+//! flux
 //!   Phi = T12 pi L / f,   f = 1/A by area, 1/(K A_i) where one of K faces is chosen by index,
-//! that one direction with the density cos / pi brings, and camera paths that are refracted into the body with
-//! probability T21 and find there
+//! that one direction with the density cos / pi brings, and camera paths that are refracted into the
+//! body with probability T21 and find there
 //!   L = 1/M sum_p K(d_p) Phi_p B_p / p(d_p),   B_p = 1 with probability p(d_p),
-//! K = R_d / pi of the classical dipole (Jensen, Marschner, Levoy & Hanrahan 2001). Only multiple scattering is scored; a
-//! convex body shades nothing of itself.
+//! K = R_d / pi of the classical dipole (Jensen, Marschner, Levoy & Hanrahan 2001). Only multiple
+//! scattering is scored; a convex body shades nothing of itself.
 
 use std::f64::consts::PI;
 use std::sync::Arc;

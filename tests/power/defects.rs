@@ -135,7 +135,8 @@ pub struct Planted {
     pub family: Family,
     /// What is wrong, in one line.
     pub what: &'static str,
-    /// The tests, `experiment.claim`, `samplers.TEST` or `identity NAME`, of which each is expected to see it.
+    /// The tests, `experiment.claim`, `samplers.TEST` or `identity NAME`, of which each is expected to
+    /// see it.
     pub expected: &'static [&'static str],
 }
 
@@ -613,8 +614,8 @@ const fn verifier(
     of(Family::Verifier, row(name, defect, what, expected))
 }
 
-/// Defects in places where this program cannot plant them, and the test of the library that holds the code
-/// to the opposite.
+/// Defects in places where this program cannot plant them, and the test of the library that holds the
+/// code to the opposite.
 pub const UNIT_TESTED: &[(&str, &str)] = &[
     (
         "a block is dropped or counted twice in the merge",

@@ -11,8 +11,8 @@
 //! The last is what the others start: this program is scatterproof's own command line over a registry
 //! whose estimators of the test (or whose samplers) hold the defect; where the claims are green and an
 //! identity of the surface is broken, it exits with 1 all the same. What judges is the same code, with
-//! the same levels, as for any user. All defects get the same experiments (`*.toml` here), the same budgets,
-//! and streams that their names name.
+//! the same levels, as for any user. All defects get the same experiments (`*.toml` here), the same
+//! budgets, and streams that their names name.
 
 // The planted programs are no part of what ships: their arithmetic may be std's.
 #![allow(clippy::disallowed_methods)]

@@ -10,8 +10,8 @@ use super::defects::{self, Planted, UNIT_TESTED};
 use super::is_sham;
 use super::runs::{self, Outcome};
 
-/// Is an outcome as it must be? A defect is caught where the program does not exit with 0, and one of the
-/// tests that are expected to see it has seen it; the sham has to be green.
+/// Is an outcome as it must be? A defect is caught where the program does not exit with 0, and one of
+/// the tests that are expected to see it has seen it; the sham has to be green.
 pub fn judge(row: &Planted, outcome: &Outcome) -> Result<String, String> {
     let caught = outcome.caught();
     let list = caught.iter().copied().collect::<Vec<_>>().join(", ");
@@ -57,8 +57,8 @@ impl Tally {
     }
 }
 
-/// `matrix [--seeds N] [--only TEXT] [--out DIR]`, of the rows whose names contain TEXT: exit code 1 where a
-/// defect survived a seed or the sham was not green.
+/// `matrix [--seeds N] [--only TEXT] [--out DIR]`, of the rows whose names contain TEXT: exit code 1
+/// where a defect survived a seed or the sham was not green.
 pub fn main(words: &[String]) -> ExitCode {
     let value = |flag: &str| words.iter().position(|w| w == flag).and_then(|i| words.get(i + 1));
     let seeds: u64 = value("--seeds").map_or(20, |text| text.parse().expect("--seeds takes a number"));

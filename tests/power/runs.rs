@@ -32,7 +32,7 @@ pub struct Outcome {
 /// What a test saw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Seen {
-    /// No test saw it.
+    /// The test passed: it saw no defect.
     Green,
     /// Nothing, and too little for what its claim wants: no evidence of a defect either.
     Underpowered,

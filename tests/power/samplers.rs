@@ -58,7 +58,8 @@ const G: f64 = 0.7;
 /// claims to detect (`detect` in samplers.toml).
 const TILT: f64 = 0.06;
 
-/// Henyey-Greenstein about a direction of travel that is aligned with nothing; chart ((1 + mu)/2, turns).
+/// Henyey-Greenstein about a direction of travel that is aligned with nothing; chart ((1 + mu)/2,
+/// turns).
 struct Phase {
     defect: Defect,
     drawn: HenyeyGreenstein,
@@ -140,8 +141,8 @@ impl Sampler for Flight {
     }
 }
 
-/// Distance along a ray over [0, 3] about a point at 1 along it and 0.5 beside it (Kulla & Fajardo 2012):
-/// t - 1 = D tan of an angle that is uniform between those of both ends. Chart t / 3.
+/// Distance along a ray over [0, 3] about a point at 1 along it and 0.5 beside it (Kulla & Fajardo
+/// 2012): t - 1 = D tan of an angle that is uniform between those of both ends. Chart t / 3.
 struct Equiangular {
     defect: Defect,
 }

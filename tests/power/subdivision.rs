@@ -1,7 +1,7 @@
 //! Whole paths with subdivision next-event estimation, and an analog light tracer to compare them with:
 //! both the test's own. Where a path ends in two scatterings and an exit, `connection`'s four techniques
-//! share it; the rest has interface and light samples alone. Survival at every medium vertex is albedo, so
-//! that the throughput on arrival at a vertex is albedo times what came in through the surface.
+//! share it; the rest has interface and light samples alone. Survival at every medium vertex is albedo,
+//! so that the throughput on arrival at a vertex is albedo times what came in through the surface.
 
 use std::sync::Arc;
 
@@ -25,8 +25,8 @@ use super::surface::{Meeting, meet, meet_value};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FluxOptions {
-    /// Of the paths that leave by two scatterings, seen from the sensor, only those are scored whose flight
-    /// between them is longer than this, mm: see `last_two`.
+    /// Of the paths that leave by two scatterings, seen from the sensor, only those are scored whose
+    /// flight between them is longer than this, mm: see `last_two`.
     pub beyond_mm: f64,
 }
 
@@ -252,8 +252,8 @@ impl Photons {
         let origin = bounds.center + bounds.radius * (2.0 * sample.wi + x * across.s + y * across.t);
         let mut ray = Ray { origin, dir: -sample.wi };
         let mut history = History::default();
-        // Events since the entry, and whether the first was a scattering: with the second it makes the two
-        // by which a path leaves that comes from the sensor.
+        // Events since the entry, and whether the first was a scattering: with the second it makes the
+        // two by which a path leaves that comes from the sensor.
         let (mut events, mut begins_in_medium) = (0, false);
         let mut side = Side::Outside;
         let mut hit = scene.shape.intersect(&ray, side, None, f64::INFINITY)?;

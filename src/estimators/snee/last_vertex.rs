@@ -45,7 +45,8 @@ pub struct LastVertex {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub wide_share: f64,
-    /// Least roughness of the wider lobe (at least twice the boundary's own); its width at a smooth boundary.
+    /// Least roughness of the wider lobe (at least twice the boundary's own); its width at a smooth
+    /// boundary.
     #[serde(default = "wide")]
     #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub wide: f64,

@@ -81,7 +81,8 @@ impl Snee {
     /// For a scene.
     ///
     /// # Errors
-    /// A scene that it does not serve; bands that are to share walks and differ in more than their media.
+    /// A scene that it does not serve; bands that are to share walks and differ in more than their
+    /// media.
     pub fn new(scene: Arc<Scene>, options: SneeOptions) -> Result<Snee> {
         Snee::KIND.check(&scene)?;
         Snee::set_up(scene, options)

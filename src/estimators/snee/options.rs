@@ -119,7 +119,7 @@ pub enum SneePreset {
     Guided,
 }
 
-/// Technique that samples the last edge of a path.
+/// One technique that samples the last two segments of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EdgeTechnique {

@@ -25,7 +25,8 @@ fn estimators_have_unique_names() {
 
 #[test]
 fn a_claim_is_of_one_kind() {
-    let rule = "exactly one of `equals`, `agree`, `differs`, `reproduces`, `faster`, `not_slower`, `sampler` is needed, found none";
+    let rule = "exactly one of `equals`, `agree`, `differs`, `reproduces`, `faster`, `not_slower`, `sampler` is \
+                needed, found none";
     holds(&claim("name = \"x\""), rule, "18:1", "");
     let equals = "equals = { value = 1, column = \"r\", source = \"\" }";
     assert!(

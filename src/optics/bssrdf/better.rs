@@ -106,7 +106,7 @@ impl Better {
         self.total
     }
 
-    /// Depths of the dipole's two sources.
+    /// The dipole of the real and the virtual source.
     pub fn shape(&self) -> Dipole {
         self.shape
     }

@@ -54,7 +54,7 @@ impl Classical {
         self.total
     }
 
-    /// Depths of the dipole's two sources.
+    /// The dipole of the real and the virtual source.
     pub fn shape(&self) -> Dipole {
         self.shape
     }

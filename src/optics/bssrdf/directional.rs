@@ -82,7 +82,7 @@ pub struct DirectionalTerms {
     pub d_r: f64,
     /// Distance d_v to the virtual source, mm.
     pub d_v: f64,
-    /// Cosine mu0 of the published correction.
+    /// Cosine mu0 = -n_o.w12 of the refracted direction at the exit.
     pub mu0: f64,
 }
 

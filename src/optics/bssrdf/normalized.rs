@@ -4,9 +4,9 @@
 //!
 //!   R(r) = A s (e^(-s r/l) + e^(-s r/(3l))) / (8 pi l r),
 //! whose integral over the plane is A, the surface's albedo, for any shape s:
-//!   s = 1.85 - A + 7 |A - 0.8|^3     searchlight along the normal, l = mean free path 1/sigma_t' (eq. 6)
-//!   s = 1.9 - A + 3.5 (A - 0.8)^2    diffuse light, the same l (eq. 7)
-//!   s = 3.5 + 100 (A - 0.33)^4       l = diffuse mean free path 1/sigma_tr (eq. 8)
+//!   s = 1.85 - A + 7 |A - 0.8|^3    searchlight along the normal, l = mean free path 1/sigma_t' (eq. 6)
+//!   s = 1.9 - A + 3.5 (A - 0.8)^2   diffuse light, the same l (eq. 7)
+//!   s = 3.5 + 100 (A - 0.33)^4      l = diffuse mean free path 1/sigma_tr (eq. 8)
 //!
 //! Reciprocal, never negative, infinite at r = 0.
 

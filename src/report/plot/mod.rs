@@ -187,13 +187,15 @@ impl Plot {
         for (value, _) in &self.levels {
             let at = y.at(*value);
             svg += &format!(
-                "<path d=\"M{left} {at:.1}H{right:.1}\" stroke=\"currentColor\" stroke-dasharray=\"5 4\" fill=\"none\"/>\n"
+                "<path d=\"M{left} {at:.1}H{right:.1}\" stroke=\"currentColor\" stroke-dasharray=\"5 4\" \
+                 fill=\"none\"/>\n"
             );
         }
         // A nested SVG clips what lies outside the axes.
         let (wide, high) = (right - left, bottom - top);
         svg += &format!(
-            "<svg x=\"{left}\" y=\"{top}\" width=\"{wide:.1}\" height=\"{high:.1}\" viewBox=\"{left} {top} {wide:.1} {high:.1}\">\n"
+            "<svg x=\"{left}\" y=\"{top}\" width=\"{wide:.1}\" height=\"{high:.1}\" viewBox=\"{left} {top} \
+             {wide:.1} {high:.1}\">\n"
         );
         let coloured = || self.series.iter().zip(self.colours());
         coloured().for_each(|(series, colour)| svg += &series.band(&x, &y, colour));
@@ -239,9 +241,10 @@ impl Plot {
             );
         }
         svg + &format!(
-            "<path d=\"M{left} {top}V{bottom}H{right:.1}\" stroke=\"currentColor\" fill=\"none\"/>\
-             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"currentColor\">{}</text>\
-             <text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\" fill=\"currentColor\">{}</text>\n",
+            "<path d=\"M{left} {top}V{bottom}H{right:.1}\" stroke=\"currentColor\" fill=\"none\"/><text \
+             x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"currentColor\">{}</text><text \
+             transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\" \
+             fill=\"currentColor\">{}</text>\n",
             0.5 * (left + right),
             height - 8.0,
             escape(&self.x.label),

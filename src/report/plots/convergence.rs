@@ -25,10 +25,11 @@ pub(super) fn section(stored: &Stored) -> Section {
     let cells = stored.record.cells.iter().enumerate();
     Section {
         heading: "Error against time and rays".into(),
-        text: "Relative root-mean-square error of the sensor's first observable, all bands together: how far independent \
-               means of so many passes lie apart (points, with 95 % intervals), and what 1 / sqrt(passes) promises from \
-               the variance of all passes (dotted, to the end of the run). Points above their dotted line, or falling \
-               more slowly, mean that the variance is not what the passes show."
+        text: "Relative root-mean-square error of the sensor's first observable, all bands together: how far \
+               independent means of so many passes lie apart (points, with 95 % intervals), and what 1 / \
+               sqrt(passes) promises from the variance of all passes (dotted, to the end of the run). Points \
+               above their dotted line, or falling more slowly, mean that the variance is not what the passes \
+               show."
             .into(),
         drawn: cells.flat_map(|(index, cell)| of_cell(stored, index, cell)).collect(),
         are_small: true,

@@ -6,15 +6,16 @@
 //! p_i / q.
 //!
 //! Same law as independent Bernoulli(p_i):
-//!   1. The nodes at which a query stops depend on the query point, the tree and constants alone, not on random numbers,
-//!      and their ranges partition the points.
-//!   2. The candidates of a range are independent Bernoulli(q), made in one of two ways that p_m alone decides:
-//!      by gaps, q = p_m: floor(ln U / ln(1 - q)) is geometric with success q on 0, 1, ..., and independent geometric
-//!      gaps between successes are what a Bernoulli process has;
-//!      by words, q = ceil(256 p_m) / 256: bit by bit from the last binary digit of q, a random word is or-ed (digit 1)
-//!      or and-ed (digit 0) to the result, each of whose 64 bits is then 1 with probability (digit + before) / 2.
-//!   3. A candidate is accepted by a fresh number with p_i / q <= 1, as p does not increase and no point is nearer than
-//!      its box: independent Bernoulli(q p_i / q) = Bernoulli(p_i).
+//!   1. The nodes at which a query stops depend on the query point, the tree and constants alone, not on
+//!      random numbers, and their ranges partition the points.
+//!   2. The candidates of a range are independent Bernoulli(q), made in one of two ways that p_m alone
+//!      decides: by gaps, q = p_m: floor(ln U / ln(1 - q)) is geometric with success q on 0, 1, ..., and
+//!      independent geometric gaps between successes are what a Bernoulli process has; by words, q =
+//!      ceil(256 p_m) / 256: bit by bit from the last binary digit of q, a random word is or-ed
+//!      (digit 1) or and-ed (digit 0) to the result, each of whose 64 bits is then 1 with probability
+//!      (digit + before) / 2.
+//!   3. A candidate is accepted by a fresh number with p_i / q <= 1, as p does not increase and no point
+//!      is nearer than its box: independent Bernoulli(q p_i / q) = Bernoulli(p_i).
 //!   4. Different ranges use different numbers of the stream.
 
 use std::ops::Range;

@@ -36,11 +36,13 @@ pub struct Ratio {
     pub unresolved: Option<String>,
 }
 
-/// The ratio in every band, for a run of a cell. `seconds` are CPU seconds of all the images, and of the record's run.
+/// The ratio in every band, for a run of a cell. `seconds` are CPU seconds of all the images, and of the
+/// record's run.
 ///
-/// log V of the images is the pooled variance of their pixels, its error by a jackknife over seeds; of the
-/// record's, that of its pixels, its error by a jackknife over batches of the sum of its tiles' variances,
-/// which is the same sum of pixels. Seconds are taken as exact. t has K - 1 degrees of freedom.
+/// log V of the images is the pooled variance of their pixels, its error by a jackknife over seeds; of
+/// the record's, that of its pixels, its error by a jackknife over batches of the sum of its tiles'
+/// variances, which is the same sum of pixels. Seconds are taken as exact. t has K - 1 degrees of
+/// freedom.
 pub fn ratios(
     stored: &Stored,
     cell: usize,

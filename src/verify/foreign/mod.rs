@@ -293,7 +293,8 @@ impl BandQuestion<'_> {
             false => TestKind::TOfSeeds,
         });
         let (a, b) = (theirs.std_error, arm.mean.std_error);
-        // The fewer degrees of freedom bound the tails for every ratio of variances: see `BandImages::difference`.
+        // The fewer degrees of freedom bound the tails for every ratio of variances: see
+        // `BandImages::difference`.
         Evidence::of_difference(Estimate {
             value: theirs.value - arm.mean.value,
             std_error: (a * a + b * b).sqrt(),
