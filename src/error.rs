@@ -27,7 +27,7 @@ pub struct Diagnostic {
 pub struct Place {
     /// The name of the text: a path, or `--set`.
     pub name: Arc<str>,
-    /// The text itself.
+    /// Text of the input.
     pub text: Arc<str>,
     /// The bytes the finding covers.
     pub span: Range<usize>,

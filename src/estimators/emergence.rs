@@ -67,7 +67,7 @@ impl Emergence<'_> {
 
 /// The streams of one camera path beside its walk.
 pub(super) struct PathStreams {
-    /// Of light samples at entries.
+    /// Random numbers of light samples at entries.
     pub lights: Stream,
     /// Random numbers of entry points.
     pub entries: Stream,

@@ -26,7 +26,7 @@ pub enum SensorKind {
     Perspective,
     /// One ray from outside.
     Probe,
-    /// A medium vertex.
+    /// Sensor at a medium vertex.
     Vertex,
     /// Exitance or flux by the cosine of the exit direction.
     Flux,

@@ -1,4 +1,4 @@
-//! From the words of a validated experiment to the scene: the one match from names to types.
+//! From a validated experiment to the scene: the one match from names to types.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;

@@ -27,7 +27,7 @@ pub struct ClaimEntry {
     /// Two measurements do not agree (a control): the difference must be found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differs: Option<Differs>,
-    /// The record comes out again, bit for bit.
+    /// The record is reproduced bit for bit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reproduces: Option<Reproduces>,
     /// An estimator is more efficient than another.

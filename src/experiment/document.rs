@@ -125,7 +125,7 @@ impl Node {
         })
     }
 
-    /// The place to name for what is wrong with the whole of it: the key of a table, else the value.
+    /// The place to report for an error in the whole node: the key of a table, else the value.
     pub fn place(&self) -> &Place {
         match (&self.value, &self.key) {
             (Value::Table(_), Some(key)) if !self.inline => key,

@@ -96,7 +96,7 @@ fn tenth_more() -> f64 {
     1.1
 }
 
-/// What both claims come to: an efficiency ratio that must exceed a bound.
+/// Common form of both claims: an efficiency ratio that must exceed a bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Duel<'a> {
     /// The estimator under test.

@@ -7,13 +7,13 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 
-/// From words to scenes.
+/// From entries to scenes.
 pub mod build;
 
-/// Words for claims.
+/// Claims as they are written.
 mod claim_words;
 
-/// Words for directions.
+/// Directions as they are written.
 mod direction;
 
 /// A TOML text as a tree with places.
@@ -31,7 +31,7 @@ mod origins;
 /// Setting values by dotted key.
 mod overrides;
 
-/// What pictures a file may ask for.
+/// Pictures that a file may ask for.
 pub mod picture;
 
 /// The kinds of estimators and samplers that a file may name.
@@ -52,7 +52,7 @@ pub mod schema;
 /// The JSON Schema of a file.
 pub mod schema_json;
 
-/// Words for sensors.
+/// Sensors as they are written.
 mod sensor;
 
 /// Suggestions of similar names ("did you mean").
@@ -129,7 +129,7 @@ pub struct CellSpec {
     pub sweep_values: BTreeMap<String, Value>,
 }
 
-/// What the command line adds to a file.
+/// Overrides from the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
     /// `key=value` arguments, applied in order after the setting.

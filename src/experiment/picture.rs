@@ -59,7 +59,7 @@ pub struct SplitEntry {
     pub exposure_stops: Option<f64>,
 }
 
-/// What the results folder keeps of the pictures that a file asks for.
+/// The pictures that a file asks for, as the results folder keeps them.
 pub fn wanted(entries: &[PictureEntry]) -> Vec<Wanted> {
     entries.iter().filter_map(PictureEntry::wanted).collect()
 }

@@ -85,7 +85,7 @@ pub struct ExperimentFile {
     pub display: Display,
 }
 
-/// The wavelength bands.
+/// How the spectrum is divided into wavelength bands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum BandsEntry {
@@ -311,7 +311,7 @@ pub enum EtaFormula {
     },
     /// n^2 = 1 + sum_i b_i l^2 / (l^2 - c_i), l in um.
     Sellmeier {
-        /// Strengths.
+        /// Oscillator strengths b_i.
         #[schemars(length(min = 1))]
         b: Vec<f64>,
         /// Squared resonance wavelengths, um^2.

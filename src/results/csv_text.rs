@@ -86,7 +86,7 @@ macro_rules! displayed {
     };
 }
 
-/// What is no field of a row.
+/// An error: not a field of a row.
 macro_rules! refused {
     ($($method:ident($($argument:ty),*) -> $result:ty;)*) => {
         $(fn $method(self, $(_: $argument),*) -> Result<$result, fmt::Error> {

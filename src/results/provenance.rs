@@ -1,4 +1,4 @@
-//! What built and ran it.
+//! Build and machine of a run.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,9 +28,9 @@ const LOCK: &str = include_str!("../../Cargo.lock");
 pub struct Provenance {
     /// This crate's version.
     pub version: String,
-    /// What fixes the bits.
+    /// Fingerprint of what fixes the bits.
     pub fingerprint: String,
-    /// blake3 of the program itself, hex: what another build has left is not gone on with.
+    /// blake3 of the program itself, hex: the states of another build are not resumed.
     pub build: String,
     /// Commit of the source tree the program was built from, as it was when it ran.
     pub commit: Option<String>,
@@ -132,7 +132,7 @@ fn checkout(folder: &Path) -> (Option<String>, Option<bool>) {
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_string())
     };
     let commit = git(&["rev-parse", "HEAD"]);
-    // What runs write makes no other program.
+    // The output of runs does not change the program.
     let changes = ["status", "--porcelain", "--untracked-files=no", "--", ".", ":(exclude)results"];
     let status = commit.as_ref().and_then(|_| git(&changes));
     (commit, status.map(|s| !s.is_empty()))

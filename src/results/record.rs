@@ -283,7 +283,7 @@ pub enum ClaimKind {
     Agree,
     /// Two measurements differ.
     Differs,
-    /// The record comes out again, bit for bit.
+    /// The record is reproduced bit for bit.
     Reproduces {
         /// The checksum that the record's numbers must have.
         numbers: Option<String>,

@@ -1,4 +1,4 @@
-//! From what jobs gave to the record, its arrays, and the timing.
+//! From the results of jobs to the record, its arrays, and the timing.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -43,7 +43,7 @@ pub fn claim_hashes(experiment: &Experiment) -> Vec<String> {
     experiment.file.claim.iter().map(hash_json).collect()
 }
 
-/// Puts what a plan's jobs measured into a record.
+/// Assembles the measurements of a plan's jobs into a record.
 pub fn assemble(
     experiment: &Experiment,
     plan: &Plan,

@@ -1,5 +1,5 @@
-//! Units of work: an estimator in a cell, or a sampler; and the passes of an estimator with what they
-//! leave.
+//! Units of work: an estimator in a cell, or a sampler; and the passes of an estimator with their
+//! results.
 
 use std::time::Instant;
 
@@ -15,16 +15,16 @@ use crate::stats::tree::{Counter, Merge};
 
 /// One unit of work.
 pub struct Job {
-    /// What people call it: cell and estimator, or the sampler.
+    /// Label in messages: cell and estimator, or the sampler.
     pub label: String,
     /// Hash of all that its result depends on except the number of passes, hex: its state is kept under
     /// it.
     pub identity: String,
-    /// What is to be done.
+    /// The task.
     pub task: Task,
 }
 
-/// What a job does.
+/// Task of a job.
 pub enum Task {
     /// Runs passes of an estimator in a cell.
     Estimate(Box<Passes>),
@@ -33,7 +33,7 @@ pub enum Task {
 }
 
 impl Job {
-    /// Its passes, where it is of an estimator.
+    /// The passes, where the job is of an estimator.
     pub fn passes(&self) -> Option<&Passes> {
         match &self.task {
             Task::Estimate(passes) => Some(passes),
@@ -41,7 +41,7 @@ impl Job {
         }
     }
 
-    /// Its draws, where it is of a sampler.
+    /// The draws, where the job is of a sampler.
     pub fn draws(&self) -> Option<&Draws> {
         match &self.task {
             Task::Estimate(_) => None,
@@ -53,11 +53,11 @@ impl Job {
 /// A run of an estimator in a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
-    /// The estimator's name, or that of its control.
+    /// Name of the estimator, or of its control.
     pub name: String,
     /// A second arm of the same estimator, on streams of its own.
     pub is_control: bool,
-    /// It is timed side by side with the other arms of its cell that are.
+    /// Whether it is timed side by side with other arms of its cell.
     pub is_timed: bool,
 }
 
@@ -69,9 +69,9 @@ pub struct Passes {
     pub entry: usize,
     /// Which run of the estimator it is.
     pub arm: Arm,
-    /// What its passes are for.
+    /// Stage that the passes belong to.
     pub stage: Stage,
-    /// Their number, where the budget does not state it.
+    /// Number of passes, where the budget does not state it.
     pub count: Option<u64>,
     /// Estimator that runs the passes.
     pub estimator: Box<dyn Estimator>,
@@ -93,7 +93,7 @@ pub struct Group {
     pub pilot: StreamKey,
 }
 
-/// What a run of passes left behind.
+/// Moments and counts of a run of passes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Block {
     /// Moments of `[observable][band]`, kept by batch.
@@ -116,11 +116,11 @@ pub struct Block {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Start {
-    /// Hashes of the claims: what is claimed later is claimed with the result in sight.
+    /// Hashes of the claims: later claims are made with the result in sight.
     pub claims: Vec<String>,
     /// Hash of the budget that was turned into passes.
     pub budget: String,
-    /// Those passes: the same budget is not turned into others.
+    /// Passes that the budget was turned into, fixed once.
     pub passes: u64,
 }
 
@@ -132,7 +132,7 @@ pub struct Work {
     pub cost: [u64; Cost::ALL.len()],
     /// CPU time of the passes alone, seconds.
     pub cpu_seconds: f64,
-    /// How many of them were timed side by side with their rivals, by a worker that was warm.
+    /// How many passes were timed side by side with their rivals, by a worker that was warm.
     pub settled: u64,
 }
 
@@ -248,7 +248,7 @@ impl Block {
     }
 }
 
-/// What a finished job has measured: its batches, and one image instead of the tree's many.
+/// Measurement of a finished job: its batches, and one image instead of the tree's many.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finished {
     /// Number of passes.
@@ -273,7 +273,7 @@ impl Finished {
 }
 
 impl Block {
-    /// All passes are done: folds what the tree still holds apart.
+    /// All passes are done: merges the nodes that the tree still keeps separate.
     pub fn finish(self) -> Finished {
         Finished {
             passes: self.next_pass(),
@@ -287,7 +287,7 @@ impl Block {
 }
 
 impl Passes {
-    /// Number of the group of jobs that are timed side by side, where it is of one.
+    /// Number of the group of jobs that are timed side by side, where the job belongs to one.
     pub fn side_by_side(&self) -> Option<usize> {
         self.arm.is_timed.then_some(self.cell)
     }

@@ -57,12 +57,12 @@ pub struct Options {
     /// without it the budget does. A budget in seconds gives another number of passes each time that it
     /// is measured anew: this is how such a record is reproduced bit for bit.
     pub passes_of: Option<PathBuf>,
-    /// A viewer that shows images while they are made.
+    /// Viewer that shows images while they are rendered.
     pub live: Option<Arc<Live>>,
 }
 
 impl Options {
-    /// Into `out`, on all cores.
+    /// Options that write into `out` and use all cores.
     pub fn new(out: impl Into<PathBuf>) -> Options {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Options {
@@ -102,7 +102,7 @@ pub fn run(
     Ok((folder, stored))
 }
 
-/// Has every estimator run as many passes as the record in `from` has of it.
+/// Sets the passes of every estimator to those of the record in `from`.
 fn take_passes(plan: &mut Plan, experiment: &Experiment, from: &RecordFolder) -> Result<()> {
     if plan.jobs.iter().all(|job| job.passes().is_none()) {
         let name = &experiment.file.name;
@@ -126,7 +126,7 @@ fn take_passes(plan: &mut Plan, experiment: &Experiment, from: &RecordFolder) ->
     Ok(())
 }
 
-/// Carries a plan out into the results folder `root`.
+/// Executes a plan and writes the results folder `root`.
 fn execute(
     experiment: &Experiment,
     plan: &Plan,
@@ -167,7 +167,7 @@ fn execute(
     Ok((folder, stored))
 }
 
-/// The first passes once more, as `reproduces` claims want it.
+/// Runs the first passes again where `reproduces` claims ask for it.
 fn replays(
     experiment: &Experiment,
     plan: &Plan,

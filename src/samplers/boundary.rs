@@ -240,9 +240,9 @@ struct SlopeEdges {
     disc: [f64; 2],
     cone: [f64; 2],
     wrong_side: f64,
-    /// q_r = q_c.
+    /// Parameter where q_r = q_c.
     corner: f64,
-    /// q_w = q_c.
+    /// Parameter where q_w = q_c.
     touch: f64,
     horizon: f64,
 }

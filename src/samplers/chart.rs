@@ -28,7 +28,7 @@ pub trait Chart: Send + Sync {
     /// A point of the domain.
     type Point: Copy;
 
-    /// The piece.
+    /// The piece that the chart covers.
     fn piece(&self) -> Piece;
 
     /// The coordinates of a point, with the domain's measure per unit of them.

@@ -10,13 +10,13 @@ pub trait Sampler: Send + Sync {
     /// Draws one outcome.
     fn draw(&self, stream: &mut Stream) -> Draw;
 
-    /// The continuous pieces.
+    /// The continuous pieces of the distribution.
     fn pieces(&self) -> Vec<Piece>;
 
     /// Density of piece `piece` per unit of its chart, from the code's own density function.
     fn density(&self, piece: usize, at: [f64; 2]) -> f64;
 
-    /// The discrete outcomes.
+    /// The discrete outcomes of the distribution.
     fn deltas(&self) -> Vec<Discrete> {
         Vec::new()
     }

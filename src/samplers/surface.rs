@@ -39,7 +39,7 @@ pub const MESH: SamplerKind = sampler_kind!(
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct MeshOptions {
-    /// The mesh.
+    /// Shape of the mesh.
     shape: UnevenShape,
     /// How a triangle is chosen.
     triangles: FaceChoice,

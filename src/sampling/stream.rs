@@ -15,7 +15,7 @@ pub enum Purpose {
     Sensor = 1,
     /// The walk: distances, directions, lobes, roulette.
     Walk = 2,
-    /// Light samples.
+    /// Numbers of light samples.
     Light = 3,
     /// Connections from medium vertices through the boundary.
     Connection = 4,

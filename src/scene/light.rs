@@ -10,7 +10,7 @@ use crate::sampling::warp::{pdf_cap, square_to_cap};
 /// A light, with its radiance (or irradiance) per band.
 #[derive(Debug)]
 pub struct Light {
-    /// Name in observables.
+    /// Name of the light in observables.
     pub name: String,
     /// Radiance or irradiance by direction and band.
     pub emission: Emission,

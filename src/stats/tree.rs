@@ -16,7 +16,7 @@ pub trait Merge: Sized {
     fn merge(self, later: Self) -> Self;
 }
 
-/// Element by element.
+/// Merges element by element.
 impl<T: Merge> Merge for Vec<T> {
     fn merge(self, later: Vec<T>) -> Vec<T> {
         assert_eq!(self.len(), later.len(), "vectors of one length");

@@ -57,12 +57,12 @@ pub struct EfficiencyRow {
     pub cpu_cost_ratio: Option<f64>,
     /// Rays of a pass, baseline over candidate.
     pub ray_cost_ratio: Option<f64>,
-    /// Is the ratio one that more passes would not move out of its interval, and that no single pass
-    /// makes?
+    /// Whether the ratio is resolved: more passes would not move it out of its interval, and no single
+    /// pass dominates it.
     pub resolved: bool,
     /// What counts as cost.
     pub cost: CostMeasure,
-    /// Were the two timed side by side? By counters it does not matter.
+    /// Whether the two were timed side by side; by counters it does not matter.
     pub side_by_side: bool,
     /// Kurtosis of a pass of the baseline.
     pub kurtosis_baseline: Option<f64>,
@@ -84,7 +84,7 @@ pub fn to_csv(rows: &[EfficiencyRow]) -> String {
     csv_text::table(rows)
 }
 
-/// What a row compares.
+/// The two arms of a row.
 struct RowSubject<'a> {
     cell: &'a Cell,
     baseline: (&'a EstimatorRun, Quantity),
@@ -234,7 +234,7 @@ fn rays(stored: &Stored, run: &EstimatorRun) -> Option<f64> {
     Some((count("rays")? + count("shadow_rays").unwrap_or(0.0)) / run.passes as f64)
 }
 
-/// What a measure is called in tables.
+/// Name of a measure in tables.
 pub fn measure_name(measure: CostMeasure) -> &'static str {
     match measure {
         CostMeasure::Counters => "counters",

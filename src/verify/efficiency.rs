@@ -49,7 +49,7 @@ const LEAST_QUADRUPLES: usize = 16;
 pub struct Contest {
     /// Baseline over candidate: above 1 where the candidate is the better.
     pub efficiency: Efficiency,
-    /// Were they timed side by side? Always so by counters.
+    /// Whether they were timed side by side; always true by counters.
     pub side_by_side: bool,
 }
 
@@ -134,7 +134,7 @@ impl CostedBatches {
     }
 
     /// Batches of pairs with what their passes cost. A batch of pairs is one of passes, or two where
-    /// those are of one pass each. The cost of a pair is put down as that of one pass, and of a batch's
+    /// those are of one pass each. The cost of a pair is recorded as that of one pass, and of a batch's
     /// odd pass not at all.
     fn of_pairs(
         batches: &[Moments],
@@ -187,7 +187,7 @@ fn quadruples(a: &CostedBatches, b: &CostedBatches) -> (Vec<JackknifeBlock>, Vec
 pub(super) struct EfficiencyClaim<'a> {
     pub candidate: &'a Quantity,
     pub baseline: &'a Quantity,
-    /// What E must exceed.
+    /// Bound that E must exceed.
     pub bound: f64,
     pub cost: CostMeasure,
 }

@@ -13,9 +13,9 @@ pub const CONFIDENCE: f64 = 0.999;
 /// What the numbers of one test show.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Evidence {
-    /// Nothing, for this reason.
+    /// No evidence, for this reason.
     Nothing(String),
-    /// A statement without chance: it holds, or it does not.
+    /// An exact statement: it holds, or it does not.
     Exact { holds: bool, said: String },
     /// A difference with its error; its p-value is this many times that of Student's t.
     Difference { difference: Estimate, times: f64 },
@@ -45,7 +45,7 @@ impl Evidence {
         Evidence::Exact { holds, said }
     }
 
-    /// The test; none where there is nothing to test, or no chance.
+    /// The test; none where there is nothing to test, or the statement is exact.
     pub fn test(&self) -> Option<Test> {
         match self {
             Evidence::Nothing(_) | Evidence::Exact { .. } => None,
@@ -99,7 +99,7 @@ fn test_of(difference: &Estimate, times: f64) -> Test {
     Test { statistic, dof, p_value }
 }
 
-/// Counts against probabilities: what knows the smallest defect that it would have found.
+/// Counts against probabilities, with the smallest defect that they would have found.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum CountsFit {
     /// Chi-square over many bins.
@@ -121,7 +121,7 @@ impl CountsFit {
     }
 }
 
-/// What a claim of efficiency shows: see `verify::efficiency`.
+/// Evidence on a claim of efficiency: see `verify::efficiency`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct EfficiencyTest {
     /// E, variance times cost of the baseline over that of the candidate.
@@ -132,9 +132,9 @@ pub(super) struct EfficiencyTest {
     pub kurtosis: (f64, f64),
     /// The difference of the means, relative to the larger.
     pub difference: Estimate,
-    /// Is it the means that speak against the claim, more than E?
+    /// Whether the means contradict the claim more than E does.
     pub blames_means: bool,
-    /// A control wants E to fall short.
+    /// Whether a control expects E to fall short.
     pub fails: bool,
     /// Student's t of ln E - ln e, with the p-value of the claim as a whole.
     pub test: Test,
@@ -142,8 +142,8 @@ pub(super) struct EfficiencyTest {
 
 impl EfficiencyTest {
     /// The outcome, where the p-value adjusted over the family is `adjusted_p` and a test fails below
-    /// `level`; `own_level` is the level of this test alone. A control that expects failure wants it of
-    /// E.
+    /// `level`; `own_level` is the level of this test alone. A control expects E to
+    /// fail.
     pub fn outcome(
         &self,
         adjusted_p: Option<f64>,

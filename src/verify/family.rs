@@ -11,13 +11,13 @@ use crate::stats::multiplicity::holm;
 /// One test of a family.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Finding {
-    /// What it shows by itself.
+    /// Evidence of the test by itself.
     pub evidence: Evidence,
     /// What `detectable` of a difference is relative to; 0 for absolute.
     pub relative_to: f64,
     /// The largest defect that may go unseen, in the units of the verdict's `detectable`.
     pub detect: Option<f64>,
-    /// It has no second look: that would share this one's errors, or come too late.
+    /// Whether it has one look: a second one would share its errors, or come too late.
     pub one_look: bool,
     /// Filled in except for the test's numbers, outcome and note.
     pub verdict: Verdict,
@@ -29,7 +29,7 @@ impl Finding {
         Finding { evidence, relative_to: 0.0, detect: None, one_look: false, verdict }
     }
 
-    /// Did the first look fail, and is it one that a second look decides?
+    /// Whether the first look failed and a second look decides.
     fn wants_second_look(&self, adjusted_p: Option<f64>, looks: Looks) -> bool {
         matches!(self.evidence, Evidence::Difference { .. } | Evidence::Counts { .. })
             && !self.one_look
@@ -40,20 +40,20 @@ impl Finding {
 
 /// The verdicts of a family.
 pub(super) struct Concluded {
-    /// One verdict a finding.
+    /// One verdict for each finding.
     pub verdicts: Vec<Verdict>,
-    /// The findings that want a second look which was not taken yet; their verdicts are `fail` until
+    /// The findings that need a second look which was not taken yet; their verdicts are `fail` until
     /// then.
     pub wanted: Vec<usize>,
 }
 
-/// What a second look came to.
+/// State of a second look.
 enum SecondLook {
-    /// It was not taken yet.
+    /// Not taken yet.
     Missing,
-    /// It means nothing, for this reason.
+    /// Void, for this reason.
     Invalid(String),
-    /// Its adjusted p-value.
+    /// Taken, with this adjusted p-value.
     Taken(f64),
 }
 
@@ -134,7 +134,7 @@ fn state(
         _ => match adjusted_p {
             None => Outcome::Invalid("the test has no p-value".into()),
             Some(p) if p < looks.at_once() => Outcome::Fail,
-            // Where nothing is known to be detectable, nothing is.
+            // Without a known detectable size nothing counts as detectable.
             _ if detect.is_some_and(|d| verdict.detectable.is_none_or(|found| found > d)) => {
                 Outcome::Underpowered
             }

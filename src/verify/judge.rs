@@ -20,31 +20,31 @@ const TABLE: usize = 10;
 pub struct Case<'a> {
     /// Record of the main run.
     pub main: &'a Stored,
-    /// What was measured again for a second look, where there was one.
+    /// Record of the second look, where there was one.
     pub retest: Option<&'a Stored>,
 }
 
 /// The result of a verification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
-    /// One verdict a comparison, case by case.
+    /// One verdict for each comparison, case by case.
     pub verdicts: Vec<Verdict>,
     /// Number of the case that each verdict is of.
     pub case_of: Vec<usize>,
-    /// What wants a second look that no record holds yet; its verdicts are `fail` until then.
+    /// Cases that need a second look that no record holds yet; their verdicts are `fail` until then.
     pub wanted: Vec<LookAgain>,
 }
 
-/// What wants a second look.
+/// A case that needs a second look.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookAgain {
     /// Index of the case.
     pub case: usize,
-    /// What is to be measured again.
+    /// Subjects to measure again.
     pub subject: Measured,
 }
 
-/// Something that can be measured again.
+/// A subject that can be measured again.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Measured {
     /// A quantity of a scene.
@@ -58,7 +58,7 @@ pub fn judge_alone(stored: &Stored) -> Vec<Verdict> {
     judge(&[Case { main: stored, retest: None }], Looks::ALONE).verdicts
 }
 
-/// What a trial is of.
+/// Subject of a trial.
 #[derive(Clone, Copy)]
 struct TrialOf {
     case: usize,

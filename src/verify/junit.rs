@@ -1,4 +1,4 @@
-//! Verdicts for continuous integration, in the XML that JUnit began and CI systems read.
+//! Verdicts for continuous integration, in JUnit's XML format.
 
 use super::verdict::{Outcome, Verdict};
 

@@ -10,7 +10,7 @@
 //! probability at most 1e-3, and fails it, the streams being independent, with conditional probability
 //! at most 5e-4: together at most 5e-7 + 1e-3 * 5e-4 = 1e-6 = `FAMILY_LEVEL`.
 //!
-//! What this buys: a defect is found with 99 % probability at the first look's critical value plus 2.33
+//! The gain: a defect is found with 99 % probability at the first look's critical value plus 2.33
 //! standard errors, and the second look sees it at twice that distance, so nothing is lost there. For
 //! m = 300 the first look cuts at 4.65 standard errors where one look at 1e-6 would cut at 5.91: 6.98
 //! against 8.24 standard errors to be found, 1.4 times fewer passes.
@@ -55,7 +55,7 @@ pub enum Looks {
 }
 
 impl Looks {
-    /// A record by itself, without second looks.
+    /// A single record, without second looks.
     pub const ALONE: Looks = Looks::One { level: FAMILY_LEVEL };
 
     /// The family-wise level at which a test fails at once.

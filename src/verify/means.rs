@@ -46,7 +46,7 @@ impl<'a> QuantityMean<'a> {
         Some(QuantityMean { run, batches, all, mean })
     }
 
-    /// Why no statement about it is worth anything.
+    /// Why every statement about it is void.
     pub fn objection(&self) -> Option<String> {
         let name = &self.run.estimator;
         let anomaly =
@@ -98,16 +98,16 @@ impl<'a> QuantityMean<'a> {
 /// What a claim asks of the means that it is about.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asked {
-    /// They are to be equal: an estimator with a bias cannot claim that.
+    /// Whether they must be equal: an estimator with a bias cannot claim that.
     agreement: bool,
-    /// A difference is to be found, so that a reason for one is no objection.
+    /// Whether a difference must be found, so that a reason for one is no objection.
     difference: bool,
-    /// It is about each class or observable that there is: some may be dark.
+    /// Whether it is on each class or observable that exists: some may be 0.
     each: bool,
 }
 
 impl Asked {
-    /// Two means are to be equal.
+    /// A claim that two means are equal.
     pub const EQUAL: Asked = Asked { agreement: true, difference: false, each: false };
 
     /// What a claim asks.
@@ -129,12 +129,12 @@ pub(super) enum Reference<'a> {
     Mean { quantity: &'a Quantity, paired: bool },
 }
 
-/// What holding a mean against its reference shows.
+/// Result of comparing a mean with its reference.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Held {
     /// Evidence of the comparison.
     pub evidence: Evidence,
-    /// The test, where it came to one.
+    /// The test, where one was possible.
     pub test: Option<TestKind>,
     /// The relative deviation, where there is no sampling error.
     pub deviation: Option<f64>,
@@ -151,7 +151,7 @@ pub(super) fn evidence_of_means(stored: &Stored, a: &Quantity, b: &Quantity) -> 
     hold(stored, a, Reference::Mean { quantity: b, paired: false }, Asked::EQUAL)
 }
 
-/// Holds a mean against its reference.
+/// Compares a mean with its reference.
 pub(super) fn hold(stored: &Stored, quantity: &Quantity, reference: Reference, asked: Asked) -> Held {
     let a = QuantityMean::of(stored, quantity);
     let (b, is_paired, stated) = match reference {
@@ -223,7 +223,7 @@ fn hold_exact(held: &mut Held, difference: f64, scale: f64, stated_error: f64, v
     held.evidence = Evidence::Exact { holds, said };
 }
 
-/// Why the test would mean nothing.
+/// Why the test would be void.
 fn objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Option<String> {
     means
         .iter()
@@ -261,8 +261,8 @@ fn model_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
     ))
 }
 
-/// Two estimators that both scored nothing agree on nothing: they may share what keeps them dark. A
-/// claim on each class is not void by one that does not occur, as long as their sum is not dark.
+/// Two estimators that both scored nothing agree on nothing: they may share the defect that makes them
+/// zero. A claim on each class is not void by one that does not occur, as long as their sum is not 0.
 fn silence_objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Option<String> {
     if asked.each && quantity.observable.class != "all" {
         return None;

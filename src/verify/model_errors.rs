@@ -1,4 +1,4 @@
-//! What models are off by: their means against light transport itself, in the same cell. Measured, never
+//! Errors of models: their means against light transport itself, in the same cell. Measured, never
 //! judged.
 
 use crate::results::csv_text;

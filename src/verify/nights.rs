@@ -20,7 +20,7 @@ use crate::stats::evidence::calibrated;
 /// The probability of any false alarm of the accumulated evidence, over all tests and nights.
 pub const LIFE_LEVEL: f64 = 1e-3;
 
-/// The state that nights hand on: a small JSON file.
+/// The state passed from night to night: a small JSON file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Nights {
@@ -34,13 +34,13 @@ pub struct Nights {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Accumulated {
-    /// What fixes the numbers: another one begins again.
+    /// Fingerprint of what fixes the numbers: another one begins again.
     pub code: String,
     /// Nights counted.
     pub nights: u64,
     /// Natural logarithm of the product of e-values.
     pub log_e: f64,
-    /// The largest that it has been: what alarms look at.
+    /// Largest value so far, which alarms compare with.
     pub peak: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Claims that a record comes out again, bit for bit.
+//! Claims that a record is reproduced bit for bit.
 
 use super::evidence::Evidence;
 use super::family::Finding;

@@ -1,4 +1,4 @@
-//! What a sampler's record shows: its draws compared with the density that it claims.
+//! Tests of a sampler: its draws compared with the density that it claims.
 //!
 //! | test | statement | judged by |
 //! |---|---|---|
@@ -52,7 +52,7 @@ pub(super) fn trials(stored: &Stored, index: usize, comparison: &SamplerComparis
 struct Tests<'a> {
     stored: &'a Stored,
     run: &'a SamplerRun,
-    /// With the names filled in.
+    /// A verdict with the names filled in.
     verdict: Verdict,
     findings: Vec<Finding>,
 }

@@ -13,7 +13,7 @@ use crate::results::store::Stored;
 use crate::stats::multiplicity::holm;
 use crate::stats::tails::normal_two_sided;
 
-/// The probability that any ratio of a comparison is called another although none is.
+/// The probability that any ratio of a comparison is reported as different although none is.
 pub const LEVEL: f64 = 1e-3;
 
 /// Standard errors in half a 95 % interval.
@@ -35,7 +35,7 @@ pub struct TimingRatio {
 }
 
 impl TimingRatio {
-    /// Are the two one ratio, for all that is known?
+    /// Whether the two ratios are compatible.
     pub fn is_compatible(&self) -> bool {
         self.adjusted_p >= LEVEL
     }

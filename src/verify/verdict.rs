@@ -16,7 +16,7 @@ pub enum Outcome {
     Fail,
     /// No defect was found, and one as large as the claim wants to see could have been missed.
     Underpowered,
-    /// The test would mean nothing, for this reason.
+    /// The test would be void, for this reason.
     Invalid(String),
 }
 
@@ -72,7 +72,7 @@ pub enum TestKind {
     Serial,
     /// The mean of this function of a draw.
     Contrast(String),
-    /// This discrete outcome.
+    /// Probability of this discrete outcome.
     Delta(String),
     /// Draws that return nothing.
     Null,
@@ -95,7 +95,7 @@ pub enum TestKind {
 }
 
 impl TestKind {
-    /// Is it one that a claim on a sampler makes?
+    /// Whether a claim on a sampler makes it.
     pub fn is_of_sampler(&self) -> bool {
         use TestKind::{
             Chi2Coarse, Chi2Fine, Contrast, Delta, Null, Outside, OwnDensity, Serial, TotalMass,
@@ -196,7 +196,7 @@ pub struct Verdict {
     pub second_p: Option<f64>,
     /// The reason for the outcome, as a sentence.
     pub note: String,
-    /// It expects something else than agreement.
+    /// Whether it is a control, which expects something other than agreement.
     #[serde(skip)]
     pub control: bool,
 }
@@ -224,13 +224,13 @@ pub fn exit_code(verdicts: &[Verdict]) -> u8 {
     }
 }
 
-/// A number that may be none.
+/// A number, or nothing.
 pub(super) fn known(x: f64) -> Option<f64> {
     (!x.is_nan()).then_some(x)
 }
 
 impl Verdict {
-    /// Does it count as evidence for its claim?
+    /// Whether it counts as evidence for its claim.
     pub fn is_green(&self) -> bool {
         self.outcome == Outcome::Pass
     }

@@ -1,4 +1,4 @@
-//! What counts of work cost: fixed weights, so that efficiencies by counters are the same numbers on
+//! Cost of counted work: fixed weights, so that efficiencies by counters are the same numbers on
 //! every machine; and how well CPU time follows them.
 
 use crate::results::record::EstimatorRun;
@@ -12,7 +12,7 @@ use crate::results::store::Stored;
 /// cargo test --release --test integration -- --ignored --nocapture cpu_time_follows_the_counters
 /// ```
 ///
-/// What they are worth: they predicted the CPU time of each of those 27 runs to 15 %; a rough boundary
+/// Accuracy: they predicted the CPU time of each of those 27 runs to 15 %; a rough boundary
 /// under a sky costs more than they predict, because light samples below the horizon are not counted.
 /// They predict together; one by one they mean little, because in a path tracer rays are paths, medium
 /// events and boundary events together: of the fits that are equally good this one charges the rays.
@@ -21,7 +21,7 @@ use crate::results::store::Stored;
 /// what a classical dipole costs a band, as
 ///
 /// ```text
-/// cargo bench --bench point_cloud
+/// cargo bench -p benches --bench point_cloud
 /// ```
 ///
 /// prints them.
@@ -38,7 +38,7 @@ pub const WEIGHTS: [(&str, f64); 10] = [
     ("bssrdf_evaluations", 40.0),
 ];
 
-/// CPU time may drift by this much from the weights before they want measuring again.
+/// CPU time may drift by this much from the weights before they must be measured again.
 pub const DRIFT_LIMIT: f64 = 0.1;
 
 /// The weighted cost of every batch of a run.

@@ -66,7 +66,7 @@ fn axes(stored: &Stored) -> Vec<String> {
 struct Places {
     /// Label of the axis.
     what: String,
-    /// Label -> place.
+    /// Label -> position on the axis.
     at: BTreeMap<String, f64>,
     /// Names of the places 0, 1, ... of an axis of categories.
     names: Vec<String>,

@@ -20,7 +20,7 @@ const CONFIDENCE: f64 = 0.95;
 /// An interval wider than this factor either way decides nothing.
 const WIDEST: f64 = 2.0;
 
-/// One pixel's share of the spread above which its variance is one sample's affair.
+/// One pixel's share of the spread above which a single sample dominates the variance.
 const SHARE: f64 = 0.05;
 
 /// The ratio of costs at equal error: how much longer the other renderer takes.

@@ -25,7 +25,7 @@ use crate::stats::tails::{chi_square_sf, normal_two_sided};
 pub mod efficiency;
 /// Images made elsewhere, as planes of a record's bands.
 pub mod images;
-/// Per pixel.
+/// Statistics per pixel.
 mod pixels;
 
 use images::Planes;
@@ -37,7 +37,8 @@ pub const LEVEL: f64 = 1e-4;
 /// One pixel of fewer than this many may well hold half of their spread.
 const FEW_PIXELS: usize = 64;
 
-/// The record disowns the user's word on independent pixels where their seeds' spread is less likely.
+/// The record contradicts the user's assertion of independent pixels where the seeds' spread is less
+/// likely than this.
 const SPREAD_LEVEL: f64 = 1e-6;
 
 /// What the images are compared with, and how.
@@ -73,18 +74,18 @@ pub struct PixelMap {
     pub std_error: Vec<f64>,
 }
 
-/// What the images show.
+/// Result of judging the images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// One verdict a test.
     pub verdicts: Vec<Verdict>,
-    /// One map a band; none for a single class, of which the record has no pixels.
+    /// One map for each band; none for a single class, of which the record has no pixels.
     pub maps: Vec<PixelMap>,
     /// What a reader must know.
     pub notes: Vec<String>,
 }
 
-/// The run that a question is about.
+/// The run that images are compared with.
 ///
 /// # Errors
 /// No such estimator in the cell, or no image of it.
@@ -177,7 +178,7 @@ fn finite_or_nan(x: f64) -> f64 {
     if x.is_finite() { x } else { f64::NAN }
 }
 
-/// One band of a question.
+/// One band of the comparison.
 struct BandQuestion<'a> {
     question: &'a Question<'a>,
     band: &'a BandImages<'a>,
@@ -358,7 +359,7 @@ impl BandQuestion<'_> {
         finding
     }
 
-    /// What a band's pixels look like.
+    /// Maps of a band's pixels.
     fn notes(&self, name: &str) -> Vec<String> {
         let judged = (0..self.band.ours.len()).filter(|&i| self.band.difference(i).std_error > 0.0);
         let z: Vec<f64> = judged.map(|i| self.band.z(i)).collect();

@@ -120,9 +120,9 @@ impl<'a> BandImages<'a> {
 
 /// The mean over pixels of the squared bias, its noise, and the statistic that tests it.
 pub(super) struct SquaredBias {
-    /// Unbiased: below 0 where there is none and chance has it so.
+    /// Unbiased: may be below 0 by chance where there is no bias.
     pub mean: f64,
-    /// Standard deviation of that where there is no bias.
+    /// Standard deviation of the estimate without bias.
     pub noise: f64,
     /// Number of blocks that hold anything.
     pub terms: f64,
