@@ -58,7 +58,7 @@ pub struct Args {
     verbose: bool,
 }
 
-/// Something to judge, and what it takes to look at it again.
+/// A record to judge, with the data of its second look.
 struct Judged {
     folder: RecordFolder,
     main: Stored,
@@ -160,7 +160,7 @@ impl Court<'_> {
         Ok(!alarms.is_empty())
     }
 
-    /// What the paths name, measured where there is no record yet.
+    /// Records that the paths name, run where there is none yet.
     fn subjects(&self, paths: &[PathBuf]) -> Result<Vec<Judged>> {
         let mut subjects = Vec::new();
         for path in paths {
@@ -190,7 +190,7 @@ impl Court<'_> {
         Ok(Judged { folder, main, retest, experiment: Some(experiment) })
     }
 
-    /// Measures again what wants a second look; whether anything was.
+    /// Runs second looks where they are needed; true where any was run.
     fn look_again(&self, subjects: &mut [Judged], judgement: &Judgement) -> Result<bool> {
         let mut looked = false;
         for (index, subject) in subjects.iter_mut().enumerate() {
@@ -198,7 +198,7 @@ impl Court<'_> {
             let mut wanted: Vec<Measured> = own.map(|w| w.subject.clone()).collect();
             let (false, Some(experiment)) = (wanted.is_empty(), &subject.experiment) else { continue };
             eprintln!("second look at {}", experiment.file.name);
-            // What an earlier second look holds stays in its record.
+            // The record of an earlier second look keeps its quantities.
             wanted.extend(subject.retest.iter().flat_map(held));
             let main = &subject.main.record;
             subject.retest = Some(self.measured_again(experiment, main, &wanted)?);

@@ -1,4 +1,4 @@
-//! What a walk remembers of the bands that it scores: nothing where it traces one band alone; of a walk
+//! State that a walk keeps per band: none where it traces one band alone; of a walk
 //! that all bands share, what each band would have made of it.
 //!
 //! Shared walks (hero wavelengths, Wilkie et al. 2014). The hero h, drawn with probability 1/n, steers:
@@ -19,7 +19,7 @@ use super::{Scores, TransportClass};
 use crate::math::exp;
 use crate::optics::medium::Medium;
 
-/// What a walk remembers of its bands.
+/// State that a walk keeps per band.
 pub(super) trait WalkBands: Clone {
     /// A flight of length `t` in the medium, which ends in a scattering event or at the boundary.
     fn flight(&mut self, media: &[Medium], t: f64, scatters: bool);

@@ -1,4 +1,4 @@
-//! What every tracer does at the boundary, whichever way it goes.
+//! Events at the boundary, common to camera and light tracing.
 
 use crate::geometry::Side;
 use crate::optics::boundary::Boundary;

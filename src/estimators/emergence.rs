@@ -6,7 +6,7 @@
 //!
 //! The branch of refraction is taken with probability T21, so that what is gathered there must leave T21
 //! out. L_t follows the refracted ray to the other side with transmittance exp(-sigma_t* t), leaves with
-//! the transmittance of the boundary as a weight (what is reflected there is the model's business) and
+//! the transmittance of the boundary as a weight (the model accounts for what is reflected there) and
 //! goes on outside as the same path.
 //!
 //! Bands that refract alike share a path; with dispersion each index has its own.
@@ -146,7 +146,7 @@ impl BssrdfScene {
         self.groups.iter().map(among).filter(|group| !group.is_empty()).collect()
     }
 
-    /// What camera paths cannot find.
+    /// Notes on light that camera paths cannot find.
     pub fn notes(&self) -> Vec<String> {
         let parallel = self.scene.lights.iter().filter(|light| light.is_directional());
         parallel

@@ -1,4 +1,4 @@
-//! What a light sends to a point of the surface, and what of it goes in and comes out elsewhere: the
+//! Light that reaches a point of the surface, and the part of it that enters and leaves elsewhere: the
 //! part that all ways of choosing the point share.
 
 use super::choice::{choose_light, light_shares};

@@ -1,6 +1,6 @@
 //! Analog tracing from the lights into sensors of finite extent.
 //!
-//! A photon takes a light, a direction from it and a place, and does what light does: it is reflected or
+//! A photon draws a light, a direction from it and a place, and follows the light: it is reflected or
 //! refracted at the boundary, flies distances of density sigma_t exp(-sigma_t t), is absorbed with
 //! probability 1 - albedo at every scattering event or turned by the phase function, and enters again
 //! where a body is not convex, until it leaves for good. Then the sensor receives it
@@ -277,7 +277,7 @@ impl<'a> Photon<'a> {
         Some(())
     }
 
-    /// Flies on outside; where nothing is in the way the sensor receives the photon.
+    /// Continues outside; the sensor receives the photon where nothing occludes it.
     fn fly_outside(&mut self) -> Option<Hit> {
         self.scores.count(Cost::Rays);
         let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
@@ -290,7 +290,8 @@ impl<'a> Photon<'a> {
         hit
     }
 
-    /// Meets the boundary from `side`; the side the photon goes on to, `None` where it ends.
+    /// Meets the boundary from `side`; returns the side on which the photon continues, `None` where it
+    /// ends.
     fn cross(&mut self, hit: &Hit, side: Side) -> Option<Side> {
         self.from = Some(hit.face);
         self.ray.origin = hit.point;

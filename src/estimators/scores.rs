@@ -1,4 +1,4 @@
-//! Scores of one pass: `[observable][band]`, and counts of work and of what must not go unseen.
+//! Scores of one pass: `[observable][band]`, and counts of work and of anomalies.
 //!
 //! Observables: for each region of the sensor that is split, its total, its transport classes, and
 //! (with more than one light) each light's share; for the other regions the total. Pixels beside them.
@@ -64,7 +64,7 @@ impl Cost {
     }
 }
 
-/// Counts of what must not go unseen.
+/// Counts of anomalies, which reports always show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anomaly {
     /// A score that is not a finite number; it is not added and voids the claims that rest on it.

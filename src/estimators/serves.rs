@@ -15,7 +15,7 @@ pub struct Serves {
     pub bodies: Bodies,
 }
 
-/// Kinds of sensors that estimators tell apart.
+/// Kinds of sensors, as estimators distinguish them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorKind {
     /// Parallel rays through pixels.
@@ -83,7 +83,7 @@ impl Serves {
         ..Serves::ALL
     };
 
-    /// Scenes whose sensor looks from outside and does not ask where light came in.
+    /// Scenes whose sensor looks from outside and does not depend on where light entered.
     pub const WITHOUT_ENTRIES: Serves = Serves {
         sensors: &[
             SensorKind::Orthographic,

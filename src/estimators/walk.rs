@@ -43,7 +43,7 @@ impl Default for Roulette {
     }
 }
 
-/// What all walks of an estimator share.
+/// Data that all walks of an estimator share.
 #[derive(Debug)]
 pub(super) struct Field {
     /// Scene that paths are traced in.
@@ -192,7 +192,7 @@ pub(super) struct CameraWalk<'a, R, B> {
     pub ray: Ray,
     from: Option<FaceId>,
     pub throughput: f64,
-    /// The throughput without radiance's eta^2: what roulette looks at.
+    /// The throughput without radiance's eta^2, which roulette compares with its threshold.
     survival: f64,
     pub history: History,
     drawn: DirectionDraw,
@@ -383,7 +383,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
     }
 
-    /// Flies on outside; scores the lights where nothing is in the way.
+    /// Continues outside; scores the lights where nothing occludes them.
     fn fly_outside(&mut self) -> Option<Hit> {
         self.scores.count(Cost::Rays);
         let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
@@ -393,7 +393,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         hit
     }
 
-    /// Meets the boundary from `side`; the side the path goes on to, `None` where it ends.
+    /// Meets the boundary from `side`; returns the side on which the path continues, `None` where it
+    /// ends.
     fn cross(&mut self, hit: &Hit, side: Side) -> Option<Side> {
         self.from = Some(hit.face);
         let wo = -self.ray.dir;
@@ -471,7 +472,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
     }
 
-    /// What other techniques make of the path that leaves at the last exit, if there is one.
+    /// Densities of other techniques for the path that leaves at the last exit, if there is one.
     #[inline]
     fn rival_densities(&mut self, light: usize, wi: DVec3) -> f64 {
         match self.exit {
@@ -480,7 +481,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
     }
 
-    /// Which of BSDF and light sampling take part in what leaves at the last exit.
+    /// Which of BSDF and light sampling take part at the last exit.
     #[inline]
     fn taking_part(&self) -> [f64; 2] {
         if self.exit.is_some() { self.rivals.unidirectional() } else { [1.0, 1.0] }
@@ -633,7 +634,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     }
 }
 
-/// Russian roulette on a weight: above the threshold it goes on as it is, below it survives with
+/// Russian roulette on a weight: above the threshold it is unchanged, below it survives with
 /// probability weight / threshold. Returns the probability to divide by.
 #[inline]
 pub(super) fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> Option<f64> {
@@ -644,7 +645,7 @@ pub(super) fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> 
     (u() < probability).then_some(probability)
 }
 
-/// What every walk lacks of parallel light at a matched boundary.
+/// Notes on parallel light that every walk lacks at a matched boundary.
 pub(super) fn unscattered_notes(scene: &Scene) -> impl Iterator<Item = String> {
     let is_matched = scene.boundary.contains(&Boundary::Matched);
     let parallel = scene.lights.iter().filter(move |light| light.is_directional() && is_matched);

@@ -10,7 +10,7 @@ use super::schema::ClaimEntry;
 /// Suffix to the name of an estimator that is run a second time as a control.
 pub const CONTROL: &str = " (control)";
 
-/// What an estimator's work is measured by.
+/// Measure of an estimator's work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CostMeasure {

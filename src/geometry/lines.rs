@@ -36,7 +36,7 @@ pub struct Line {
     pub radius: f64,
 }
 
-/// What following a line took.
+/// Work of following a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Met {
     /// Closest-hit queries.

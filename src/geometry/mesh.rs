@@ -14,7 +14,7 @@ use crate::math::DVec3;
 pub struct Mesh {
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
-    /// What shading normals are interpolated from; none for flat shading.
+    /// Vertex normals that shading normals are interpolated from; none for flat shading.
     normals: Option<Normals>,
     bounds: BoundingSphere,
     tree: BoxTree,
@@ -129,7 +129,7 @@ impl Mesh {
         &self.triangles
     }
 
-    /// What shading normals are interpolated from; none for flat shading.
+    /// Vertex normals that shading normals are interpolated from; none for flat shading.
     pub fn normals(&self) -> Option<&Normals> {
         self.normals.as_ref()
     }

@@ -1,7 +1,7 @@
 //! The border between f32 culling and f64 intersection. Door for `obvhs`.
 //!
 //! The tree only rules triangles out; every number a result sees is computed in f64 by the caller.
-//! What culls is conservative, so results do not depend on the tree.
+//! Culling is conservative, so results do not depend on the tree.
 //!
 //! # Frame
 //!

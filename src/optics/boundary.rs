@@ -47,7 +47,7 @@ pub enum Density {
     Delta,
 }
 
-/// What happened at the surface.
+/// Event at the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// `wi` is on the side of `wo`.

@@ -425,7 +425,7 @@ mod tests {
         assert_eq!(by_mixture.towards(w_in, TO).pdf(DVec3::X), mixture.pdf(DVec3::X));
     }
 
-    /// What building, drawing and asking cost; `cargo test --release joint::tests::cost -- --ignored
+    /// Cost of building, drawing and evaluating; `cargo test --release joint::tests::cost -- --ignored
     /// --nocapture`.
     #[test]
     #[ignore = "times, for people"]

@@ -1,4 +1,4 @@
-//! What the views of a record are made from.
+//! Input of the views of a record.
 
 use super::document::ViewerBlock;
 use super::plots::Section;

@@ -68,7 +68,7 @@ pub struct FigureBlock {
     pub path: String,
     /// File that is shown.
     pub picture: PictureFile,
-    /// What it is, in a few words.
+    /// Short description.
     pub title: String,
     /// Caption.
     pub caption: String,

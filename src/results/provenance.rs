@@ -16,7 +16,7 @@ pub const NUMERICAL_VERSION: u32 = 3;
 /// The crates whose arithmetic enters a stored number.
 const NUMERICAL_CRATES: [&str; 4] = ["libm", "rand_pcg", "glam", "obvhs"];
 
-/// The crates that a reader of results may ask about.
+/// Further crates whose versions are reported.
 const NOTED_CRATES: [&str; 10] =
     ["blake3", "exr", "glam", "libm", "obvhs", "png", "rand_pcg", "serde_json", "statrs", "tobj"];
 

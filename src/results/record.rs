@@ -30,7 +30,7 @@ pub struct Record {
     pub claims_hash: String,
     /// The claims as the file states them.
     pub claims: serde_json::Value,
-    /// What verification needs of each of `claims`, in their order.
+    /// Statement of each of `claims`, in their order.
     pub statements: Vec<Claim>,
     /// Indices of claims that were changed or added when passes had already been run: they are not
     /// evidence.
@@ -46,7 +46,7 @@ pub struct Record {
     pub bands: Vec<Band>,
     /// The cells in the order of the sweep.
     pub cells: Vec<Cell>,
-    /// What was drawn from each sampler.
+    /// Counts of each sampler.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub samplers: Vec<SamplerRun>,
     /// blake3 of every array file, hex, by its path relative to the record's folder.
@@ -93,7 +93,7 @@ pub struct Cell {
     pub content_hash: String,
     /// The regions of the sensor, after which observables are named.
     pub regions: Vec<ObservedRegion>,
-    /// What each estimator measured here.
+    /// Measurement of each estimator in this cell.
     pub runs: Vec<EstimatorRun>,
 }
 
@@ -148,7 +148,7 @@ pub struct EstimatorRun {
     pub control_of: Option<String>,
     /// Its kind, as `path`.
     pub kind: String,
-    /// What it promises of its mean.
+    /// How its mean is related to the integral.
     pub bias: StatedBias,
     /// The model whose integral it estimates; none where it is light transport itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -156,7 +156,7 @@ pub struct EstimatorRun {
     /// Where its mean is known beforehand to be far from normal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub heavy_tails: Vec<StatedTail>,
-    /// What a reader must know (a transport that it cannot sample).
+    /// Notes for the reader, such as transport that it cannot sample.
     pub notes: Vec<String>,
     /// Number of independent passes.
     pub passes: u64,
@@ -172,7 +172,7 @@ pub struct EstimatorRun {
     pub image: Option<Image>,
     /// Deterministic counts of work done, summed over bands and passes.
     pub cost: BTreeMap<String, u64>,
-    /// Counts of what must not go unseen, by name (`nonfinite`, `lost_ray`, `wrong_side`).
+    /// Counts of anomalies, by name (`nonfinite`, `lost_ray`, `wrong_side`).
     pub anomalies: BTreeMap<String, u64>,
 }
 
@@ -188,7 +188,7 @@ pub struct StatedTail {
     pub reason: String,
 }
 
-/// What an estimator promises of its mean.
+/// How an estimator's mean is related to the integral.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StatedBias {
@@ -383,7 +383,7 @@ pub enum Against {
     },
 }
 
-/// What an estimator's work is measured by.
+/// Measure of an estimator's work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CostMeasure {

@@ -1,4 +1,4 @@
-//! What a record holds of samplers: counts, and the masses that their densities give the same bins.
+//! Samplers in a record: counts, and the masses of the same bins under their densities.
 
 use serde::{Deserialize, Serialize};
 
@@ -60,11 +60,11 @@ pub struct Delta {
     pub mass: f64,
     /// Number of draws with this outcome.
     pub observed: u64,
-    /// Those whose value was not what it has to be.
+    /// Draws whose value was not the stated one.
     pub inexact: u64,
 }
 
-/// How often a sampler returns nothing.
+/// Probability that a sampler returns no sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NullMass {

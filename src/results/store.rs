@@ -35,7 +35,7 @@ pub struct Stored {
     pub record: Record,
     /// Arrays of the record.
     pub arrays: Arrays,
-    /// What it cost in time, where that was measured; no part of the record, and nothing guards it.
+    /// Times, where they were measured; not part of the record, without a checksum.
     pub timing: Option<Timing>,
 }
 
@@ -113,7 +113,7 @@ impl Stored {
         (array.shape.first() == Some(&3)).then(|| Bins { observed: row(0), mass: row(1), bound: row(2) })
     }
 
-    /// What does not fit together, as a sentence.
+    /// The first inconsistency of the record, as a sentence.
     fn defect(&self) -> Option<String> {
         let bands = self.record.bands.len();
         for run in self.record.cells.iter().flat_map(|cell| &cell.runs) {
@@ -158,7 +158,7 @@ pub struct Bins<'a> {
     pub bound: &'a [f64],
 }
 
-/// What does not fit together in the record of a sampler, as a sentence.
+/// The first inconsistency in the record of a sampler, as a sentence.
 fn sampler_defect(record: &Record, arrays: &Arrays) -> Option<String> {
     record.samplers.iter().find_map(|run| {
         let paths = [Some(&run.coarse), run.fine.as_ref(), run.serial.as_ref()];

@@ -1,4 +1,4 @@
-//! What it cost in time: measured, kept apart from the record, and never byte-identical.
+//! Times of a run: measured, kept apart from the record, and never byte-identical.
 
 use std::collections::BTreeMap;
 
@@ -62,7 +62,7 @@ impl Timing {
         self.batches.get(cell)?.get(estimator)
     }
 
-    /// What was measured of one estimator in one cell.
+    /// Times of one estimator in one cell.
     pub fn of(&self, cell: &str, estimator: &str) -> Option<&Cost> {
         self.cells.get(cell)?.get(estimator)
     }

@@ -43,7 +43,7 @@ pub trait Chart: Send + Sync {
 pub struct Measure(pub [f64; 3]);
 
 impl Measure {
-    /// A measure of one factor.
+    /// A measure with one factor; the other two are 1.
     pub fn of(factor: f64) -> Measure {
         Measure([factor, 1.0, 1.0])
     }

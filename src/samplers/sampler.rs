@@ -21,7 +21,7 @@ pub trait Sampler: Send + Sync {
         Vec::new()
     }
 
-    /// How often it returns nothing.
+    /// Probability that it returns no sample.
     fn null(&self) -> Null {
         Null::Never
     }
@@ -40,7 +40,7 @@ pub trait Sampler: Send + Sync {
 /// Outcome of one draw.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Draw {
-    /// The sampler returned nothing.
+    /// The sampler returned no sample.
     Null,
     /// Discrete outcome `index`; `exact` is false where its value is farther than 1e-12 from what it
     /// has to be.
@@ -92,7 +92,7 @@ pub struct Discrete {
     pub mass: f64,
 }
 
-/// How often a sampler returns nothing.
+/// Probability that a sampler returns no sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Null {
     /// Never; one null is an error.

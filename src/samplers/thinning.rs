@@ -38,7 +38,7 @@ pub struct ThinningOptions {
     /// How accepted points are found.
     #[serde(default)]
     pub search: Search,
-    /// What of a query is looked at.
+    /// Which outcome of a query is tested.
     pub view: QueryView,
     /// Points of the cloud, on a sphere.
     #[schemars(range(min = 2, max = 1048576))]
@@ -62,7 +62,7 @@ pub enum NumericRule {
     Proportional([f64; 2]),
 }
 
-/// What of a query is looked at.
+/// Which outcome of a query is tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum QueryView {
@@ -105,7 +105,7 @@ pub struct ThinningSampler {
     masses: Vec<f64>,
 }
 
-/// Mass of numbers below which they are not told apart.
+/// Mass below which numbers of points are not distinguished.
 const RARE: f64 = 1e-5;
 
 impl ThinningSampler {

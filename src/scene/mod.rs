@@ -14,7 +14,7 @@ use crate::geometry::Shape;
 use crate::optics::boundary::Boundary;
 use crate::optics::medium::Medium;
 
-/// A body, what shines on it, what looks at it. Optical properties are per band.
+/// A body, its lights and its sensor. Optical properties are per band.
 #[derive(Debug)]
 pub struct Scene {
     /// Geometry of the body; cells of a sweep share it.

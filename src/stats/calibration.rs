@@ -77,7 +77,7 @@ fn masses(count: usize) -> Vec<f64> {
     (0..count).map(|i| cdf((i + 1) as f64 / n) - cdf(i as f64 / n)).collect()
 }
 
-/// What a kind of test promises of its p-values under a true hypothesis.
+/// Guarantee of a kind of test on its p-values under a true hypothesis.
 #[derive(Clone, Copy, PartialEq)]
 enum Promise {
     /// P(p <= x) = x.
@@ -224,7 +224,7 @@ const LEVELS: [f64; 2] = [1e-2, 1e-3];
 /// Each check of a kind may alarm by chance with this probability.
 const ALARM: f64 = 1e-4;
 
-/// What many runs of a null hypothesis showed.
+/// Result of many runs of a null hypothesis.
 struct Calibration {
     runs: u64,
     distance: f64,

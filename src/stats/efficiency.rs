@@ -46,7 +46,7 @@ pub const FEWEST_BLOCKS: usize = 8;
 /// The largest share of an arm's sum of squares that one pass may hold.
 pub const LARGEST_SHARE: f64 = 0.05;
 
-/// What the values of a block are, and so what V is.
+/// Meaning of a block's values, and so of V.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Values {
     /// Scores of passes: V is their variance.
@@ -81,7 +81,7 @@ impl Values {
 pub struct JackknifeBlock {
     /// Moments of the passes' values.
     pub moments: Moments,
-    /// What they cost together, in any unit that both arms share: CPU seconds, rays.
+    /// Their total cost, in any unit that both arms share: CPU seconds, rays.
     pub cost: f64,
 }
 
@@ -136,7 +136,7 @@ impl LogRatio {
     }
 }
 
-/// What one arm is like.
+/// Summary of one arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmSummary {
     /// Moments of all its passes.

@@ -1,4 +1,4 @@
-//! Significance tests of means, and what they can detect. Two-sided throughout.
+//! Significance tests of means, and the smallest difference that they detect. Two-sided throughout.
 
 use super::moments::Moments;
 use super::tails::student_two_sided;

@@ -347,7 +347,7 @@ mod tests {
         assert!(worst.values().all(|(_, all, _)| *all <= 1e-8), "{worst:?}");
     }
 
-    // The table sees what it is for: a lost digit in the tail, a cdf taken from 1, a wrong edge.
+    // The table detects its targets: a lost digit in the tail, a cdf taken from 1, a wrong edge.
     #[test]
     fn the_table_catches_planted_tails() {
         type Tail = fn(f64, f64, f64) -> f64;

@@ -126,7 +126,7 @@ impl<T: Merge> Counter<T> {
         fold_back(self.nodes.into_iter().map(|node| node.value))
     }
 
-    /// What [`Counter::finish`] would give now, from a copy.
+    /// The result of [`Counter::finish`] at this point, from a copy.
     pub fn so_far(&self) -> Option<T>
     where
         T: Clone,

@@ -147,7 +147,7 @@ impl Bidirectional {
     }
 }
 
-/// What a walk carries.
+/// State that a walk carries for connections.
 struct OneLightVertex<'a> {
     guides: &'a [Guide],
     light: Option<LightPath<'a>>,

@@ -1,4 +1,4 @@
-//! What a light lends to techniques that start from it: its concentrated part, drawn by itself.
+//! The concentrated part of a light, from which techniques that start at the light sample.
 
 use std::f64::consts::PI;
 

@@ -46,7 +46,7 @@ pub use options::{EdgeTechnique, JointKind, SneeChoices, SneeOptions, SneePreset
 pub use probe::ProbeShares;
 pub use two_bounce::TwoBounce;
 
-/// What connections need to know, for one band.
+/// Data of connections, for one band.
 #[derive(Debug)]
 struct BandSetup {
     options: Arc<SneeOptions>,
@@ -119,7 +119,7 @@ impl Snee {
     }
 }
 
-/// What bands may not differ in if they share walks.
+/// Properties that must be equal in all bands if they share walks.
 fn check_shared(scene: &Scene) -> Result<()> {
     let same_boundary = scene.boundary.windows(2).all(|pair| pair[0] == pair[1]);
     let grey = |light: &crate::scene::Light| (1..scene.bands()).all(|band| light.is_same_in(0, band));

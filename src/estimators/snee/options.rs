@@ -42,9 +42,9 @@ pub struct SneeOptions {
 /// Which techniques make the paths whose last two medium vertices follow each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Strategies {
-    /// The walk goes on, its exit by BSDF sampling.
+    /// The walk continues, its exit by BSDF sampling.
     pub bsdf: bool,
-    /// The walk goes on, its exit by light sampling.
+    /// The walk continues, its exit by light sampling.
     pub light: bool,
     /// Subdivision from the light's end.
     pub top_to_bottom: bool,
@@ -73,13 +73,13 @@ pub enum JointKind {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SneeChoices {
-    /// What the other options start from.
+    /// Preset that the other options change.
     #[serde(default)]
     pub preset: SneePreset,
     /// When a path is ended by chance.
     #[serde(default)]
     pub roulette: Roulette,
-    /// What makes the paths whose last two medium vertices follow each other.
+    /// Techniques for paths whose last two medium vertices are consecutive.
     ///
     /// All other paths are always the walk's own (and the light-guided last vertex's).
     pub strategies: Option<Vec<EdgeTechnique>>,
@@ -207,7 +207,7 @@ impl SneePreset {
 }
 
 impl SneeChoices {
-    /// The preset with what differs from it.
+    /// The preset with the options that differ from it.
     ///
     /// # Errors
     /// No technique, one that loses lights, or shares of probes that leave nothing to uniform

@@ -58,7 +58,7 @@ use serde::{Deserialize, Serialize};
 use crate::optics::medium::Medium;
 use crate::sampling::radial::Radial;
 
-/// What a model does with the flux that arrives under the boundary on its way out.
+/// Treatment of the flux that arrives under the boundary on its way out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outgoing {
@@ -78,7 +78,7 @@ pub enum Model {
         /// Where the Fresnel moments come from.
         #[serde(default)]
         moments: MomentKind,
-        /// What happens to the exitance on its way out.
+        /// Treatment of the exitance on its way out.
         #[serde(default)]
         outgoing: Outgoing,
     },
@@ -180,7 +180,7 @@ impl Model {
     /// where the boundary is matched).
     ///
     /// # Errors
-    /// What the medium lacks (scattering, absorption) or what does not fit the bands, in words.
+    /// Why the medium does not fit the model or the bands (no scattering, no absorption), as text.
     pub fn of(&self, band: usize, bands: usize, medium: &Medium, eta: f64) -> Result<Bssrdf, String> {
         let reduced = Reduced::of(medium);
         let scatters = medium.albedo > 0.0 && reduced.albedo > 0.0;
@@ -309,7 +309,7 @@ impl MomentKind {
 }
 
 impl std::fmt::Display for Model {
-    /// Its name, with what its source leaves open.
+    /// Name, with the choices that its source leaves open.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Model::Classical { moments, outgoing } => {

@@ -6,7 +6,7 @@ use crate::report::number::significant;
 /// Label, scale and range of an axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlotAxis {
-    /// What it shows, with its unit.
+    /// Label of the axis, with its unit.
     pub label: String,
     /// Whether it is logarithmic.
     pub is_log: bool,

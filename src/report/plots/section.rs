@@ -12,7 +12,7 @@ use crate::results::store::{RecordFolder, Stored};
 pub struct PlotFigure {
     /// Stem of its files under `plots/`, unique on its page.
     pub name: String,
-    /// What it shows, in a few words.
+    /// Short description of the plot.
     pub title: String,
     /// How to read it.
     pub caption: String,

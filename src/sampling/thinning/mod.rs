@@ -1,7 +1,7 @@
 //! Thinning: each point x_i of a cloud is accepted independently with probability p(|x - x_i|), and what
 //! is accepted has weight 1/p, so that the expected sum over the accepted is the sum over all.
 //!
-//! p is positive and does not increase with distance. `scan` asks every point; `PointTree` makes
+//! p is positive and does not increase with distance. `scan` evaluates every point; `PointTree` makes
 //! acceptances of the same law from a hierarchy, without visiting most of the points that it rejects.
 //!
 //! Uniform numbers decide against p down to 2^-106 (`Stream::draw_fine`): with 24 bits, the one number 0
@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use super::stream::Stream;
 use crate::math::exp;
 
-/// The probability of acceptance by distance (mm), and what makes deciding cheap.
+/// The probability of acceptance by distance (mm), with bounds for cheap decisions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThinningRule {
     form: ThinningForm,
@@ -200,7 +200,7 @@ pub enum Search {
     /// By a hierarchy over the points.
     #[default]
     Hierarchy,
-    /// By asking every point.
+    /// Thins by evaluating every point.
     Scan,
 }
 
@@ -215,7 +215,7 @@ pub struct Accepted {
     pub weight: f64,
 }
 
-/// Counts of what a query did.
+/// Work of a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ThinningWork {
     /// Nodes of the hierarchy.

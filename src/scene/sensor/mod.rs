@@ -65,7 +65,7 @@ macro_rules! call {
     };
 }
 
-/// What a kind of sensor declares; the methods of [`Sensor`] tell what each means.
+/// What a kind of sensor declares; the methods of [`Sensor`] document each.
 trait SensorKind {
     fn rays_per_pass(&self) -> usize;
 
@@ -158,7 +158,7 @@ impl Sensor {
     }
 }
 
-/// A ray of the sensor and what it counts.
+/// A ray of the sensor with its weight and slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorRay {
     /// The ray, against the flow of light.
@@ -174,7 +174,7 @@ pub struct SensorRay {
 pub struct SensorRegion {
     /// Name of the region in observables.
     pub name: String,
-    /// Whether transport classes and lights are told apart.
+    /// Whether transport classes and lights are distinguished.
     pub split: bool,
     /// The pixels of an image's tile; none for any other region.
     pub tile: Option<PixelRectangle>,
