@@ -24,7 +24,7 @@ use scatterproof::sampling::warp::{square_to_cap, square_to_cosine_hemisphere};
 use scatterproof::scene::sensor::Probe;
 use scatterproof::scene::{Emission, Light, Scene, Sensor};
 
-/// Inputs of a kernel; one iteration goes through all of them.
+/// Inputs of a kernel; one iteration visits all of them.
 const INPUTS: usize = 4096;
 
 /// Paths of one iteration.

@@ -1,4 +1,4 @@
-//! What a query of a point cloud costs: by the hierarchy, and by asking every point.
+//! Cost of a query of a point cloud: by the hierarchy, and by visiting every point.
 //!
 //!   cargo bench --bench point_cloud
 //!

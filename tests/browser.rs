@@ -18,9 +18,9 @@ use serde_json::{Value, json};
 use super::work::{IMAGE, Work, replaced};
 
 const SCRIPT: &str = include_str!("data/browser-test.js");
-/// What the script prints before its outcome.
+/// Prefix of the script's outcome.
 const MARK: &str = "BROWSER-TEST ";
-/// A browser that says nothing for so long has failed.
+/// A browser that prints nothing for so long has failed.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn browser() -> PathBuf {
@@ -78,7 +78,7 @@ impl Open {
         Open { child, lines, _profile: profile }
     }
 
-    /// What the script found.
+    /// Findings of the script.
     fn outcome(&self) -> Value {
         let mut said = String::new();
         loop {
@@ -103,7 +103,7 @@ impl Drop for Open {
     }
 }
 
-/// A report with pictures, and what the script is to know of its record.
+/// A report with pictures, and the facts of its record that the script checks.
 struct Report {
     work: Work,
     page: String,
@@ -146,7 +146,7 @@ impl Report {
     }
 }
 
-/// The outcome of a test that found nothing.
+/// The outcome of a test without findings.
 fn sound(outcome: Value) -> Value {
     let failures = outcome["failures"].as_array().expect("failures");
     let lines: Vec<&str> = failures.iter().filter_map(Value::as_str).collect();

@@ -1,4 +1,4 @@
-//! The command line: what it says of bad input, with which exit code, and what each command does.
+//! The command line: messages and exit codes for bad input, and the effect of each command.
 
 use super::work::{IMAGE, SENSOR, Work, edit, replaced};
 

@@ -1,4 +1,4 @@
-//! The pages for people: what they show is accepted, what they claim holds, what they point at exists.
+//! The documentation: examples are accepted, statements hold, links and commands are valid.
 
 use std::fs;
 use std::path::Path;
@@ -126,7 +126,7 @@ fn experiments(page: &str) -> Vec<(usize, Table)> {
             "toml" => files.push((first, merged(&base, parse(first, &block.text())))),
             "toml one-of" | "toml one-of spectral" => {
                 for &(number, line) in &block.lines {
-                    // What was measured, was in R, G and B.
+                    // The measurement was in R, G and B.
                     let in_rgb = block.tag == "toml one-of" || line.contains("\"marble\"");
                     let base = if in_rgb { &base } else { &spectral };
                     files.push((number, merged(base, parse(number, line))));
@@ -149,7 +149,7 @@ fn write_sky(path: &Path) {
     write_exr(path, &Picture::new(&bands, &pixels), &[]).expect("a sky");
 }
 
-/// What `check` says of a page's experiments: how many there are, and what is wrong.
+/// Result of `check` on a page's experiments: their number, and the errors.
 fn refused(page: &str) -> (usize, String) {
     let work = Work::new();
     work.write("body.obj", OCTAHEDRON);
@@ -166,7 +166,7 @@ fn refused(page: &str) -> (usize, String) {
     }
     let ran = work.run(&format!("check {}", names.join(" ")));
     let said = ran.stdout();
-    // Not every error says in which experiment it is.
+    // Not every error names its experiment.
     names.retain(|name| !said.contains(&format!("{name}: ok, ")));
     ran.check((ran.code() == Some(0)) == names.is_empty(), "the exit code says what the lines say");
     let errors = format!("{}\n{}", names.join(" "), ran.stderr());
@@ -280,7 +280,7 @@ fn commands(page: &str) -> Vec<(usize, String)> {
     found
 }
 
-/// What is wrong with a command, where something is. Files in folders must be there; `example.toml` is
+/// The error in a command, if any. Files in folders must be there; `example.toml` is
 /// the file of the page by example.
 fn wrong(work: &Work, command: &str) -> Option<String> {
     let words: Vec<&str> = command.split_whitespace().collect();
@@ -376,7 +376,7 @@ fn every_command_exists() {
     assert_eq!(found.lines().count(), 6, "{found}");
 }
 
-/// A page that the book does not list is a page that nobody finds.
+/// Every page is listed in the book.
 #[test]
 fn the_book_lists_every_page() {
     let summary = text("docs/SUMMARY.md");

@@ -1,4 +1,4 @@
-//! Work and time by batch, rivals side by side, and what both make of claims of efficiency.
+//! Work and time by batch, rivals side by side, and claims of efficiency that rest on them.
 
 use scatterproof::results::store::{RecordFolder, Stored};
 use scatterproof::verify::weights::{DRIFT_LIMIT, WEIGHTS, counter, drift, fit, timed};

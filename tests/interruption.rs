@@ -102,7 +102,7 @@ fn an_earlier_record_outlives_an_interrupted_run() {
     same(&work.record("results"), &WHOLE, "extended");
 }
 
-/// What was kept of an interrupted run was seen: a claim made since then is post hoc.
+/// The kept passes of an interrupted run were seen: a claim made since then is post hoc.
 #[test]
 fn claims_made_after_an_interruption_are_post_hoc() {
     // Uniform light, so that no rare path carries much.

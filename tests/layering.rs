@@ -1,12 +1,12 @@
-//! What neither the compiler nor clippy can say of the sources: who uses whom (the picture in
-//! `src/lib.rs`), which module is the door of which crate, that one name denotes one type, and how long
-//! a file may be. Functions that differ between machines are in `clippy.toml`.
+//! Rules of the sources that neither the compiler nor clippy can check: which module uses which (the
+//! picture in `src/lib.rs`), which module is the door of which crate, that one name denotes one type,
+//! and how long a file may be. Functions that differ between machines are in `clippy.toml`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// What a module may use, besides itself and `error`.
+/// Modules that a module may use, besides itself and `error`.
 const LAYERS: [(&str, &[&str]); 18] = [
     ("error", &[]),
     // Simulation.
@@ -181,7 +181,7 @@ impl Source {
         text.lines().map(|line| code(line) + "\n").collect()
     }
 
-    /// Every path, by line: `use` statements taken apart.
+    /// Every path, by line: `use` statements are expanded.
     fn paths(&self) -> Vec<(usize, String)> {
         let (mut paths, mut statement) = (Vec::new(), None);
         for (line, number) in self.text.lines().map(code).zip(1..) {
@@ -250,7 +250,9 @@ impl Source {
         }
         found.dedup();
         if !self.text.starts_with("//! ") {
-            found.push(format!("{path}:1: the first line does not say, after `//! `, what the file is"));
+            found.push(format!(
+                "{path}:1: the first line does not state, after `//! `, what the file is"
+            ));
         }
         let longest = LONG.iter().find(|(long, _)| long == path).map_or(LONGEST, |(_, lines)| *lines);
         let lines = self.text.lines().count();
@@ -286,7 +288,7 @@ fn expanded(used: &str) -> Vec<String> {
     let used = used.trim().trim_start_matches("::");
     let Some((head, group)) = used.split_once('{') else {
         let path = used.split(" as ").next().unwrap_or_default();
-        // The crate under another name hides what is used of it.
+        // The crate under another name would hide its uses.
         return vec![if path == "crate" { "crate::crate".into() } else { path.to_string() }];
     };
     let (mut parts, mut depth) = (vec![String::new()], 0);
@@ -369,7 +371,7 @@ fn circles(sources: &[Source]) -> Vec<String> {
     let none = BTreeSet::new();
     let mut found = Vec::new();
     for start in uses.keys() {
-        // Breadth first: the shortest way back. Each circle is told by its first name.
+        // Breadth first: the shortest way back. Each cycle is identified by its first name.
         let mut ways = vec![vec![start]];
         let mut seen = BTreeSet::new();
         let mut at = 0;
@@ -476,7 +478,7 @@ fn words_mean_what_the_table_says() {
     }
 }
 
-/// What a planted text breaks, after a good first line.
+/// Rules that a planted text breaks, after a valid first line.
 fn planted(path: &str, text: &str) -> String {
     Source::new(path, &format!("//! A file.\n{text}")).violations().join("\n")
 }

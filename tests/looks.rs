@@ -24,7 +24,7 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).expect("JSON")
 }
 
-/// Mean and standard error of what the experiment measures first.
+/// Mean and standard error of the experiment's first measurement.
 fn measured(text: &str) -> (f64, f64) {
     let work = Work::with(text);
     work.run("run x.toml -q").exits(0);
@@ -56,9 +56,9 @@ fn a_second_look_is_run_and_decides() {
     assert!(work.read("results/x/verdicts.csv").contains("at both looks"));
     work.run("report results/x").exits(0);
     assert!(work.read("results/x/verdicts.csv").contains("at both looks"));
-    // A folder without its second look is not green either, and says what it wants.
+    // A folder without its second look is not green either, and its message names the second look.
     std::fs::remove_dir_all(work.path("results/x/retest")).expect("removed");
-    work.run("verify results/x").exits(1).says("wants a second look on fresh streams");
+    work.run("verify results/x").exits(1).says("needs a second look on fresh streams");
     // Nearer, the first look is enough.
     let work = Work::with(&equals(mean - 2.0 * error));
     work.run("verify x.toml -q").exits(0);
@@ -74,7 +74,7 @@ fn controls_and_each_class() {
         let work = Work::with(&format!("{text}{analog}{sweep}[[claim]]\n{claim}\n"));
         work.run("verify x.toml -q --verbose")
     };
-    // Absorption matters; the way to end a path does not, and a control that says so is red.
+    // Absorption matters; the way to end a path does not, and a control that claims so is red.
     let found = claimed("differs = { estimators = [\"mis\"], across = \"albedo\" }");
     found.exits(0).says("control, expects a difference");
     let same = claimed("differs = { estimators = [\"mis\", \"analog\"] }");

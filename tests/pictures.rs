@@ -25,7 +25,7 @@ fn a_picture_is_a_view_and_no_part_of_the_record() {
     std::fs::remove_dir_all(work.path("results/x/images")).expect("removed");
     work.run("report results/x").exits(0);
     assert!(files() == first, "another picture");
-    // And goes where nobody asks for it any more; nothing is run again.
+    // It is removed when no file asks for it; nothing is run again.
     work.write("x.toml", IMAGE);
     work.run("run x.toml -q").exits(0);
     assert!(!work.path("results/x/pictures.json").exists());

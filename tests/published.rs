@@ -12,7 +12,7 @@ use scatterproof::results::store::RecordFolder;
 
 /// Folders of published results, by setting.
 const SETTINGS: [&str; 2] = ["short", "full"];
-/// What a published folder holds beside its record and its tables.
+/// Files of a published folder beside its record and its tables.
 const BESIDE: [&str; 4] = [MANIFEST, "provenance.json", "timing.json", "pictures.json"];
 
 const HELP: &str =
@@ -56,7 +56,7 @@ fn manifest(bytes: &[u8]) -> Manifest {
     serde_json::from_slice(bytes).expect("a manifest")
 }
 
-/// Of a published folder's files, what is not as its manifest says.
+/// Files of a published folder that differ from its manifest.
 fn changed(files: &BTreeMap<String, Vec<u8>>) -> Vec<String> {
     let views = manifest(&files[MANIFEST]).views;
     let is_kept =
@@ -77,7 +77,7 @@ fn changed(files: &BTreeMap<String, Vec<u8>>) -> Vec<String> {
     found
 }
 
-/// What the record in a published folder gives otherwise than its manifest says.
+/// Differences between the record in a published folder and its manifest.
 fn stale(folder: &Path) -> Vec<String> {
     let temp = tempfile::tempdir().expect("a folder");
     let copy = temp.path().join(folder.file_name().expect("a name"));
@@ -193,7 +193,7 @@ fn quotes(page: &str) -> Vec<Quote<'_>> {
     quotes
 }
 
-/// What a quote says that its file does not, in words.
+/// Differences between a quote and its file, as text.
 fn misquoted(quote: &Quote) -> Option<String> {
     let path = package().join("results/published").join(quote.path);
     let Ok(text) = fs::read_to_string(&path) else { return Some(format!("no file {}", quote.path)) };
@@ -267,7 +267,7 @@ fn pictures_of_pages_are_published() {
     }
 }
 
-/// What is kept in git stays small.
+/// The published files stay small.
 #[test]
 fn what_is_published_is_small() {
     let files = files(&package().join("results/published"));

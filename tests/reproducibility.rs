@@ -31,7 +31,7 @@ fn json(files: &Files) -> Value {
     serde_json::from_slice(&files["record.json"]).expect("JSON")
 }
 
-/// Bytes of the observables by what was measured: hash of the cell's content and estimator.
+/// Bytes of the observables, keyed by hash of the cell's content and estimator.
 fn observables(files: &Files) -> BTreeMap<(String, String), Vec<u8>> {
     let text = |value: &Value| value.as_str().expect("a text").to_string();
     let mut observables = BTreeMap::new();
@@ -228,7 +228,7 @@ fn a_budget_in_seconds_comes_again_by_the_passes_of_its_record() {
     let work = Work::with(&edit("budget.passes = 100", "budget.cpu_seconds = 0.2"));
     let first = record(&work, "first", "");
     same(&first, &record(&work, "again", "--passes-of first"), "with the passes of the first");
-    // What an earlier run of that folder had begun with is not asked.
+    // The state of an earlier run in that folder is not used.
     work.run("run x.toml -q --out other --set budget.cpu_seconds=0.4").exits(0);
     same(
         &first,

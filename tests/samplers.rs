@@ -208,7 +208,7 @@ fn verdicts(name: &str, samples: u64, kind: &str, options: Value) -> Vec<Verdict
     judge_alone(&ran(&experiment(name, samples, &[("it", kind, options)])))
 }
 
-/// The tests that did not come out as a pass, with their outcomes.
+/// The tests that did not pass, with their outcomes.
 fn red(verdicts: &[Verdict]) -> Vec<String> {
     let red = verdicts.iter().filter(|v| !v.is_green());
     red.map(|v| format!("{}: {}", v.test_name(), v.outcome)).collect()
@@ -444,7 +444,7 @@ fn the_second_look_decides_what_the_first_cannot() {
     let test = waiting
         .verdicts
         .iter()
-        .find(|v| v.note.contains("wants a second look"))
+        .find(|v| v.note.contains("needs a second look"))
         .expect("one")
         .test_name();
     assert_eq!(row(&waiting, &test).outcome, Outcome::Fail);

@@ -11,7 +11,7 @@ use scatterproof::results::store::RecordFolder;
 
 use super::work::{IMAGE, Ran, SENSOR, Work, edit, probe, replaced, same};
 
-/// What the viewer shows.
+/// Images in the viewer.
 #[derive(Clone, Debug, Default)]
 struct Shown {
     images: BTreeMap<String, Image>,
@@ -19,7 +19,7 @@ struct Shown {
     largest_packet: usize,
     /// Has every connection been closed?
     is_over: bool,
-    /// What no viewer would take.
+    /// A packet that no viewer would accept.
     errors: Vec<String>,
 }
 
@@ -182,7 +182,7 @@ impl Shown {
     }
 }
 
-/// What a viewer has to show of the record of `results/x`, by name and channel.
+/// Expected images of the record of `results/x`, by name and channel.
 fn recorded(work: &Work) -> BTreeMap<String, BTreeMap<String, Vec<f32>>> {
     let stored = RecordFolder::new(work.path("results/x")).read().expect("a record");
     let f32s = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x as f32).collect::<Vec<f32>>();

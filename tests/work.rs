@@ -144,7 +144,7 @@ impl Work {
     }
 }
 
-/// Two records are the same bytes; says which file is not.
+/// Asserts that two records have the same bytes; names the file that differs.
 pub fn same(a: &BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>, what: &str) {
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>(), "{what}: other files");
     for (name, bytes) in a {
@@ -154,7 +154,7 @@ pub fn same(a: &BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>, what: 
     }
 }
 
-/// What the program did.
+/// Exit code and output of the program.
 pub struct Ran {
     folder: PathBuf,
     arguments: String,
@@ -194,19 +194,19 @@ impl Ran {
         self.check(self.code() == Some(code), &format!("expected exit code {code}"))
     }
 
-    /// The program said this on standard error.
+    /// Standard error contains this text.
     #[track_caller]
     pub fn complains(&self, part: &str) -> &Ran {
         self.check(self.stderr().contains(part), &format!("expected on stderr: {part}"))
     }
 
-    /// The program said all of these on standard error.
+    /// Standard error contains all of these texts.
     #[track_caller]
     pub fn complains_of(&self, parts: &[&str]) -> &Ran {
         parts.iter().fold(self, |ran, part| ran.complains(part))
     }
 
-    /// The program said this on standard output.
+    /// Standard output contains this text.
     #[track_caller]
     pub fn says(&self, part: &str) -> &Ran {
         self.check(self.stdout().contains(part), &format!("expected on stdout: {part}"))

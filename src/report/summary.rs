@@ -122,7 +122,7 @@ pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> 
     };
     let table = pivot(stored, &["band", "observable"], rows.iter().map(entry).collect());
     let mut caption = format!(
-        "What the mean of each model is off by, per cent of that of `{truth}`, which is light transport itself. \
+        "Error of each model's mean, per cent of that of `{truth}`, which is light transport itself. \
          In brackets the 95 % interval."
     );
     if rows.iter().any(|row| !row.note.is_empty()) {

@@ -137,8 +137,8 @@ fn contrasts_have_their_means() {
     assert!(known > 60, "{known} means are known");
 }
 
-/// A density that is off by a thousandth, a mirrored one and one of the wrong place are told apart: the
-/// tests above can fail.
+/// A density that is off by a thousandth, a mirrored one and one of the wrong place are distinguished:
+/// the tests above can fail.
 #[test]
 fn wrong_densities_are_seen() {
     let (_, right) = build(

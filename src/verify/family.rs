@@ -146,7 +146,7 @@ fn state(
         _ => reason(&found, &evidence, detect, &verdict),
     };
     match second {
-        Some(SecondLook::Missing) => reason += "; wants a second look on fresh streams",
+        Some(SecondLook::Missing) => reason += "; needs a second look on fresh streams",
         Some(SecondLook::Taken(_)) if found == Outcome::Pass => {
             reason = "failed at the first look and cleared by a second on fresh streams".into();
         }
@@ -171,7 +171,7 @@ fn reason(found: &Outcome, evidence: &Evidence, detect: Option<f64>, verdict: &V
         (Outcome::Fail, Evidence::Sum(_)) => "the table as a whole deviates".into(),
         (Outcome::Fail, _) => verdict.deviation(),
         (Outcome::Underpowered, _) => format!(
-            "could have missed {:.2e}, {:.2e} is to be seen",
+            "could have missed {:.2e}, {:.2e} must be found",
             verdict.detectable.unwrap_or(f64::INFINITY),
             detect.unwrap_or_default()
         ),

@@ -322,7 +322,7 @@ fn a_first_look_between_the_levels_wants_a_second() {
     // t with 63 degrees of freedom: 4.0 has p 1.7e-4, 3.0 has 3.9e-3, 6.5 has 1.4e-8.
     let waiting = judged_twice(4.0, None);
     assert_eq!(waiting.verdicts[0].outcome, Outcome::Fail);
-    assert!(waiting.verdicts[0].note.ends_with("wants a second look on fresh streams"));
+    assert!(waiting.verdicts[0].note.ends_with("needs a second look on fresh streams"));
     assert_eq!(waiting.wanted, [LookAgain { case: 0, subject: Measured::Quantity(quantity("mis", 0)) }]);
     for off in [3.0, 6.5] {
         let at_once = judged_twice(off, None);

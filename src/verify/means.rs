@@ -79,7 +79,7 @@ impl<'a> QuantityMean<'a> {
         if self.batches.len() < MIN_BATCHES {
             let n = self.batches.len();
             return Some(format!(
-                "too few passes: {name} has {n} batches, a t test wants {MIN_BATCHES}"
+                "too few passes: {name} has {n} batches, a t test needs {MIN_BATCHES}"
             ));
         }
         let skewness = self.all.skewness().abs() / (self.all.n as f64).sqrt();

@@ -8,7 +8,7 @@
 //! | `pair` | the cloud is thinned: a random pair of neighbours | products of p and 1 - p |
 //! | `number` | the cloud is thinned: how many are accepted | Poisson-binomial |
 //!
-//! What a draw says of its own density is 1 over the weight that it gave. An event of probability 2^-24
+//! The density that a draw reports is 1 over the weight that it gave. An event of probability 2^-24
 //! is not met by any affordable number of draws: `tail` begins in it, by a word of random bits whose
 //! first 24 are 0. It looks where p is below 2^-24, so that a number of 24 bits (0, then) accepts
 //! everything there, each with a weight above 2^24.

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::connection::{BOTTOM_TO_TOP, BSDF, CALL, Ends, LIGHT, Model, TOP_TO_BOTTOM, Vertex};
 use super::defects::Defect;
 
-/// Which techniques draw.
+/// Techniques that draw the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Technique {
@@ -30,12 +30,12 @@ pub enum Technique {
 }
 
 impl Technique {
-    /// Does it draw by this one of [`super::connection`]'s techniques?
+    /// Whether it draws by this one of [`super::connection`]'s techniques.
     pub fn uses(self, technique: usize, model: &Model) -> bool {
         (self == Technique::All || self as usize == technique) && model.can_draw(technique)
     }
 
-    /// What a sample of f is divided by: its own density, or the sum of all (Veach & Guibas 1995).
+    /// Divisor of a sample of f: its own density, or the sum of all (Veach & Guibas 1995).
     pub fn density(self, densities: [f64; 4], defect: Defect) -> f64 {
         match self {
             Technique::All if defect == Defect::MisOmitsBottom => densities[..3].iter().sum(),
@@ -49,14 +49,14 @@ impl Technique {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TwoBounceOptions {
-    /// Which techniques draw.
+    /// Techniques that draw the samples.
     pub technique: Technique,
     /// How far beyond the first surface that the probe meets x_i lies along the probe's ray, mm.
     pub depth_mm: f64,
     /// Only connections whose first flight is longer than this are scored, mm: a part of the integral,
     /// the same for all. Where a ray from x_k passes x_i at the distance D, the weight of
-    /// `top_to_bottom` grows as 1 / D next to x_i: its variance diverges as a logarithm, and of such a
-    /// mean no t test says anything.
+    /// `top_to_bottom` grows as 1 / D next to x_i: its variance diverges as a logarithm, and no t test
+    /// is valid for such a mean.
     pub beyond_mm: f64,
 }
 

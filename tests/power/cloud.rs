@@ -240,7 +240,7 @@ impl Estimator for Cloud {
             let mut stream = key.stream(index as u64, Purpose::Connection);
             let reflectance = fresnel(-seen.ray.dir.dot(hit.normal), self.eta).reflectance;
             if stream.draw() < reflectance {
-                continue; // goes off to the sky: surface reflection, which is not scored
+                continue; // leaves towards the sky: surface reflection, which is not scored
             }
             let exit = if self.defect == Defect::ExitTwice { 1.0 - reflectance } else { 1.0 };
             let radiance = self.gather(&points, hit.point, &mut stream);

@@ -67,7 +67,7 @@ pub struct Ends {
     pub light: usize,
 }
 
-/// What an interface does between w_kj and w_L.
+/// Transmission of an interface between w_kj and w_L.
 struct Through {
     /// Value of the integrand, f_t |n.w_L|.
     value: f64,
@@ -111,7 +111,7 @@ impl Model<'_> {
         1.0 / self.scene.lights.len() as f64
     }
 
-    /// Does nothing lie on the way that leaves `origin` inwards?
+    /// Whether the segment that leaves `origin` inwards is unoccluded.
     pub fn is_clear(&self, origin: DVec3, to: DVec3, from: Option<&Hit>, scores: &mut Scores) -> bool {
         let between = to - origin;
         let ray = Ray { origin, dir: between.normalize() };
@@ -120,7 +120,7 @@ impl Model<'_> {
         self.scene.shape.intersect(&ray, Side::Inside, from, between.length()).is_none()
     }
 
-    /// Does light reach a point of the surface?
+    /// Whether light reaches a point of the surface.
     pub fn is_lit(&self, exit: &Hit, to_light: DVec3, scores: &mut Scores) -> bool {
         scores.count(Cost::ShadowRays);
         let ray = Ray { origin: exit.point, dir: to_light };

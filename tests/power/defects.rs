@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::{acceptance, cloud};
 
-/// What may be wrong. Every place that can hold a defect asks for its own by name.
+/// Defects that can be planted. Every place that can hold a defect tests for its own by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Defect {
     /// Nothing: the sham, which must be green.
@@ -133,7 +133,7 @@ pub struct Planted {
     pub defect: Defect,
     /// Part of the program that it is planted in.
     pub family: Family,
-    /// What is wrong, in one line.
+    /// Description of the defect, in one line.
     pub what: &'static str,
     /// The tests, `experiment.claim`, `samplers.TEST` or `identity NAME`, of which each is expected to
     /// see it.
@@ -459,7 +459,7 @@ pub const SAMPLERS: &[Planted] = &[
     sampler(
         "density-tilted",
         Defect::DensityTilted,
-        "a density is off by what the claim says it detects",
+        "a density is off by the claim's `detect`",
         &["samplers.chi2 coarse"],
     ),
     sampler(

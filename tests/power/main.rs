@@ -139,7 +139,7 @@ fn scatterproof_with(name: &str, arguments: &[OsString]) -> ExitCode {
     if code == ExitCode::SUCCESS && !broken.is_empty() { ExitCode::from(1) } else { code }
 }
 
-/// What is asked of a row's code without random streams, and whether it is broken.
+/// Identities of a row's code, without random streams, and whether each is broken.
 fn identities(row: &Planted) -> Vec<(String, bool)> {
     let mut asked = Vec::new();
     if matches!(row.family, Family::Tracer | Family::Sham) {

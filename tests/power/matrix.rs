@@ -10,8 +10,8 @@ use super::defects::{self, Planted, UNIT_TESTED};
 use super::is_sham;
 use super::runs::{self, Outcome};
 
-/// Is an outcome as it must be? A defect is caught where the program does not exit with 0, and one of
-/// the tests that are expected to see it has seen it; the sham has to be green.
+/// Whether an outcome is the expected one. A defect is caught where the program does not exit with 0,
+/// and one of the tests that are expected to see it has seen it; the sham has to be green.
 pub fn judge(row: &Planted, outcome: &Outcome) -> Result<String, String> {
     let caught = outcome.caught();
     let list = caught.iter().copied().collect::<Vec<_>>().join(", ");

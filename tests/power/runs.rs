@@ -1,4 +1,4 @@
-//! Plays of defects: child processes, as many at once as there are cores, and what their verdicts were.
+//! Runs of defects: child processes, as many at once as there are cores, and their verdicts.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -16,25 +16,25 @@ use scatterproof::results::record::Band;
 
 use super::defects::{Family, Planted};
 
-/// What `verify` said of one defect with one seed.
+/// Output of `verify` on one defect with one seed.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Exit code; -1 where a signal ended it.
     pub exit: i32,
     /// Tests, and what each saw: the worst of its verdicts.
     pub tests: BTreeMap<String, Seen>,
-    /// What it wrote, for people.
+    /// Its printed output.
     pub said: String,
     /// Wall time, seconds.
     pub seconds: f64,
 }
 
-/// What a test saw.
+/// Result of a test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Seen {
     /// The test passed: it saw no defect.
     Green,
-    /// Nothing, and too little for what its claim wants: no evidence of a defect either.
+    /// Underpowered: no evidence of a defect either.
     Underpowered,
     /// A failure, or that the record is worth nothing.
     Defect,
@@ -47,7 +47,7 @@ impl Outcome {
         caught.map(|(name, _)| name.as_str()).collect()
     }
 
-    /// `verify` came to a verdict, whatever it is.
+    /// Whether `verify` reached a verdict.
     pub fn is_verdict(&self) -> bool {
         matches!(self.exit, 0 | 1 | 3) && !self.tests.is_empty()
     }

@@ -1,5 +1,5 @@
-//! Small samplers with places for defects, one for every way in which a draw and its density come apart.
-//! Densities are per unit of the chart, as the catalogue has them.
+//! Small samplers with places for defects, one for every way in which a draw and its density may
+//! disagree. Densities are per unit of the chart, as the catalogue has them.
 
 use std::f64::consts::{PI, SQRT_2, TAU};
 use std::sync::Mutex;
@@ -102,7 +102,7 @@ impl Sampler for Phase {
         2.0 * TAU * factor * self.claimed.pdf(2.0 * x - 1.0)
     }
 
-    /// The mean cosine that the sampler was asked for, whatever it draws.
+    /// The stated mean cosine, which a defect may change.
     fn contrasts(&self) -> Vec<Contrast> {
         let of = Box::new(|_, [x, _]: [f64; 2]| 2.0 * x - 1.0);
         vec![Contrast { name: "mean cosine", of, expected: Some(G) }]

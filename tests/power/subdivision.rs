@@ -47,7 +47,7 @@ impl Estimator for Subdivision {
     }
 }
 
-/// What a path carries.
+/// State of a path.
 struct Path<'a> {
     ends: TwoEnds<'a>,
     ray: Ray,
@@ -118,7 +118,7 @@ impl Path<'_> {
         }
     }
 
-    /// Meets the surface: samples a light, then goes on.
+    /// Meets the surface: samples a light, then continues.
     fn cross(&mut self, hit: &Hit, side: Side, is_end: bool) -> Option<Meeting> {
         let model = self.ends.model;
         let wo = -self.ray.dir;
@@ -160,7 +160,7 @@ impl Path<'_> {
         }
     }
 
-    /// Flies and scatters in the medium until the surface comes.
+    /// Flies and scatters in the medium until it meets the surface.
     fn wander(&mut self) -> Option<Hit> {
         let medium = self.ends.model.medium;
         loop {
@@ -253,7 +253,7 @@ impl Photons {
         let mut ray = Ray { origin, dir: -sample.wi };
         let mut history = History::default();
         // Events since the entry, and whether the first was a scattering: with the second it makes the
-        // two by which a path leaves that comes from the sensor.
+        // two by which a path from the sensor leaves.
         let (mut events, mut begins_in_medium) = (0, false);
         let mut side = Side::Outside;
         let mut hit = scene.shape.intersect(&ray, side, None, f64::INFINITY)?;

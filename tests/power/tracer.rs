@@ -1,6 +1,7 @@
 //! A second unidirectional path tracer, written plainly and apart from `estimators::path`: lights are
 //! chosen evenly, two light samples are drawn a vertex, the interface is `surface`, and after three
-//! scattering events a path goes on with probability albedo. Without a defect it must agree with `path`.
+//! scattering events a path continues with probability albedo. Without a defect it must agree with
+//! `path`.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -249,7 +250,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// Meets the boundary from `side`; the side on which the path goes on.
+    /// Meets the boundary from `side`; the side on which the path continues.
     fn meet(&mut self, hit: &Hit, side: Side) -> Option<Side> {
         self.scores.count(Cost::BoundaryEvents);
         self.ray.origin = hit.point;
@@ -379,7 +380,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// The density of a light sample, as the light says it.
+    /// The density of a light sample, as the light reports it.
     fn light_pdf(&self, light: usize, wi: DVec3, pdf: f64) -> f64 {
         match (&self.scene.lights[light].emission, self.defect) {
             (Emission::Map(_), Defect::SineMissing) => pdf * (1.0 - wi.z * wi.z).max(0.0).sqrt(),

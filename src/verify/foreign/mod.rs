@@ -246,7 +246,7 @@ impl BandQuestion<'_> {
             finding.detect = Some(self.question.detect);
             if arm.mean.value == 0.0 && !matches!(finding.evidence, Evidence::Nothing(_)) {
                 finding.evidence =
-                    Evidence::Nothing("the record's image is black: nothing to hold".into());
+                    Evidence::Nothing("the record's image is black: there is nothing to compare".into());
             }
         }
         finding
