@@ -1,4 +1,4 @@
-// A viewer's controls, and what it says in words.
+// A viewer's controls, and its texts.
 
 const LAYERS = { image: "Image", noise: "Noise", difference: "Difference", z: "z-score of the difference" };
 const ABOUT = {
@@ -82,7 +82,7 @@ class Controls extends Canvases {
       "split to move the seam, with Shift to pan. Two fingers zoom and pan; a tap flips.");
   }
 
-  // Decodes what is in view, paints it, and says what it is.
+  // Decodes, paints and describes the layer in view.
   async refresh() {
     const ticket = (this.ticket = {});
     this.stage.setAttribute("aria-busy", "true");
@@ -156,7 +156,7 @@ class Controls extends Canvases {
     this.explain(shown);
   }
 
-  // The colour bar and what there is to say of it.
+  // The colour bar and its description.
   explain(shown) {
     const { data } = this;
     const { layer, band } = this.state;
