@@ -55,7 +55,7 @@
 //! | campaign | all that one experiment plans and runs: cells with estimators, or samplers |
 //! | record | what a campaign writes |
 //! | re-run | to run a published experiment again and compare its record |
-//! | claim | what an experiment file says must hold |
+//! | claim | a statement in an experiment file that must hold |
 //! | comparison | one test of a claim: one quantity against a value or another quantity |
 //! | verdict | the outcome of a comparison: pass, fail, underpowered or invalid |
 //! | look | one round of tests; what fails the first look is measured again for the second |

@@ -121,7 +121,7 @@ fn a_damaged_record_is_refused_and_a_run_replaces_it() {
 }
 
 #[test]
-fn a_record_of_another_version_says_so() {
+fn a_record_of_another_version_is_refused() {
     let work = Work::with(&edit("passes = 100", "passes = 4"));
     work.run("run x.toml -q").exits(0);
     let path = "results/x/record/record.json";

@@ -415,7 +415,7 @@ fn shared(sources: &[Source]) -> Vec<String> {
 }
 
 #[test]
-fn a_type_name_stands_for_one_type() {
+fn a_type_name_denotes_one_type() {
     let found = shared(&sources());
     assert!(found.is_empty(), "{} names:\n{}", found.len(), found.join("\n"));
 }
@@ -456,7 +456,7 @@ fn misused(source: &Source) -> Vec<String> {
 }
 
 #[test]
-fn words_mean_what_the_table_says() {
+fn words_mean_what_the_table_states() {
     let found: Vec<String> = sources().iter().flat_map(misused).collect();
     assert!(found.is_empty(), "{} names:\n{}", found.len(), found.join("\n"));
 

@@ -252,7 +252,7 @@ fn what_is_right_passes_every_test() {
 }
 
 /// r sqrt(Var mu) is the density's relative error in the mean square: where that is what `chi2 coarse`
-/// says that it detects, it is found, and a tenth of it is not.
+/// states that it detects, it is found, and a tenth of it is not.
 #[test]
 fn a_wrong_density_is_found_at_the_detectable_size() {
     let g = 0.5;
@@ -486,7 +486,7 @@ fn files_are_held_to_their_schema() {
         ("samples = 20000", "samples = 20000000000", "x.toml:2:11", "must be at most 10000000000"),
         ("samples = 20000", "samples = 20000\nseeds = 1", "x.toml:3:1", "unknown key `seeds`"),
         ("samples = 20000\n", "", "x.toml:1:1", "missing key `samples`"),
-        ("samples = 20000", "samples = 20000\npair.over = []", "x.toml:3:1", "says more of a scene"),
+        ("samples = 20000", "samples = 20000\npair.over = []", "x.toml:3:1", "belongs to a scene"),
         ("sampler = {", "equals = { value = 1, source = \"\" } #", "x.toml:8:1", "there are none"),
         ("\"hg\"\nh", "\"h/g\"\nh", "x.toml:6:8", "the name \"h/g\" contains '/'"),
         ("henyey_greenstein", "henyey_grenstein", "x.toml:7:1", "did you mean `henyey_greenstein`?"),
@@ -511,7 +511,7 @@ fn files_are_held_to_their_schema() {
 }
 
 #[test]
-fn every_command_knows_samplers() {
+fn every_command_handles_samplers() {
     let work = Work::with(FILE);
     work.run("list samplers").exits(0).says("henyey_greenstein").says("g  Mean cosine.");
     work.run("plan x.toml --dry --setting more").exits(0).says("1 sampler, 30000 draws each");

@@ -291,7 +291,7 @@ fn several_files_have_one_connection() {
 }
 
 #[test]
-fn nobody_there_costs_nothing() {
+fn a_missing_viewer_costs_nothing() {
     let work = Work::with(&edit("budget.passes = 100", "budget.passes = 4"));
     let (listener, address) = listen();
     drop(listener);

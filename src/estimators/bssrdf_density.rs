@@ -49,7 +49,7 @@ pub struct DensityOptions {
     #[serde(rename = "radius_mm")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
-    /// Whether single scattering is added by sampling; without it where the model leaves it out.
+    /// Whether single scattering is added by sampling; by default where the model leaves it out.
     pub single: Option<bool>,
     /// Whether light that goes straight through the body is followed.
     #[serde(default = "super::kind::on")]

@@ -43,7 +43,7 @@ pub struct ProbeOptions {
     #[serde(default = "super::kind::one")]
     #[schemars(range(min = 1, max = 65536))]
     pub probes: usize,
-    /// Whether single scattering is added by sampling; without it where the model leaves it out.
+    /// Whether single scattering is added by sampling; by default where the model leaves it out.
     pub single: Option<bool>,
     /// Whether light that goes straight through the body is followed.
     #[serde(default = "super::kind::on")]

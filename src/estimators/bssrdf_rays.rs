@@ -38,14 +38,14 @@ pub struct RayOptions {
     #[serde(default = "super::kind::one")]
     #[schemars(range(min = 1, max = 65536))]
     pub rays: usize,
-    /// How far under the exit the rays start, mm; without it the reduced mean free path.
+    /// How far under the exit the rays start, mm; the reduced mean free path by default.
     ///
     /// Of bands that share a path the geometric mean of the least and the largest. At most half way to
     /// the opposite side.
     #[serde(rename = "depth_mm")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub depth: Option<f64>,
-    /// Whether single scattering is added by sampling; without it where the model leaves it out.
+    /// Whether single scattering is added by sampling; by default where the model leaves it out.
     pub single: Option<bool>,
     /// Whether light that goes straight through the body is followed.
     #[serde(default = "super::kind::on")]

@@ -7,7 +7,7 @@
 //! The branch of refraction is taken with probability T21, so that what is gathered there must leave T21
 //! out. L_t follows the refracted ray to the other side with transmittance exp(-sigma_t* t), leaves with
 //! the transmittance of the boundary as a weight (the model accounts for what is reflected there) and
-//! goes on outside as the same path.
+//! continues outside as the same path.
 //!
 //! Bands that refract alike share a path; with dispersion each index has its own.
 

@@ -55,7 +55,7 @@ use crate::scene::Scene;
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LightTraceOptions {
-    /// Photons whose sum is one pass; without it as many as the sensor has rays.
+    /// Photons whose sum is one pass; by default as many as the sensor has rays.
     #[schemars(range(min = 1, max = 1073741824))]
     pub paths: Option<usize>,
 }

@@ -100,8 +100,8 @@ pub(super) trait Rivals: Sized {
     /// latest medium vertex: 1 or 0 each.
     fn unidirectional(&self) -> [f64; 2];
 
-    /// Sum over the rivals of their densities of the path that ends at `exit` and goes on towards `wi`,
-    /// light `light`, relative to the density of the walk's medium vertices.
+    /// Sum over the rivals of their densities of the path that ends at `exit` and continues towards
+    /// `wi`, light `light`, relative to the density of the walk's medium vertices.
     fn densities<B: WalkBands>(
         walk: &mut CameraWalk<'_, Self, B>,
         exit: &WalkExit,

@@ -73,7 +73,7 @@ pub enum Value {
 pub struct Node {
     /// Parsed value.
     pub value: Value,
-    /// Where the value stands.
+    /// Where the value is.
     pub origin: Origin,
     /// Where its key is; none for elements of arrays and for the root.
     pub key: Option<Place>,

@@ -39,11 +39,11 @@ pub struct Faster {
     /// What counts as cost.
     #[serde(default)]
     pub cost: CostMeasure,
-    /// The observable; the sensor's first one without it. `pixels` for the variance of a pixel, averaged
+    /// The observable; the sensor's first by default. `pixels` for the variance of a pixel, averaged
     /// over the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
-    /// The transport class; `all` without it.
+    /// The transport class; `all` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
     /// The largest relative difference of the two means that may go unseen.
@@ -72,11 +72,11 @@ pub struct NotSlower {
     /// What counts as cost.
     #[serde(default)]
     pub cost: CostMeasure,
-    /// The observable; the sensor's first one without it. `pixels` for the variance of a pixel, averaged
+    /// The observable; the sensor's first by default. `pixels` for the variance of a pixel, averaged
     /// over the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
-    /// The transport class; `all` without it.
+    /// The transport class; `all` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
     /// The largest relative difference of the two means that may go unseen.

@@ -23,14 +23,14 @@ pub struct PictureEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunningEntry {
-    /// The estimators; all of them without it.
+    /// The estimators; all by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
     pub estimators: Option<Vec<String>>,
-    /// The observable; the sensor's first one without it.
+    /// The observable; the sensor's first by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
-    /// The transport class; `all` without it.
+    /// The transport class; `all` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
     /// Band that is shown.

@@ -372,7 +372,7 @@ pub struct Coefficients {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [{ "required": ["directional"] }, { "required": ["solid_angle"] }, { "required": ["environment"] }]))]
 pub struct LightEntry {
-    /// Name in observables (`mean@sun`); without it `light_1`, `light_2`, ...
+    /// Name in observables (`mean@sun`); by default `light_1`, `light_2`, ...
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Parallel light.
@@ -478,7 +478,7 @@ impl SamplerEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
-    /// Name of the axis in tables and in `where`; without it the last word of its first key.
+    /// Name of the axis in tables and in `where`; by default the last word of its first key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// One dotted key, as `object.boundary.rough.alpha` or `light.0.solid_angle.solid_angle_sr`.

@@ -378,8 +378,8 @@ mod tests {
         assert!(hits > BRUTE_FORCE_RAYS / 3, "{hits}");
     }
 
-    /// A walk that meets the surface at an edge goes on from a point that rounding may have put outside
-    /// of the neighbouring face: it leaves through that face at once, and is not lost.
+    /// A walk that meets the surface at an edge continues from a point that rounding may have put
+    /// outside of the neighbouring face: it leaves through that face at once, and is not lost.
     #[test]
     fn rays_from_edges_and_corners_leave() {
         let mut u = Uniform::named("rays_from_edges_and_corners_leave");

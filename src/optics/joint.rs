@@ -1,9 +1,9 @@
 //! Directions of a single bounce towards a point, in proportion to phase function and geometry together.
 //!
-//! Light that arrives at a vertex along `w_in`, goes on along w to x, and from there to a given point b,
-//! carries phase(w_in.w) / (|x - a|^2 |x - b|^2). Over the distance along an infinite ray the geometry
-//! integrates to (pi - theta) / (R sin theta) ([`crate::sampling::towards`]), so the direction's density
-//! has to be in proportion to
+//! Light that arrives at a vertex along `w_in`, continues along w to x, and from there to a given point
+//! b, carries phase(w_in.w) / (|x - a|^2 |x - b|^2). Over the distance along an infinite ray the
+//! geometry integrates to (pi - theta) / (R sin theta) ([`crate::sampling::towards`]), so the
+//! direction's density has to be in proportion to
 //!   target(w) = phase(w_in.w) (pi - theta) / sin(theta),     theta the angle between w and b,
 //! and the distance equiangular (joint importance sampling: Georgiev, Krivanek, Hachisuka,
 //! Nowrouzezahrai & Jarosz 2013; Kulla & Fajardo 2012; the phase function of the next vertex is left

@@ -9,7 +9,7 @@ use crate::results::store::Stored;
 use crate::verify::comparisons::EfficiencyRow;
 use crate::verify::model_errors::ModelError;
 
-/// The rows by one measure of cost that stand for a pair of estimators: all classes together, and pixels
+/// The rows by one measure of cost that represent a pair of estimators: all classes together, and pixels
 /// rather than their mean. Second arms of one estimator are left out.
 pub fn chosen<'a>(
     stored: &Stored,
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn no_ratio_is_said_to_be_none() {
+    fn a_missing_ratio_is_shown_as_missing() {
         let mut stored = sample::stored(0.1);
         sample::set_observables(&mut stored, "snee", |i, _, band| {
             let off = if band == 0 { 0.3 } else { 0.0 };

@@ -152,7 +152,7 @@ mod tests {
     use crate::results::sample;
 
     #[test]
-    fn a_manifest_stands_for_a_record_that_is_gone() {
+    fn a_manifest_replaces_a_missing_record() {
         let temp = tempfile::tempdir().expect("a folder");
         let folder = RecordFolder::new(temp.path().join("sample"));
         let told = folder.manifest().expect_err("nothing is there").to_string();

@@ -36,7 +36,7 @@ pub struct Split {
 pub struct Running {
     /// The estimators, or all.
     pub estimators: Option<Vec<String>>,
-    /// The observable; the sensor's first one without it.
+    /// The observable; the sensor's first by default.
     pub observable: Option<String>,
     /// Transport class that is shown.
     pub class: String,

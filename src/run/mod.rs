@@ -49,7 +49,7 @@ pub struct Options {
     pub out: PathBuf,
     /// Number of threads.
     pub threads: usize,
-    /// Passes per block; chosen by time without it.
+    /// Passes per block; chosen by time by default.
     pub block_passes: Option<u64>,
     /// Do not show a progress bar.
     pub quiet: bool,

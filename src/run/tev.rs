@@ -161,7 +161,7 @@ impl Connection {
     /// Connects to a viewer.
     ///
     /// # Errors
-    /// Nobody listens there, or nobody answers.
+    /// No program listens at the address, or none answers.
     pub fn open(address: &Address) -> io::Result<Connection> {
         let mut last = io::Error::new(io::ErrorKind::NotFound, "the host has no address");
         for socket in (address.host.as_str(), address.port).to_socket_addrs()? {

@@ -184,7 +184,7 @@ fn unbend([from, to]: [f64; 2], angle: f64) -> f64 {
 /// Normals of a distribution of microfacets, all of them or those seen from a direction.
 pub struct NormalSampler {
     facets: Microfacets,
-    /// The direction of view; without it the plain normals.
+    /// The direction of view; the plain normals by default.
     view: Option<DVec3>,
     chart: SlopeChart,
 }

@@ -308,7 +308,7 @@ mod tests {
         }
     }
 
-    /// The point on the line is the clamp's business, the point at the origin nobody's; vectors and
+    /// A point on the line is handled by the clamp, a point at the origin is refused; vectors and
     /// their two numbers agree.
     #[test]
     fn equiangular_limits() {

@@ -217,7 +217,7 @@ fn reweighted(d: &mut Draws, lambda_over_sigma: f64) -> f64 {
     if d.uniform() < (-tau).exp() { tau.exp() } else { 0.0 }
 }
 
-/// The levels whose rejections are counted: a distance between distributions says nothing of their
+/// The levels whose rejections are counted: a distance between distributions does not bound their
 /// tails.
 const LEVELS: [f64; 2] = [1e-2, 1e-3];
 

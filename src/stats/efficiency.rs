@@ -40,7 +40,7 @@ use super::tails::critical_value;
 use super::tree::Merge;
 use crate::math::{exp, ln};
 
-/// The fewest blocks of an arm: below, Student's interval is too wide to say anything.
+/// The fewest blocks of an arm: below, Student's interval is too wide to be of use.
 pub const FEWEST_BLOCKS: usize = 8;
 
 /// The largest share of an arm's sum of squares that one pass may hold.
@@ -167,7 +167,7 @@ pub struct Efficiency {
     pub a: ArmSummary,
     /// Variance and cost of arm B.
     pub b: ArmSummary,
-    /// Were the blocks deleted in pairs?
+    /// Whether the blocks were deleted in pairs.
     pub is_joint: bool,
     /// How far `work`'s log moved from the first half of the blocks to all of them: when the passes
     /// doubled.

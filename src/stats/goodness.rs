@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn what_says_nothing_is_refused() {
+    fn void_tests_are_refused() {
         let good = bins(&[0.25, 0.75], &[120, 280]);
         assert!(pearson(&good).is_ok());
         let refusal = |change: fn(&mut Vec<Bin>)| {
@@ -355,7 +355,7 @@ mod tests {
 
     #[test]
     fn one_sample_where_none_can_be_is_a_failure() {
-        // Whatever else could be said against the test.
+        // Before any other refusal of the test.
         for masses in [[0.5, 0.5, 0.0], [0.01, 0.99, 0.0]] {
             let found = pearson(&bins(&masses, &[100, 100, 1])).expect("a verdict");
             assert_eq!((found.p_value, found.statistic), (0.0, f64::INFINITY));

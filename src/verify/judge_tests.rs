@@ -70,7 +70,7 @@ fn a_claim_made_after_the_run_is_not_green() {
 }
 
 #[test]
-fn two_silences_agree_on_nothing() {
+fn two_zero_means_are_no_agreement() {
     let mut s = with_claim(stored(0.1), ClaimKind::Agree, ExpectedOutcome::Pass, other(false), None);
     set_observables(&mut s, "mis", |_, _, _| 0.0);
     set_observables(&mut s, "snee", |_, _, _| 0.0);

@@ -95,7 +95,7 @@ pub struct PointCloudOptions {
     /// How accepted points are found; both have the same law.
     #[serde(default)]
     pub search: Search,
-    /// Whether single scattering is added by sampling; without it where the model leaves it out.
+    /// Whether single scattering is added by sampling; by default where the model leaves it out.
     pub single: Option<bool>,
     /// Whether light that goes straight through the body is followed.
     #[serde(default = "crate::estimators::kind::on")]

@@ -28,7 +28,7 @@
 //! normalised models have K = R / (pi (1 - 2 C1(1/eta))), so that their hemispherical exitance under T21
 //! is R. The classical dipole's total is the whole diffuse reflectance within 0.03 of exact transport,
 //! so that single scattering on top of it is counted twice in part; its source adds it nonetheless, and
-//! `leaves_out_single` says so.
+//! `leaves_out_single` states this.
 
 mod better;
 mod classical;

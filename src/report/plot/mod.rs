@@ -400,7 +400,7 @@ mod tests {
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     }
 
-    /// Marks that stand side by side at one name are of that name.
+    /// Marks that are side by side at one name belong to that name.
     #[test]
     fn numbers_stand_by_their_names() {
         let points = vec![PlotPoint::bare(-0.2, 1.0), PlotPoint::bare(0.8, 2.0)];
@@ -413,7 +413,7 @@ mod tests {
         );
     }
 
-    /// Names whose lines end at one height do not stand on each other.
+    /// Names whose lines end at one height do not overlap.
     #[test]
     fn names_stand_apart() {
         let svg = plot().to_svg();

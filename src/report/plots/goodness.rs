@@ -78,7 +78,7 @@ mod tests {
 
     /// 100 draws in three bins of masses 0.25, 0.75 and 0, and an outcome that neither can be nor was.
     #[test]
-    fn residuals_are_in_standard_deviations_and_the_impossible_is_said() {
+    fn residuals_are_in_standard_deviations_and_the_impossible_is_noted() {
         let mut stored = sample::stored(0.1);
         let run = serde_json::json!({
             "sampler": "coin", "kind": "test", "samples": 100, "coarse": "c", "fine": null, "serial": null,

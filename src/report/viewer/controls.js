@@ -209,7 +209,7 @@ class Controls extends Canvases {
     this.readout.replaceChildren(place, make("table", {}, ...rows));
   }
 
-  // The value that an index into a palette stands for.
+  // The value of an index into a palette.
   mapped(index) {
     const { data } = this;
     if (index === 0) return "no value";

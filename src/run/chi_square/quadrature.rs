@@ -225,7 +225,7 @@ impl<'a> Quadrature<'a> {
     }
 }
 
-/// The point of the range that a coordinate beyond it stands for.
+/// The point of the range that a coordinate beyond it denotes.
 pub fn wrap(axis: &Coordinate, x: f64) -> f64 {
     let [low, high] = axis.range;
     if !axis.periodic || (low..=high).contains(&x) { x } else { low + (x - low).rem_euclid(high - low) }
