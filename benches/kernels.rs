@@ -1,6 +1,6 @@
 //! Speed of the kernels and of whole paths, at fixed seeds: every run of a benchmark does the same
-//! work, so two builds are compared on equal terms. `cargo bench -p benches --bench kernels -- --quick` for a
-//! look, without `--quick` for figures to compare.
+//! work, so two builds are compared on equal terms. `cargo bench -p benches --bench kernels -- --quick`
+//! for a look, without `--quick` for figures to compare.
 
 use std::f64::consts::PI;
 use std::hint::black_box;
@@ -24,7 +24,7 @@ use scatterproof::sampling::warp::{square_to_cap, square_to_cosine_hemisphere};
 use scatterproof::scene::sensor::Probe;
 use scatterproof::scene::{Emission, Light, Scene, Sensor};
 
-/// Inputs of a kernel; one iteration goes through all of them.
+/// Inputs of a kernel; one iteration visits all of them.
 const INPUTS: usize = 4096;
 
 /// Paths of one iteration.

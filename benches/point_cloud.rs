@@ -1,11 +1,12 @@
-//! What a query of a point cloud costs: by the hierarchy, and by asking every point.
+//! Cost of a query of a point cloud: by the hierarchy, and by visiting every point.
 //!
 //!   cargo bench --bench point_cloud
 //!
-//! For bodies of three materials and two sizes: points built into the hierarchy, nanoseconds for each node or point that a
-//! query visits, for each point that the scan rejects, for each BSSRDF evaluated, and how many times as fast the
-//! hierarchy is in CPU time, both evaluating a classical dipole in three bands for what they accept. Repeats of the two alternate;
-//! the median of the ratios is shown, with the smallest and the largest.
+//! For bodies of three materials and two sizes: points built into the hierarchy, nanoseconds for each
+//! node or point that a query visits, for each point that the scan rejects, for each BSSRDF evaluated,
+//! and how many times as fast the hierarchy is in CPU time, both evaluating a classical dipole in three
+//! bands for what they accept. Repeats of the two alternate; the median of the ratios is shown, with the
+//! smallest and the largest.
 
 use std::hint::black_box;
 
@@ -104,7 +105,7 @@ fn row(name: &str, radius: f64, count: usize) {
 }
 
 impl Bench {
-    /// Nanoseconds a query.
+    /// Time of a query, ns, and the work of all.
     fn time(&mut self, by_tree: bool, evaluate: bool) -> (f64, ThinningWork) {
         let Bench { tree, rule, models, at, stream } = self;
         let mut work = ThinningWork::default();

@@ -11,7 +11,7 @@ What it does, in this order, with counts on standard output:
    one of the same direction: they leave holes;
 3. keeps the largest connected part;
 4. where several fans of triangles meet in one vertex, gives each a vertex of its own, moved a hundredth
-   of the way to its neighbours so that the copies stand apart;
+   of the way to its neighbours so that the copies are separate;
 5. closes each hole by triangles from its rim to a new vertex at the mean of the rim;
 6. turns the body outside out (positive volume) and centres its bounding box at the origin.
 

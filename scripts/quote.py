@@ -8,8 +8,8 @@ A page quotes a table by a comment and what follows it up to an empty line:
     <!-- results/published/short/NAME/tables/TABLE.md rows: WORDS; WORDS -->
     | ... |
 
-With `rows:` only those rows are quoted that hold one of the words (between the bars, as they stand there).
-Without --check pages are brought up to date; with it, exit code 1 says that one is not. Pictures: `scripts/publish`.
+With `rows:` only those rows are quoted that hold one of the words (between the bars, as they are written there).
+Without --check pages are brought up to date; with it, exit code 1 means that one is not. Pictures: `scripts/publish`.
 """
 import pathlib
 import re

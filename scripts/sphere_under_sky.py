@@ -22,7 +22,7 @@ mp.dps = 30
 
 # Reduced scattering and absorption, 1/mm, red green blue; index; and radii, mm. With the smaller one the mean over the
 # bands of the effective transport coefficient, less twice the smallest, times the diameter is below 3; with the larger
-# it is above in all of them but marble, where it is negative; the third is far above.
+# it is above in all of them except marble, where it is negative; the third is far above.
 MATERIALS = {
     "skin1": ((0.74, 0.88, 1.01), (0.032, 0.17, 0.48), 1.3, (5, 20, 40)),
     "marble": ((2.19, 2.62, 3.00), (0.0021, 0.0041, 0.0071), 1.5, (5, 20)),
@@ -63,7 +63,7 @@ def diffused(scattering, absorption, n, radius):
 
 print("# Flux that leaves a sphere under a uniform sky of radiance 1, W, after diffusing:")
 print("# classical dipole (Jensen et al. 2001), exact Fresnel moments, quadrature with 30 digits.")
-print("# scripts/sphere_under_sky.py writes this file and says how.")
+print("# scripts/sphere_under_sky.py writes this file and states how.")
 print("label,material,radius_mm,eta,R,G,B")
 for name, (scattering, absorption, n, radii) in MATERIALS.items():
     if int(sys.argv[1]) >= len(radii):

@@ -156,7 +156,7 @@ check(chi_square(90, 63), gammainc(mpf(63) / 2, 45, inf, regularized=True))
 check(chi_square(50, 63), gammainc(mpf(63) / 2, 25, inf, regularized=True))
 check(binomial_upper(30, 50, 0.5), betainc(30, 21, 0, mpf(0.5), regularized=True))
 check(binomial_upper(20, 50, 0.5), betainc(20, 31, 0, mpf(0.5), regularized=True))
-# n = 2, by hand: D+ >= 3/4 is that both points lie below 1/4 (their step to 1 stands at the larger).
+# n = 2, by hand: D+ >= 3/4 is that both points lie below 1/4 (their step to 1 is at the larger).
 check(smirnov(0.75, 2), mpf(1) / 16)
 
 print("distribution,a,b,statistic,p")

@@ -16,7 +16,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub struct Diagnostic {
     /// The rule that was broken, as a sentence: ``unknown key `albdo` ``.
     pub rule: String,
-    /// Where: the text it stands in and the bytes it covers.
+    /// Where: the text and the bytes it covers.
     pub place: Option<Place>,
     /// What to do: ``did you mean `albedo`?``.
     pub help: Option<String>,
@@ -27,7 +27,7 @@ pub struct Diagnostic {
 pub struct Place {
     /// The name of the text: a path, or `--set`.
     pub name: Arc<str>,
-    /// The text itself.
+    /// Text of the input.
     pub text: Arc<str>,
     /// The bytes the finding covers.
     pub span: Range<usize>,
@@ -54,10 +54,10 @@ pub enum Error {
         path: PathBuf,
         /// What was being done, as `write the record`.
         doing: String,
-        /// What the system said.
+        /// The system's message.
         source: std::io::Error,
     },
-    /// What stands on disk is not what it should be (a truncated or foreign record).
+    /// What is on disk is not what it should be (a truncated or foreign record).
     Record {
         /// The file or folder.
         path: PathBuf,

@@ -8,7 +8,7 @@
 //!
 //! ```text
 //! simulation   math -> sampling -> optics -> geometry -> scene -> estimators
-//!                                                        scene -> samplers     (the catalogue of samplers)
+//!                                                        scene -> samplers  (the catalogue of samplers)
 //!              math -> optics -> reference          (closed forms; never sees the estimators)
 //! bridge       experiment -> run                    (the only modules that see both sides)
 //! evidence     math -> stats -> results -> verify -> report
@@ -18,7 +18,7 @@
 //! stored moments and counts into verdicts, tables and plots, and knows no ray. Data flows one way:
 //! `experiments/x.toml` -> schema -> validated experiment -> scene + estimators -> blocks of passes
 //! -> moments -> `results/x/` -> `verify` and `report`, which read only `results/`.
-//! A module uses only what stands before it in this picture; `tests/layering.rs` reads the sources
+//! A module uses only what comes before it in this picture; `tests/layering.rs` reads the sources
 //! and fails on any other edge.
 //!
 //! # Words
@@ -27,7 +27,7 @@
 //!
 //! | word | meaning |
 //! |---|---|
-//! | band | one wavelength interval with scalar optical properties; transport is scalar inside one band |
+//! | band | one wavelength interval with scalar optical properties and scalar transport |
 //! | `sigma_a`, `sigma_s`, `sigma_t` | absorption, scattering, extinction coefficient, 1/mm |
 //! | `albedo` | `sigma_s / sigma_t` |
 //! | `g` | mean cosine of the phase function; g > 0 is forward |
@@ -43,7 +43,7 @@
 //! | technique | one way of drawing a sample |
 //! | sampler | a function from uniform numbers to samples, with the density that it claims |
 //! | estimator | techniques plus weights |
-//! | kind | what an entry of an experiment file is, by its name in a registry: `path`, `henyey_greenstein` |
+//! | kind | type of an entry of an experiment file, a name in a registry: `path`, `henyey_greenstein` |
 //! | skipped | of a light: not connected to by subdivision, and sampled by path tracing only |
 //! | cell | one point of an experiment's sweep, and nothing else |
 //! | observable | a pixel, the mean of a region or tile, a flux, each by transport class |
@@ -55,7 +55,7 @@
 //! | campaign | all that one experiment plans and runs: cells with estimators, or samplers |
 //! | record | what a campaign writes |
 //! | re-run | to run a published experiment again and compare its record |
-//! | claim | what an experiment file says must hold |
+//! | claim | a statement in an experiment file that must hold |
 //! | comparison | one test of a claim: one quantity against a value or another quantity |
 //! | verdict | the outcome of a comparison: pass, fail, underpowered or invalid |
 //! | look | one round of tests; what fails the first look is measured again for the second |

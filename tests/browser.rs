@@ -1,7 +1,8 @@
-//! The report's viewer in a real browser. A script at the end of a copy of the page acts as a reader would, and prints
-//! what it found to the browser's console, which goes to its standard error.
+//! The report's viewer in a real browser. A script at the end of a copy of the page acts as a reader
+//! would, and prints what it found to the browser's console, which goes to its standard error.
 //!
-//! The browser is `SCATTERPROOF_BROWSER`, or the first of chromium, chromium-browser and google-chrome on the path.
+//! The browser is `SCATTERPROOF_BROWSER`, or the first of chromium, chromium-browser and google-chrome
+//! on the path.
 
 use std::io::{BufRead, BufReader, Cursor};
 use std::os::unix::process::CommandExt;
@@ -17,9 +18,9 @@ use serde_json::{Value, json};
 use super::work::{IMAGE, Work, replaced};
 
 const SCRIPT: &str = include_str!("data/browser-test.js");
-/// What the script prints before its outcome.
+/// Prefix of the script's outcome.
 const MARK: &str = "BROWSER-TEST ";
-/// A browser that says nothing for so long has failed.
+/// A browser that prints nothing for so long has failed.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn browser() -> PathBuf {
@@ -77,7 +78,7 @@ impl Open {
         Open { child, lines, _profile: profile }
     }
 
-    /// What the script found.
+    /// Findings of the script.
     fn outcome(&self) -> Value {
         let mut said = String::new();
         loop {
@@ -102,7 +103,7 @@ impl Drop for Open {
     }
 }
 
-/// A report with pictures, and what the script is to know of its record.
+/// A report with pictures, and the facts of its record that the script checks.
 struct Report {
     work: Work,
     page: String,
@@ -145,7 +146,7 @@ impl Report {
     }
 }
 
-/// The outcome of a test that found nothing.
+/// The outcome of a test without findings.
 fn sound(outcome: Value) -> Value {
     let failures = outcome["failures"].as_array().expect("failures");
     let lines: Vec<&str> = failures.iter().filter_map(Value::as_str).collect();
@@ -187,8 +188,8 @@ fn expected(root: &Path) -> Value {
     json!({ "width": size.0, "height": size.1, "cells": cells, "limits": limits, "bands": names })
 }
 
-/// A pixel each of the split picture of two tiles of 12 x 12 pixels: they stand there as squares of 16 x 16, with a seam of
-/// one pixel and a gap of six.
+/// A pixel each of the split picture of two tiles of 12 x 12 pixels: they are shown as squares of 16 x
+/// 16, with a seam of one pixel and a gap of six.
 fn grid(path: &Path) -> Vec<u8> {
     let (sheet, mut pixels) = (png(path), Vec::new());
     let width = 2 * (12 * 16 + 1) + 6;

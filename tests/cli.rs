@@ -1,4 +1,4 @@
-//! The command line: what it says of bad input, with which exit code, and what each command does.
+//! The command line: messages and exit codes for bad input, and the effect of each command.
 
 use super::work::{IMAGE, SENSOR, Work, edit, replaced};
 
@@ -7,7 +7,7 @@ use super::work::{IMAGE, SENSOR, Work, edit, replaced};
 fn refused(work: &Work, words: &[&str]) {
     for command in ["run x.toml", "plan x.toml --dry", "verify x.toml"] {
         let ran = work.run(command);
-        ran.exits(2).check(ran.stdout().is_empty(), "nothing but the error is said");
+        ran.exits(2).check(ran.stdout().is_empty(), "nothing except the error is printed");
         ran.complains_of(words);
     }
     assert!(!work.path("results").exists(), "bad input leaves nothing behind");
@@ -125,7 +125,7 @@ fn sensors_in_bodies_and_too_much_memory() {
     for point in ["[0, 0, 0.5]", "[0, 0, 1]"] {
         let probe = format!("sensor.probe = {{ point_mm = {point}, toward = [0, 0, -1] }}");
         let work = Work::with(&edit(SENSOR, &probe));
-        refused(&work, &["the sensor at [0, 0,", "stands inside or on the body", "move it outside"]);
+        refused(&work, &["the sensor at [0, 0,", "is inside or on the body", "move it outside"]);
     }
     // Parallel rays start before the body wherever the image plane was put.
     let works = ["[0, 0, 3]", "[0, 0, 0.5]", "[0, 0, -7]"]
@@ -278,7 +278,7 @@ fn no_bar_where_there_is_no_terminal() {
     ran.check(!ran.stdout().contains(['\u{1b}', '\r']), "no control characters");
 }
 
-/// The script that plays published experiments says what it does not know before it plays anything.
+/// The script that runs published experiments refuses unknown names before it runs anything.
 #[test]
 fn reproduce_refuses_what_is_not_published() {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/reproduce");
@@ -291,7 +291,8 @@ fn reproduce_refuses_what_is_not_published() {
     work.shell(&format!("'{script}' --help")).exits(0).says("every array is byte-identical");
 }
 
-/// A name is never a path: separators and control characters are refused, and a record's files are numbered.
+/// A name is never a path: separators and control characters are refused, and a record's files are
+/// numbered.
 #[test]
 fn names_of_estimators_are_no_paths() {
     for name in ["snee/guided", "a/../../../x", "a\\\\b", "a\\nb"] {

@@ -54,7 +54,7 @@ fn a_full_disk_costs_nothing_that_was_there() {
     same(&later, &work.record("fresh"), "with and without the failure");
 }
 
-/// The state fits on the disk, the record does not: what was played is kept.
+/// The state fits on the disk, the record does not: what was run is kept.
 #[test]
 fn a_disk_that_is_full_for_the_record_alone() {
     let work = Work::with(&edit("passes = 100", "passes = 128"));
@@ -109,7 +109,7 @@ fn a_damaged_record_is_refused_and_a_run_replaces_it() {
     fs::write(work.path("results/x/record/record.json"), "{").expect("written");
     work.run("run x.toml -q").exits(0);
     same(&work.record("results"), &whole, "made again from the states");
-    // A damaged state is played again.
+    // The passes of a damaged state are run again.
     for (name, bytes) in work.files("results/x/state") {
         let mut bytes = bytes;
         bytes[100] ^= 1;
@@ -117,11 +117,11 @@ fn a_damaged_record_is_refused_and_a_run_replaces_it() {
     }
     fs::remove_dir_all(work.path("results/x/record")).expect("removed");
     work.run("run x.toml -q").exits(0);
-    same(&work.record("results"), &whole, "played again");
+    same(&work.record("results"), &whole, "run again");
 }
 
 #[test]
-fn a_record_of_another_version_says_so() {
+fn a_record_of_another_version_is_refused() {
     let work = Work::with(&edit("passes = 100", "passes = 4"));
     work.run("run x.toml -q").exits(0);
     let path = "results/x/record/record.json";

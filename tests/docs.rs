@@ -1,4 +1,4 @@
-//! The pages for people: what they show is accepted, what they claim holds, what they point at exists.
+//! The documentation: examples are accepted, statements hold, links and commands are valid.
 
 use std::fs;
 use std::path::Path;
@@ -46,7 +46,7 @@ fn text(path: &str) -> String {
 /// A fenced block of a page.
 #[derive(Debug)]
 struct Block<'a> {
-    /// What stands behind the opening fence.
+    /// The info string behind the opening fence.
     tag: &'a str,
     /// The lines between the fences, numbered as in the page.
     lines: Vec<(usize, &'a str)>,
@@ -105,7 +105,8 @@ fn merged(base: &Table, snippet: Table) -> Table {
 }
 
 /// The experiments that a page by example shows: line and file. The block `toml complete` is the base
-/// of all snippets; `toml samplers` is a file of its own; in `toml one-of` each line is one; `spectral` ones have bands with wavelengths.
+/// of all snippets; `toml samplers` is a file of its own; in `toml one-of` each line is one; `spectral`
+/// ones have bands with wavelengths.
 fn experiments(page: &str) -> Vec<(usize, Table)> {
     let parse = |line: usize, text: &str| {
         toml::from_str::<Table>(text)
@@ -125,7 +126,7 @@ fn experiments(page: &str) -> Vec<(usize, Table)> {
             "toml" => files.push((first, merged(&base, parse(first, &block.text())))),
             "toml one-of" | "toml one-of spectral" => {
                 for &(number, line) in &block.lines {
-                    // What was measured, was in R, G and B.
+                    // The measurement was in R, G and B.
                     let in_rgb = block.tag == "toml one-of" || line.contains("\"marble\"");
                     let base = if in_rgb { &base } else { &spectral };
                     files.push((number, merged(base, parse(number, line))));
@@ -137,7 +138,7 @@ fn experiments(page: &str) -> Vec<(usize, Table)> {
     files
 }
 
-/// A closed body.
+/// A closed body, as an OBJ file.
 const OCTAHEDRON: &str = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n\
     f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
 
@@ -148,7 +149,7 @@ fn write_sky(path: &Path) {
     write_exr(path, &Picture::new(&bands, &pixels), &[]).expect("a sky");
 }
 
-/// What `check` says of a page's experiments: how many there are, and what is wrong.
+/// Result of `check` on a page's experiments: their number, and the errors.
 fn refused(page: &str) -> (usize, String) {
     let work = Work::new();
     work.write("body.obj", OCTAHEDRON);
@@ -165,7 +166,7 @@ fn refused(page: &str) -> (usize, String) {
     }
     let ran = work.run(&format!("check {}", names.join(" ")));
     let said = ran.stdout();
-    // Not every error says in which experiment it is.
+    // Not every error names its experiment.
     names.retain(|name| !said.contains(&format!("{name}: ok, ")));
     ran.check((ran.code() == Some(0)) == names.is_empty(), "the exit code says what the lines say");
     let errors = format!("{}\n{}", names.join(" "), ran.stderr());
@@ -279,7 +280,7 @@ fn commands(page: &str) -> Vec<(usize, String)> {
     found
 }
 
-/// What is wrong with a command, where something is. Files in folders must be there; `example.toml` is
+/// The error in a command, if any. Files in folders must be there; `example.toml` is
 /// the file of the page by example.
 fn wrong(work: &Work, command: &str) -> Option<String> {
     let words: Vec<&str> = command.split_whitespace().collect();
@@ -307,7 +308,7 @@ fn wrong(work: &Work, command: &str) -> Option<String> {
     if !folder.join(file).is_file() {
         return Some(format!("no file {file}"));
     }
-    // Of the estimator of one's own the program at hand knows nothing.
+    // The program under test does not know the reader's own estimator.
     let overrides_only = rest.iter().filter(is_flag).all(|flag| ["--set", "--setting"].contains(flag));
     if !overrides_only || file.starts_with("examples/") {
         return None;
@@ -375,7 +376,7 @@ fn every_command_exists() {
     assert_eq!(found.lines().count(), 6, "{found}");
 }
 
-/// A page that the book does not list is a page that nobody finds.
+/// Every page is listed in the book.
 #[test]
 fn the_book_lists_every_page() {
     let summary = text("docs/SUMMARY.md");

@@ -1,4 +1,4 @@
-//! Work and time by batch, rivals side by side, and what both make of claims of efficiency.
+//! Work and time by batch, rivals side by side, and claims of efficiency that rest on them.
 
 use scatterproof::results::store::{RecordFolder, Stored};
 use scatterproof::verify::weights::{DRIFT_LIMIT, WEIGHTS, counter, drift, fit, timed};
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::work::{IMAGE, Work, probe, replaced, same};
 
-/// A claim by CPU time, so that both estimators are played side by side and `mis` twice.
+/// A claim by CPU time, so that both estimators are run side by side and `mis` twice.
 const BY_TIME: &str =
     "[[claim]]\nfaster = { candidate = \"analog\", baseline = \"mis\", cost = \"cpu\" }\n";
 
@@ -108,7 +108,8 @@ fn rivals_that_were_interrupted_go_on_to_the_same_bytes() {
     panic!("it was never interrupted in the middle");
 }
 
-/// Prints the weights that CPU time on this machine asks for, and fails where those of the program are off.
+/// Prints the weights that CPU time on this machine asks for, and fails where those of the program are
+/// off.
 #[test]
 #[ignore = "measures CPU time: for the night"]
 fn cpu_time_follows_the_counters() {

@@ -1,5 +1,5 @@
-//! Ctrl-C and kill -9 in the middle of a run: what was played is kept, and the same command goes on to
-//! the same bytes.
+//! Ctrl-C and kill -9 in the middle of a run: what was run is kept, and the same command resumes and
+//! gives the same bytes.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -53,7 +53,7 @@ fn stopped(work: &Work, signal: &str, after: u64) -> Ran {
 }
 
 #[test]
-fn ctrl_c_keeps_what_was_played() {
+fn ctrl_c_keeps_what_was_run() {
     for signal in ["INT", "TERM"] {
         // How far the second measurement gets is the machine's affair: later where it has not begun.
         let mut found = Vec::new();
@@ -61,7 +61,7 @@ fn ctrl_c_keeps_what_was_played() {
             let work = Work::with(&long());
             let ran = stopped(&work, signal, after);
             ran.exits(130).complains("interrupted: 1 of 2 measurements are complete");
-            ran.complains("are kept in results/x").complains("the same command goes on");
+            ran.complains("are kept in results/x").complains("the same command resumes");
             assert!(!work.path("results/x/record").exists(), "no record of half a run");
             found = passes(&work);
             if found.len() == 2 && found[0] > 0 {
@@ -102,7 +102,7 @@ fn an_earlier_record_outlives_an_interrupted_run() {
     same(&work.record("results"), &WHOLE, "extended");
 }
 
-/// What was kept of an interrupted run was seen: a claim made since then is post hoc.
+/// The kept passes of an interrupted run were seen: a claim made since then is post hoc.
 #[test]
 fn claims_made_after_an_interruption_are_post_hoc() {
     // Uniform light, so that no rare path carries much.

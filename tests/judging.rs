@@ -1,4 +1,5 @@
-//! `judge` on images of the program itself, made with other seeds, and `compare`; each with planted defects.
+//! `judge` on images of the program itself, made with other seeds, and `compare`; each with planted
+//! defects.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -223,7 +224,7 @@ fn bad_images_are_refused() {
     ran.exits(3).says("image 2 holds 1 values that are not finite, the first at row 3, column 4");
     ran.check(!ran.stdout().contains("invalid  R"), "the other bands are judged");
 
-    // What the seeds share is no noise of pixels: the user's word is not taken against the images.
+    // What the seeds share is not noise of pixels: the images override the user's assertion.
     let (dim, bright) = ("dim.exr", "bright.exr");
     altered(&work, "seed-0.exr", dim, |_, _, _, x| 0.8 * x);
     altered(&work, "seed-1.exr", bright, |_, _, _, x| 1.25 * x);

@@ -1,12 +1,12 @@
-//! What neither the compiler nor clippy can say of the sources: who uses whom (the picture in `src/lib.rs`), which module is
-//! the door of which crate, that one name stands for one type, and how long a file may be. Functions that differ between
-//! machines are in `clippy.toml`.
+//! Rules of the sources that neither the compiler nor clippy can check: which module uses which (the
+//! picture in `src/lib.rs`), which module is the door of which crate, that one name denotes one type,
+//! and how long a file may be. Functions that differ between machines are in `clippy.toml`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// What a module may use, besides itself and `error`.
+/// Modules that a module may use, besides itself and `error`.
 const LAYERS: [(&str, &[&str]); 18] = [
     ("error", &[]),
     // Simulation.
@@ -115,11 +115,12 @@ const SERDE: [&str; 11] = [
 const JSON: [&str; 8] =
     ["samplers", "estimators", "stats", "results", "verify", "report", "experiment", "run"];
 
-/// Type names that may stand for several types: clap's arguments of each subcommand, and nodes of trees.
+/// Type names that may denote several types: clap's arguments of each subcommand, and nodes of trees.
 const SHARED_NAMES: [&str; 2] = ["Args", "Node"];
 
-/// Words that mean one thing, and where nothing may bear them: a cell is a point of a sweep, which geometry, estimators and
-/// chi-square (bins) know nothing of; stored moments are of observables, and gates are those of continuous integration.
+/// Words that mean one thing, and where nothing may bear them: a cell is a point of a sweep, which
+/// geometry, estimators and chi-square (bins) know nothing of; stored moments are of observables, and
+/// gates are those of continuous integration.
 const WORDS: [(&str, &[&str]); 3] = [
     (
         "cell",
@@ -142,7 +143,7 @@ const WORDS: [(&str, &[&str]); 3] = [
 const LONG: [(&str, usize); 1] = [("src/experiment/schema.rs", 800)];
 const LONGEST: usize = 700;
 
-/// A source file.
+/// A source file below `src`.
 struct Source {
     /// Path from the package's folder.
     path: String,
@@ -164,13 +165,13 @@ impl Source {
         Source { path: path.into(), text: text.into(), module, is_test }
     }
 
-    /// The top module.
+    /// Name of the source's top module.
     fn top(&self) -> &str {
         let root = if self.path.ends_with("main.rs") { "main" } else { "lib" };
         self.module.first().map_or(root, String::as_str)
     }
 
-    /// What stands before the unit tests, without comments and texts.
+    /// The code before the unit tests, without comments and texts.
     fn shipped(&self) -> String {
         let text = if self.is_test {
             ""
@@ -180,7 +181,7 @@ impl Source {
         text.lines().map(|line| code(line) + "\n").collect()
     }
 
-    /// Every path, by line: `use` statements taken apart.
+    /// Every path, by line: `use` statements are expanded.
     fn paths(&self) -> Vec<(usize, String)> {
         let (mut paths, mut statement) = (Vec::new(), None);
         for (line, number) in self.text.lines().map(code).zip(1..) {
@@ -208,7 +209,8 @@ impl Source {
         paths
     }
 
-    /// Where a path leads, from the crate's root; `None` for what is of another crate or a name of this file.
+    /// Where a path leads, from the crate's root; `None` for what is of another crate or a name of this
+    /// file.
     fn target(&self, path: &str) -> Option<Vec<String>> {
         let mut words: Vec<&str> = path.split("::").collect();
         let mut from = match words.remove(0) {
@@ -240,7 +242,7 @@ impl Source {
             }
             let target = self.target(&used).and_then(|target| target.into_iter().next());
             let Some(target) = target else { continue };
-            // Unit tests stand one module deeper than their file.
+            // Unit tests are one module deeper than their file.
             let is_module = LAYERS.iter().any(|(name, _)| *name == target) || root == "crate";
             if is_module && target != top && target != "error" && !allowed.contains(&target.as_str()) {
                 found.push(format!("{path}:{line}: `{top}` may not use `{target}`"));
@@ -248,7 +250,9 @@ impl Source {
         }
         found.dedup();
         if !self.text.starts_with("//! ") {
-            found.push(format!("{path}:1: the first line does not say, after `//! `, what the file is"));
+            found.push(format!(
+                "{path}:1: the first line does not state, after `//! `, what the file is"
+            ));
         }
         let longest = LONG.iter().find(|(long, _)| long == path).map_or(LONGEST, |(_, lines)| *lines);
         let lines = self.text.lines().count();
@@ -273,7 +277,7 @@ impl Source {
     }
 }
 
-/// A line without its comment, and without what stands in quotes.
+/// A line without its comment, and without the text in quotes.
 fn code(line: &str) -> String {
     let bare: Vec<&str> = line.split('"').step_by(2).collect();
     bare.join("\"\"").split("//").next().unwrap_or_default().to_string()
@@ -284,7 +288,7 @@ fn expanded(used: &str) -> Vec<String> {
     let used = used.trim().trim_start_matches("::");
     let Some((head, group)) = used.split_once('{') else {
         let path = used.split(" as ").next().unwrap_or_default();
-        // The crate under another name hides what is used of it.
+        // The crate under another name would hide its uses.
         return vec![if path == "crate" { "crate::crate".into() } else { path.to_string() }];
     };
     let (mut parts, mut depth) = (vec![String::new()], 0);
@@ -304,7 +308,7 @@ fn expanded(used: &str) -> Vec<String> {
     parts.flat_map(|part| expanded(part)).map(|path| format!("{head}{path}")).collect()
 }
 
-/// Every source.
+/// Every source file below `src`.
 fn sources() -> Vec<Source> {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut folders = vec![package.join("src")];
@@ -346,8 +350,8 @@ fn every_module_and_every_dependency_has_a_row() {
     assert_eq!(names.collect::<BTreeSet<String>>(), doors);
 }
 
-/// Files and folders of one folder that use each other, as `a/b -> a/c -> a/b`. A folder's `mod.rs` may use what stands in
-/// it and be used by it.
+/// Files and folders of one folder that use each other, as `a/b -> a/c -> a/b`. A folder's `mod.rs` may
+/// use what is in it and be used by it.
 fn circles(sources: &[Source]) -> Vec<String> {
     let modules: BTreeSet<&[String]> = sources
         .iter()
@@ -367,7 +371,7 @@ fn circles(sources: &[Source]) -> Vec<String> {
     let none = BTreeSet::new();
     let mut found = Vec::new();
     for start in uses.keys() {
-        // Breadth first: the shortest way back. Each circle is told by its first name.
+        // Breadth first: the shortest way back. Each cycle is identified by its first name.
         let mut ways = vec![vec![start]];
         let mut seen = BTreeSet::new();
         let mut at = 0;
@@ -398,7 +402,7 @@ fn no_files_of_a_folder_use_each_other() {
     assert!(found.is_empty(), "{} circles:\n{}", found.len(), found.join("\n"));
 }
 
-/// Names that stand for several types, with their places.
+/// Names that denote several types, with their places.
 fn shared(sources: &[Source]) -> Vec<String> {
     let mut places: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for source in sources {
@@ -411,12 +415,13 @@ fn shared(sources: &[Source]) -> Vec<String> {
 }
 
 #[test]
-fn a_type_name_stands_for_one_type() {
+fn a_type_name_denotes_one_type() {
     let found = shared(&sources());
     assert!(found.is_empty(), "{} names:\n{}", found.len(), found.join("\n"));
 }
 
-/// Types, fields, functions and modules that bear a word of the table where it would mean something else.
+/// Types, fields, functions and modules that bear a word of the table where it would mean something
+/// else.
 fn misused(source: &Source) -> Vec<String> {
     let mut found = Vec::new();
     for (line, number) in source.shipped().lines().zip(1..) {
@@ -451,7 +456,7 @@ fn misused(source: &Source) -> Vec<String> {
 }
 
 #[test]
-fn words_mean_what_the_table_says() {
+fn words_mean_what_the_table_states() {
     let found: Vec<String> = sources().iter().flat_map(misused).collect();
     assert!(found.is_empty(), "{} names:\n{}", found.len(), found.join("\n"));
 
@@ -473,7 +478,7 @@ fn words_mean_what_the_table_says() {
     }
 }
 
-/// What a planted text breaks, after a good first line.
+/// Rules that a planted text breaks, after a valid first line.
 fn planted(path: &str, text: &str) -> String {
     Source::new(path, &format!("//! A file.\n{text}")).violations().join("\n")
 }

@@ -1,4 +1,4 @@
-//! `verify` looks twice, counts nights, and plays records again.
+//! `verify` looks twice, counts nights, and runs passes of records again.
 
 use serde_json::Value;
 
@@ -24,7 +24,7 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).expect("JSON")
 }
 
-/// Mean and standard error of what the experiment measures first.
+/// Mean and standard error of the experiment's first measurement.
 fn measured(text: &str) -> (f64, f64) {
     let work = Work::with(text);
     work.run("run x.toml -q").exits(0);
@@ -38,8 +38,9 @@ fn equals(value: f64) -> String {
 }
 
 #[test]
-fn a_second_look_is_played_and_decides() {
-    // A value 4.3 standard errors from what the first look is known to find: p = 6e-5, between the levels.
+fn a_second_look_is_run_and_decides() {
+    // A value 4.3 standard errors from what the first look is known to find: p = 6e-5, between the
+    // levels.
     let (mean, error) = measured(&grey());
     let work = Work::with(&equals(mean - 4.3 * error));
     let ran = work.run("verify x.toml -q");
@@ -49,15 +50,15 @@ fn a_second_look_is_played_and_decides() {
         (&record["stage"], &record["cells"][0]["runs"][0]["passes"]),
         (&"retest".into(), &4096.into())
     );
-    // It stands there now: nothing is played again, the report says the same.
+    // The retest exists now: nothing is run again, the report is the same.
     let again = work.run("verify x.toml -q");
     again.exits(1).says("at both looks").check(!again.stderr().contains("second look"), "it is there");
     assert!(work.read("results/x/verdicts.csv").contains("at both looks"));
     work.run("report results/x").exits(0);
     assert!(work.read("results/x/verdicts.csv").contains("at both looks"));
-    // A folder without its second look is not green either, and says what it wants.
+    // A folder without its second look is not green either, and its message names the second look.
     std::fs::remove_dir_all(work.path("results/x/retest")).expect("removed");
-    work.run("verify results/x").exits(1).says("wants a second look on fresh streams");
+    work.run("verify results/x").exits(1).says("needs a second look on fresh streams");
     // Nearer, the first look is enough.
     let work = Work::with(&equals(mean - 2.0 * error));
     work.run("verify x.toml -q").exits(0);
@@ -73,13 +74,13 @@ fn controls_and_each_class() {
         let work = Work::with(&format!("{text}{analog}{sweep}[[claim]]\n{claim}\n"));
         work.run("verify x.toml -q --verbose")
     };
-    // Absorption matters; the way to end a path does not, and a control that says so is red.
+    // Absorption matters; the way to end a path does not, and a control that claims so is red.
     let found = claimed("differs = { estimators = [\"mis\"], across = \"albedo\" }");
     found.exits(0).says("control, expects a difference");
     let same = claimed("differs = { estimators = [\"mis\", \"analog\"] }");
     same.exits(1).says("no difference found");
     let twice = "expect = \"differs\"\ndiffers = { estimators = [\"mis\", \"analog\"] }";
-    claimed(twice).exits(2).complains("`differs` says what is expected already");
+    claimed(twice).exits(2).complains("`differs` states what is expected already");
     // Each class and their sum; the power is relative to the sum.
     let each = claimed("agree = { estimators = [\"mis\", \"analog\"], class = \"each\", detect = 0.2 }");
     for class in ["all", "surface", "single ", "single_internal", "multiple ", "multiple_internal"] {

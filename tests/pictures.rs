@@ -25,21 +25,22 @@ fn a_picture_is_a_view_and_no_part_of_the_record() {
     std::fs::remove_dir_all(work.path("results/x/images")).expect("removed");
     work.run("report results/x").exits(0);
     assert!(files() == first, "another picture");
-    // And goes where nobody asks for it any more; nothing is played again.
+    // It is removed when no file asks for it; nothing is run again.
     work.write("x.toml", IMAGE);
     work.run("run x.toml -q").exits(0);
     assert!(!work.path("results/x/pictures.json").exists());
     assert!(!work.read("results/x/report.md").contains("split-1"));
 }
 
-/// The image under two skies: paths under parallel light have a tail that no test of a hundred means bears.
+/// The image under two skies: paths under parallel light have a tail that no test of a hundred means
+/// bears.
 fn lit_evenly() -> String {
     let sun = "directional = { toward = [1, 0, 1], irradiance = 1.0 }";
     replaced(IMAGE, sun, "environment = { radiance = 0.5, hemisphere = [1, 0, 1] }")
 }
 
 #[test]
-fn verification_that_plays_nothing_makes_the_pictures_asked_for_since() {
+fn verification_that_runs_nothing_makes_the_pictures_asked_for_since() {
     let claim = "[[claim]]\nagree = { estimators = [\"mis\", \"analog\"], detect = 9 }\n";
     let image = lit_evenly();
     let work = Work::with(&(image.clone() + claim));
@@ -50,8 +51,8 @@ fn verification_that_plays_nothing_makes_the_pictures_asked_for_since() {
     assert!(work.path("results/x/images/split-1.png").exists());
 }
 
-/// The variance of a pixel as pairs of passes show it, and as all passes do: of one expectation. The first has
-/// the larger error of the two, known from its values.
+/// The variance of a pixel as pairs of passes show it, and as all passes do: of one expectation. The
+/// first has the larger error of the two, known from its values.
 #[test]
 fn pairs_show_the_variance_that_all_passes_show() {
     // 301 passes: 75 batches of 2 pairs, and a last pass without a partner.

@@ -1,5 +1,5 @@
-//! What is published: tables are those of their manifests, manifests are those of their records, and every page quotes
-//! a table as it is.
+//! What is published: tables are those of their manifests, manifests are those of their records, and
+//! every page quotes a table as it is.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,7 +12,7 @@ use scatterproof::results::store::RecordFolder;
 
 /// Folders of published results, by setting.
 const SETTINGS: [&str; 2] = ["short", "full"];
-/// What a published folder holds beside its record and its tables.
+/// Files of a published folder beside its record and its tables.
 const BESIDE: [&str; 4] = [MANIFEST, "provenance.json", "timing.json", "pictures.json"];
 
 const HELP: &str =
@@ -56,7 +56,7 @@ fn manifest(bytes: &[u8]) -> Manifest {
     serde_json::from_slice(bytes).expect("a manifest")
 }
 
-/// Of a published folder's files, what is not as its manifest says.
+/// Files of a published folder that differ from its manifest.
 fn changed(files: &BTreeMap<String, Vec<u8>>) -> Vec<String> {
     let views = manifest(&files[MANIFEST]).views;
     let is_kept =
@@ -77,7 +77,7 @@ fn changed(files: &BTreeMap<String, Vec<u8>>) -> Vec<String> {
     found
 }
 
-/// What the record in a published folder gives otherwise than its manifest says.
+/// Differences between the record in a published folder and its manifest.
 fn stale(folder: &Path) -> Vec<String> {
     let temp = tempfile::tempdir().expect("a folder");
     let copy = temp.path().join(folder.file_name().expect("a name"));
@@ -139,8 +139,8 @@ fn every_published_record_gives_its_tables_and_plots() {
     assert!(found.is_empty(), "{}\n{HELP}", found.join("\n"));
 }
 
-/// A published number that somebody improves by hand is found: in the table, and in table and manifest where the record is
-/// published, too.
+/// A published number that is improved by hand is found: in the table, and in table and manifest where
+/// the record is published, too.
 #[test]
 fn a_changed_table_is_found() {
     let table = "tables/efficiency.md";
@@ -193,7 +193,7 @@ fn quotes(page: &str) -> Vec<Quote<'_>> {
     quotes
 }
 
-/// What a quote says that its file does not, in words.
+/// Differences between a quote and its file, as text.
 fn misquoted(quote: &Quote) -> Option<String> {
     let path = package().join("results/published").join(quote.path);
     let Ok(text) = fs::read_to_string(&path) else { return Some(format!("no file {}", quote.path)) };
@@ -243,7 +243,8 @@ fn pages_quote_tables_as_they_are() {
     }
 }
 
-/// Pictures in docs/figures/NAME/ are those that were made when the experiment of that name was published.
+/// Pictures in docs/figures/NAME/ are those that were made when the experiment of that name was
+/// published.
 #[test]
 fn pictures_of_pages_are_published() {
     let copies = files(&package().join("docs/figures"));
@@ -266,7 +267,7 @@ fn pictures_of_pages_are_published() {
     }
 }
 
-/// What is kept in git stays small.
+/// The published files stay small.
 #[test]
 fn what_is_published_is_small() {
     let files = files(&package().join("results/published"));
@@ -274,8 +275,8 @@ fn what_is_published_is_small() {
     assert!(size < 4 << 20 && files.len() < 300, "{} KiB in {} files", size >> 10, files.len());
 }
 
-/// The numbers of docs/bssrdf.md on the rules of acceptance are those of the published ratios: `kernel` at most so many
-/// times behind the best rule of a band and its median, then the two floors at most.
+/// The numbers of docs/bssrdf.md on the rules of acceptance are those of the published ratios: `kernel`
+/// at most so many times behind the best rule of a band and its median, then the two floors at most.
 #[test]
 fn the_advice_on_rules_is_what_the_ratios_say() {
     let path = package().join("results/published/short/acceptance/tables/efficiency.md");
@@ -307,7 +308,7 @@ fn the_advice_on_rules_is_what_the_ratios_say() {
     let median = format!("median {:.1}", kernel[kernel.len() / 2]);
     let numbers = [largest("kernel"), median, largest("floor 0.001"), largest("floor 0.01")];
 
-    // The numbers stand in this order in one paragraph.
+    // The numbers occur in this order in one paragraph.
     let page = fs::read_to_string(package().join("docs/bssrdf.md")).expect("a page");
     let says = |paragraph: &str| {
         let mut rest = paragraph.split_whitespace().collect::<Vec<_>>().join(" ");

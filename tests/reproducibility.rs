@@ -31,7 +31,7 @@ fn json(files: &Files) -> Value {
     serde_json::from_slice(&files["record.json"]).expect("JSON")
 }
 
-/// Bytes of the observables by what was measured: hash of the cell's content and estimator.
+/// Bytes of the observables, keyed by hash of the cell's content and estimator.
 fn observables(files: &Files) -> BTreeMap<(String, String), Vec<u8>> {
     let text = |value: &Value| value.as_str().expect("a text").to_string();
     let mut observables = BTreeMap::new();
@@ -75,7 +75,7 @@ fn a_pilots_budget_is_the_same_on_any_threads() {
 }
 
 #[test]
-fn more_passes_keep_those_that_were_played() {
+fn more_passes_keep_those_that_were_run() {
     for text in [IMAGE.to_string(), probe()] {
         let passes = |n: u64| replaced(&text, "passes = 100", &format!("passes = {n}"));
         let work = Work::with(&passes(50));
@@ -190,7 +190,7 @@ fn claims_made_after_the_run_are_not_green() {
     is_post_hoc(&work, "");
     same(&arrays(&before), &arrays(&work.record("results")), "a claim changes no number");
     assert_eq!(json(&work.record("results"))["post_hoc"].to_string(), "[0]");
-    // Nothing washes it clean but another seed: neither a second look, nor more or fewer passes.
+    // Nothing makes it valid except another seed: neither a second look, nor more or fewer passes.
     is_post_hoc(&work, "");
     for passes in [100, 64, 32, 300, 100] {
         is_post_hoc(&work, &format!("--set budget.passes={passes}"));
@@ -209,7 +209,7 @@ fn claims_made_after_the_run_are_not_green() {
     is_post_hoc(&work, "--out claimed");
 }
 
-/// A budget in seconds is turned into passes once: the same command goes on with that number instead of
+/// A budget in seconds is turned into passes once: the same command resumes with that number instead of
 /// timing itself again, and a complete run is not repeated.
 #[test]
 fn a_budget_in_seconds_is_fixed_once() {
@@ -228,7 +228,7 @@ fn a_budget_in_seconds_comes_again_by_the_passes_of_its_record() {
     let work = Work::with(&edit("budget.passes = 100", "budget.cpu_seconds = 0.2"));
     let first = record(&work, "first", "");
     same(&first, &record(&work, "again", "--passes-of first"), "with the passes of the first");
-    // What an earlier run of that folder had begun with is not asked.
+    // The state of an earlier run in that folder is not used.
     work.run("run x.toml -q --out other --set budget.cpu_seconds=0.4").exits(0);
     same(
         &first,

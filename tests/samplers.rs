@@ -208,7 +208,7 @@ fn verdicts(name: &str, samples: u64, kind: &str, options: Value) -> Vec<Verdict
     judge_alone(&ran(&experiment(name, samples, &[("it", kind, options)])))
 }
 
-/// The tests that did not come out as a pass, with their outcomes.
+/// The tests that did not pass, with their outcomes.
 fn red(verdicts: &[Verdict]) -> Vec<String> {
     let red = verdicts.iter().filter(|v| !v.is_green());
     red.map(|v| format!("{}: {}", v.test_name(), v.outcome)).collect()
@@ -252,7 +252,7 @@ fn what_is_right_passes_every_test() {
 }
 
 /// r sqrt(Var mu) is the density's relative error in the mean square: where that is what `chi2 coarse`
-/// says that it detects, it is found, and a tenth of it is not.
+/// states that it detects, it is found, and a tenth of it is not.
 #[test]
 fn a_wrong_density_is_found_at_the_detectable_size() {
     let g = 0.5;
@@ -315,8 +315,8 @@ fn a_control_passes_where_it_differs_and_detect_may_ask_too_much() {
     assert_eq!(red(&judge_alone(&ran(&fine))), ["chi2 coarse: underpowered"]);
 }
 
-/// 200 samplers that differ in name: p-values below 1/2 and below 1/50 are binomial in number, within 4.5
-/// standard deviations (7e-6).
+/// 200 samplers that differ in name: p-values below 1/2 and below 1/50 are binomial in number, within
+/// 4.5 standard deviations (7e-6).
 #[test]
 fn p_values_are_uniform() {
     let names: Vec<String> = (0..200).map(|i| format!("sampler {i}")).collect();
@@ -352,7 +352,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     files
 }
 
-/// Records without the folder that they stand in.
+/// Records without the folder that holds them.
 fn record(out: &Path, name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let root = out.join(name).join("record");
     let strip = |(path, bytes): (PathBuf, Vec<u8>)| {
@@ -444,7 +444,7 @@ fn the_second_look_decides_what_the_first_cannot() {
     let test = waiting
         .verdicts
         .iter()
-        .find(|v| v.note.contains("wants a second look"))
+        .find(|v| v.note.contains("needs a second look"))
         .expect("one")
         .test_name();
     assert_eq!(row(&waiting, &test).outcome, Outcome::Fail);
@@ -486,14 +486,14 @@ fn files_are_held_to_their_schema() {
         ("samples = 20000", "samples = 20000000000", "x.toml:2:11", "must be at most 10000000000"),
         ("samples = 20000", "samples = 20000\nseeds = 1", "x.toml:3:1", "unknown key `seeds`"),
         ("samples = 20000\n", "", "x.toml:1:1", "missing key `samples`"),
-        ("samples = 20000", "samples = 20000\npair.over = []", "x.toml:3:1", "says more of a scene"),
+        ("samples = 20000", "samples = 20000\npair.over = []", "x.toml:3:1", "belongs to a scene"),
         ("sampler = {", "equals = { value = 1, source = \"\" } #", "x.toml:8:1", "there are none"),
         ("\"hg\"\nh", "\"h/g\"\nh", "x.toml:6:8", "the name \"h/g\" contains '/'"),
         ("henyey_greenstein", "henyey_grenstein", "x.toml:7:1", "did you mean `henyey_greenstein`?"),
         ("{ g = 0.5 }", "{ g = 2 }", "x.toml:7:27", "must be at most 0.9999, is 2"),
         ("{ g = 0.5 }", "{ gg = 2 }", "x.toml:7:23", "unknown key `gg`"),
         ("[\"hg\"]", "[\"hgg\"]", "x.toml:9:25", "did you mean `hg`?"),
-        ("[\"hg\"]", "[\"hg\", \"hg\"]", "x.toml:9:31", "`hg` stands twice"),
+        ("[\"hg\"]", "[\"hg\", \"hg\"]", "x.toml:9:31", "`hg` occurs twice"),
         ("{ samplers = [\"hg\"] }", "{ detect = 0 }", "x.toml:9:22", "must be greater than 0"),
         (
             "[[claim]]",
@@ -511,7 +511,7 @@ fn files_are_held_to_their_schema() {
 }
 
 #[test]
-fn every_command_knows_samplers() {
+fn every_command_handles_samplers() {
     let work = Work::with(FILE);
     work.run("list samplers").exits(0).says("henyey_greenstein").says("g  Mean cosine");
     work.run("plan x.toml --dry --setting more").exits(0).says("1 sampler, 30000 draws each");

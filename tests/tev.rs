@@ -11,7 +11,7 @@ use scatterproof::results::store::RecordFolder;
 
 use super::work::{IMAGE, Ran, SENSOR, Work, edit, probe, replaced, same};
 
-/// What the viewer shows.
+/// Images in the viewer.
 #[derive(Clone, Debug, Default)]
 struct Shown {
     images: BTreeMap<String, Image>,
@@ -19,7 +19,7 @@ struct Shown {
     largest_packet: usize,
     /// Has every connection been closed?
     is_over: bool,
-    /// What no viewer would take.
+    /// A packet that no viewer would accept.
     errors: Vec<String>,
 }
 
@@ -182,7 +182,7 @@ impl Shown {
     }
 }
 
-/// What a viewer has to show of the record of `results/x`, by name and channel.
+/// Expected images of the record of `results/x`, by name and channel.
 fn recorded(work: &Work) -> BTreeMap<String, BTreeMap<String, Vec<f32>>> {
     let stored = RecordFolder::new(work.path("results/x")).read().expect("a record");
     let f32s = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x as f32).collect::<Vec<f32>>();
@@ -243,7 +243,7 @@ fn a_viewer_shows_what_the_record_has_and_changes_nothing() {
     alone.run("run x.toml -q").exits(0);
     same(&work.record("results"), &alone.record("results"), "with and without a viewer");
 
-    // Complete already: nothing is played, all is shown.
+    // Complete already: nothing is run, all is shown.
     let viewer = Viewer::start();
     work.run(&format!("run x.toml -q --tev {}", viewer.address)).exits(0);
     shows_the_record(&work, &viewer.end());
@@ -282,7 +282,7 @@ fn several_files_have_one_connection() {
     work.write("z.toml", &replaced(&flux, "name = \"x\"", "name = \"z\""));
     let viewer = Viewer::start();
     let ran = work.run(&format!("run x.toml y.toml z.toml -q --tev {}", viewer.address));
-    ran.exits(0).complains("note: `z` has no image: tev has nothing to show of it");
+    ran.exits(0).complains("note: `z` has no image: tev cannot show it");
     ran.check(said(&ran, "tev") == 1, "and nothing else");
     let shown = viewer.end();
     assert_eq!(shown.connections, 1);
@@ -291,7 +291,7 @@ fn several_files_have_one_connection() {
 }
 
 #[test]
-fn nobody_there_costs_nothing() {
+fn a_missing_viewer_costs_nothing() {
     let work = Work::with(&edit("budget.passes = 100", "budget.passes = 4"));
     let (listener, address) = listen();
     drop(listener);

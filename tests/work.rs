@@ -31,7 +31,8 @@ path = { roulette = { analog = {} } }
 "#;
 
 /// The sensor's line of [`IMAGE`].
-pub const SENSOR: &str = "sensor.orthographic = { resolution = [12, 12], center_mm = [0, 0, 3], toward = [0, 0, -1], up = [0, 1, 0], width_mm = 2.2 }";
+pub const SENSOR: &str = "sensor.orthographic = { resolution = [12, 12], center_mm = [0, 0, 3], toward = [0, 0, \
+                          -1], up = [0, 1, 0], width_mm = 2.2 }";
 
 /// The same light and body, seen along one ray.
 pub fn probe() -> String {
@@ -49,7 +50,7 @@ pub fn replaced(text: &str, old: &str, new: &str) -> String {
     text.replace(old, new)
 }
 
-/// The folder.
+/// A temporary folder that the program runs in.
 pub struct Work {
     folder: tempfile::TempDir,
 }
@@ -105,7 +106,7 @@ impl Work {
         self.ran(script, command.output().expect("bash starts"))
     }
 
-    /// Starts the program.
+    /// Starts the program without waiting for its end.
     pub fn start(&self, arguments: &str) -> Started<'_> {
         let mut command = self.command(arguments);
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
@@ -143,7 +144,7 @@ impl Work {
     }
 }
 
-/// Two records are the same bytes; says which file is not.
+/// Asserts that two records have the same bytes; names the file that differs.
 pub fn same(a: &BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>, what: &str) {
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>(), "{what}: other files");
     for (name, bytes) in a {
@@ -153,7 +154,7 @@ pub fn same(a: &BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>, what: 
     }
 }
 
-/// What the program did.
+/// Exit code and output of the program.
 pub struct Ran {
     folder: PathBuf,
     arguments: String,
@@ -193,19 +194,19 @@ impl Ran {
         self.check(self.code() == Some(code), &format!("expected exit code {code}"))
     }
 
-    /// The program said this on standard error.
+    /// Standard error contains this text.
     #[track_caller]
     pub fn complains(&self, part: &str) -> &Ran {
         self.check(self.stderr().contains(part), &format!("expected on stderr: {part}"))
     }
 
-    /// The program said all of these on standard error.
+    /// Standard error contains all of these texts.
     #[track_caller]
     pub fn complains_of(&self, parts: &[&str]) -> &Ran {
         parts.iter().fold(self, |ran, part| ran.complains(part))
     }
 
-    /// The program said this on standard output.
+    /// Standard output contains this text.
     #[track_caller]
     pub fn says(&self, part: &str) -> &Ran {
         self.check(self.stdout().contains(part), &format!("expected on stdout: {part}"))
@@ -231,7 +232,7 @@ impl Started<'_> {
         }
     }
 
-    /// Sends a signal.
+    /// Sends a signal to the program.
     pub fn signal(&self, name: &str) {
         let id = self.child.id().to_string();
         let sent = Command::new("bash").args(["-c", "kill -\"$1\" \"$2\"", "bash", name, &id]).status();

@@ -23,8 +23,8 @@ use crate::verify::verdict::{TestKind, Verdict};
 /// records have efficiencies by CPU time, it reports whether these are compatible. This does not affect
 /// the exit code, because times depend on the machine.
 ///
-/// --max-slowdown; 2 bad usage; 3 nothing can be compared, or the first observable of an estimator cannot
-/// be judged.
+/// --max-slowdown; 2 bad usage; 3 nothing can be compared, or the first observable of an estimator
+/// cannot be judged.
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// The reference: a results folder, such as a baseline kept in git.

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 /// ~/.bash_completion.d/scatterproof`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The shell.
+    /// Shell that the script is for.
     pub shell: Shell,
 }
 

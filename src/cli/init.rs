@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 
 /// A commented experiment with a known result: without absorption all light leaves the body.
-pub const EXAMPLE: &str = r#"# One file is one experiment. Keys carry units; `scatterproof schema` prints everything that a file
-# may say, `scatterproof check FILE` says what is wrong with it.
+pub const EXAMPLE: &str = r#"# One file is one experiment. Keys carry units; `scatterproof schema` prints
+# everything that a file may contain, `scatterproof check FILE` reports what is wrong with it.
 
 name = "furnace"                # also its folder under results/
 description = "A sphere without absorption in uniform light is indistinguishable from the light."

@@ -19,7 +19,7 @@ pub struct Args {
     pub topic: Option<Topic>,
 }
 
-/// What can be listed.
+/// Topics that can be listed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Topic {
     /// Kinds of `[[estimator]]` and their options.
@@ -68,7 +68,7 @@ pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> 
 
 fn lines(topic: Topic, registry: &Registry) -> String {
     let schema = |path: &[&str]| table(&schema_names(registry, path));
-    // Of an entry, what it can be and not what it can be called.
+    // The kinds of an entry, without its other keys.
     let kinds = |path: &[&str]| {
         let mut names = schema_names(registry, path);
         names.retain(|(name, _)| !["name", "expect"].contains(&name.as_str()));
@@ -121,7 +121,7 @@ fn numbers(material: &materials::MeasuredMaterial) -> String {
     )
 }
 
-/// The names that may stand at a path, with the first line of their documentation.
+/// The names that may occur at a path, with the first line of their documentation.
 fn schema_names(registry: &Registry, path: &[&str]) -> Vec<(String, String)> {
     let grammar = Grammar::new(json_schema(registry));
     let Some(schema) = grammar.at(path) else { return Vec::new() };

@@ -77,7 +77,7 @@ pub struct Working {
     /// Number of threads; default: all cores.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// No progress bar.
+    /// Do not show a progress bar.
     #[arg(long, short)]
     quiet: bool,
     /// Passes per block; by default chosen by time. For tests: results do not depend on it.

@@ -71,7 +71,7 @@ fn print_origins(origins: &[(String, String, String)]) {
     println!("{}", values.to_text());
 }
 
-/// What estimators would do; the CPU seconds that it takes, 0 where `dry`.
+/// The plan of estimators; returns its CPU seconds, 0 where `dry`.
 fn print_passes(experiment: &Experiment, plan: &Plan, dry: bool) -> f64 {
     let budget = experiment.file.budget.as_ref();
     let words = match budget {
@@ -100,7 +100,7 @@ fn print_passes(experiment: &Experiment, plan: &Plan, dry: bool) -> f64 {
     total
 }
 
-/// What would be drawn from samplers; the CPU seconds of the draws, 0 where `dry`.
+/// The plan of samplers; returns the CPU seconds of the draws, 0 where `dry`.
 fn print_draws(experiment: &Experiment, plan: &Plan, dry: bool) -> f64 {
     let jobs: Vec<&Draws> = plan.jobs.iter().filter_map(Job::draws).collect();
     let samples = experiment.file.samples.unwrap_or_default();

@@ -61,7 +61,7 @@ pub struct Args {
     verbose: bool,
 }
 
-/// Something to judge, and what it takes to look at it again.
+/// A record to judge, with the data of its second look.
 struct Judged {
     folder: RecordFolder,
     main: Stored,
@@ -163,7 +163,7 @@ impl Court<'_> {
         Ok(!alarms.is_empty())
     }
 
-    /// What the paths name, measured where there is no record yet.
+    /// Records that the paths name, run where there is none yet.
     fn subjects(&self, paths: &[PathBuf]) -> Result<Vec<Judged>> {
         let mut subjects = Vec::new();
         for path in paths {
@@ -193,7 +193,7 @@ impl Court<'_> {
         Ok(Judged { folder, main, retest, experiment: Some(experiment) })
     }
 
-    /// Measures again what wants a second look; whether anything was.
+    /// Runs second looks where they are needed; true where any was run.
     fn look_again(&self, subjects: &mut [Judged], judgement: &Judgement) -> Result<bool> {
         let mut looked = false;
         for (index, subject) in subjects.iter_mut().enumerate() {
@@ -201,7 +201,7 @@ impl Court<'_> {
             let mut wanted: Vec<Measured> = own.map(|w| w.subject.clone()).collect();
             let (false, Some(experiment)) = (wanted.is_empty(), &subject.experiment) else { continue };
             eprintln!("second look at {}", experiment.file.name);
-            // What an earlier second look holds stays in its record.
+            // The record of an earlier second look keeps its quantities.
             wanted.extend(subject.retest.iter().flat_map(held));
             let main = &subject.main.record;
             subject.retest = Some(self.measured_again(experiment, main, &wanted)?);
@@ -317,7 +317,7 @@ fn tell_power(verdicts: &[Verdict]) {
 /// A file itself, or the experiment files of a folder in the order of their names.
 fn experiment_files(path: &Path) -> Result<Vec<PathBuf>> {
     if !path.is_dir() {
-        return Ok(vec![path.to_path_buf()]); // `load` says what is wrong with it
+        return Ok(vec![path.to_path_buf()]); // `load` reports what is wrong with it
     }
     let entries = std::fs::read_dir(path).map_err(Error::io(path, "read the folder"))?;
     let paths = entries.filter_map(|entry| entry.ok().map(|entry| entry.path()));

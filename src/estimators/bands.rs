@@ -1,4 +1,4 @@
-//! What a walk remembers of the bands that it scores: nothing where it traces one band alone; of a walk
+//! State that a walk keeps per band: none where it traces one band alone; of a walk
 //! that all bands share, what each band would have made of it.
 //!
 //! Shared walks (hero wavelengths, Wilkie et al. 2014). The hero h, drawn with probability 1/n, steers:
@@ -6,7 +6,8 @@
 //! and the density of the walk in band b, the walk carries
 //!   value_b = f_b / (p_h w),   rho_b = p_b / p_h,
 //! w being the hero's throughput without its albedos. Step by step, relative to the hero,
-//!   a flight of length d that ends in the medium   rho_b *= (sigma_t,b / sigma_t,h) e^{-(sigma_t,b - sigma_t,h) d},
+//!   a flight of length d that ends in the medium   rho_b *= (sigma_t,b / sigma_t,h)
+//!                                                           e^{-(sigma_t,b - sigma_t,h) d},
 //!                                                  value_b *= the same * albedo_b / survival
 //!   one that ends at the boundary                  both *= e^{-(sigma_t,b - sigma_t,h) d}
 //!   a turn                                         both *= phase_b / phase_h
@@ -18,7 +19,7 @@ use super::{Scores, TransportClass};
 use crate::math::exp;
 use crate::optics::medium::Medium;
 
-/// What a walk remembers of its bands.
+/// State that a walk keeps per band.
 pub(super) trait WalkBands: Clone {
     /// A flight of length `t` in the medium, which ends in a scattering event or at the boundary.
     fn flight(&mut self, media: &[Medium], t: f64, scatters: bool);

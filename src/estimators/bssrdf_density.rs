@@ -2,12 +2,12 @@
 //! over the area of a disc, as the irradiance there.
 //!
 //! M points x_p, uniform over the area A of a finite body, each take one light sample; E_p is the
-//! irradiance that goes in, T12 L cos / pdf. A point stands for the flux Phi_q = E_q A / (M - 1) when
+//! irradiance that goes in, T12 L cos / pdf. A point carries the flux Phi_q = E_q A / (M - 1) when
 //! another one asks, and
 //!   E'_p = sum over q != p within r of Phi_q / (pi r^2),   L_r = A/M sum over p of K E'_p.
 //! Dividing by pi r^2 makes an irradiance of flux; it is in place there and nowhere else: a sum of K
 //! over points that carry flux themselves divides by nothing. The point itself is left out of its disc,
-//! or its own flux would stand there with certainty; of M - 1 others a disc holds its share, so that the
+//! or its own flux would count with certainty; of M - 1 others a disc holds its share, so that the
 //! mean of E'_p is E over the disc.
 //!
 //! Distances are straight, between points whose normals are less than a right angle apart (else light
@@ -49,7 +49,7 @@ pub struct DensityOptions {
     #[serde(rename = "radius_mm")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
-    /// Whether single scattering is added by sampling; without it where the model leaves it out.
+    /// Whether single scattering is added by sampling; by default where the model leaves it out.
     pub single: Option<bool>,
     /// Whether light that goes straight through the body is followed.
     #[serde(default = "super::kind::on")]
@@ -81,7 +81,8 @@ impl BssrdfDensity {
     /// For a scene.
     ///
     /// # Errors
-    /// A scene that it does not serve; a medium that the model does not fit; a model that needs directions.
+    /// A scene that it does not serve; a medium that the model does not fit; a model that needs
+    /// directions.
     pub fn new(scene: Arc<Scene>, options: &DensityOptions) -> Result<BssrdfDensity> {
         BssrdfDensity::KIND.check(&scene)?;
         let sampler = BodySampler::new(&scene.shape, FaceChoice::Area)
@@ -148,7 +149,7 @@ impl BssrdfDensity {
         }
     }
 
-    /// E' of E.
+    /// The averaged irradiance E' of E, `[point][light][band]`, W/mm^2.
     fn averaged(
         &self,
         points: &[(DVec3, DVec3)],
@@ -189,7 +190,7 @@ struct StoredPoints {
     points: Vec<(DVec3, DVec3)>,
     /// `[point][light][band]`, W/mm^2.
     irradiance: Vec<f64>,
-    /// Lights times bands.
+    /// Values per point: lights times bands.
     stride: usize,
 }
 
@@ -200,7 +201,7 @@ impl Estimator for BssrdfDensity {
             for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
                 let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut sum = Sum { estimator: self, stored: &stored, streams };
-                self.bssrdf.play(&group, index, key, scores, &mut sum);
+                self.bssrdf.trace(&group, index, key, scores, &mut sum);
             }
         }
     }
@@ -338,7 +339,7 @@ mod tests {
     }
 
     /// Parallel light: without discs points in the dark have nothing, with them those within r of the
-    /// border have some, and the bias says so.
+    /// border have some, and the bias states it.
     #[test]
     fn borders_of_shadows_are_blurred() {
         let radius = 0.2;

@@ -5,7 +5,8 @@
 //! tangents (1/4 each), it passes the exit at distance r, drawn from a technique of the model of one
 //! band of the group, in a uniform azimuth. All crossings of the line with the surface, of front and
 //! back faces, are entries. The expected number of entries per area at a point x_i is
-//!   pdf_area = sum over axes a of P(a) |n_i . a| times the mean over bands of sum over techniques of share pdf(r_a),
+//!   pdf_area = sum over axes a of P(a) |n_i . a| times the mean over bands of sum over techniques of
+//!   share pdf(r_a),
 //! r_a being the distance of x_i from the axis a through the exit: the disc's density, carried from the
 //! disc across a to the surface. All axes, bands and techniques that could have made an entry are in the
 //! sum, whichever made it (the balance heuristic), so that
@@ -36,13 +37,13 @@ use crate::scene::Scene;
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeOptions {
-    /// The model.
+    /// BSSRDF model.
     pub model: Model,
     /// Lines per refraction of a camera path.
     #[serde(default = "super::kind::one")]
     #[schemars(range(min = 1, max = 65536))]
     pub probes: usize,
-    /// Whether single scattering is added by sampling; without it where the model leaves it out.
+    /// Whether single scattering is added by sampling; by default where the model leaves it out.
     pub single: Option<bool>,
     /// Whether light that goes straight through the body is followed.
     #[serde(default = "super::kind::on")]
@@ -103,7 +104,7 @@ impl Estimator for BssrdfProbe {
             for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
                 let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut gather = Probing { estimator: self, streams, hits: Vec::new() };
-                self.bssrdf.play(&group, index, key, scores, &mut gather);
+                self.bssrdf.trace(&group, index, key, scores, &mut gather);
             }
         }
     }

@@ -128,7 +128,7 @@ fn t21(eta: f64, cos: f64) -> f64 {
     1.0 - fresnel(cos, eta).reflectance
 }
 
-/// On a half-space a probe's density is the kernel up to a factor: the radius adds no variance.
+/// On a half-space a probe's density is the kernel up to a factor: the radius adds zero variance.
 #[test]
 fn half_space_probes_follow_the_kernel() {
     let scene = scene(Shape::HalfSpace, &[1.3], &[medium(2.0, 0.98, 0.3)], sky(1, 1.0), 1);

@@ -32,20 +32,20 @@ use crate::scene::Scene;
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RayOptions {
-    /// The model.
+    /// BSSRDF model.
     pub model: Model,
     /// Rays per refraction of a camera path.
     #[serde(default = "super::kind::one")]
     #[schemars(range(min = 1, max = 65536))]
     pub rays: usize,
-    /// How far under the exit the rays start, mm; without it the reduced mean free path.
+    /// How far under the exit the rays start, mm; the reduced mean free path by default.
     ///
-    /// Of bands that share a path the geometric mean of the least and the largest. At most half way to the
-    /// opposite side.
+    /// Of bands that share a path the geometric mean of the least and the largest. At most half way to
+    /// the opposite side.
     #[serde(rename = "depth_mm")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub depth: Option<f64>,
-    /// Whether single scattering is added by sampling; without it where the model leaves it out.
+    /// Whether single scattering is added by sampling; by default where the model leaves it out.
     pub single: Option<bool>,
     /// Whether light that goes straight through the body is followed.
     #[serde(default = "super::kind::on")]
@@ -110,7 +110,7 @@ impl BssrdfRays {
 /// Pairs of triangle and vertex that a look at a mesh's convexity may take.
 const MOST_PAIRS: usize = 1 << 30;
 
-/// Whether no vertex of a mesh stands out over the plane of one of its triangles by more than rounding.
+/// Whether no vertex of a mesh rises above the plane of one of its triangles by more than rounding.
 /// Not asked of convex meshes that are very large, which then count as not known to be convex.
 fn is_convex(mesh: &Mesh) -> bool {
     let vertices = mesh.vertices();
@@ -133,7 +133,7 @@ impl Estimator for BssrdfRays {
             for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
                 let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut gather = Shooting { estimator: self, streams, depth };
-                self.bssrdf.play(&group, index, key, scores, &mut gather);
+                self.bssrdf.trace(&group, index, key, scores, &mut gather);
             }
         }
     }

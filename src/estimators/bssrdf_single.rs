@@ -63,7 +63,7 @@ pub(super) fn score_single(
     }
 }
 
-/// What a vertex sends to the exit.
+/// Contribution of a vertex to the exit.
 #[derive(Clone, Copy, Debug)]
 struct Scattered {
     light: usize,

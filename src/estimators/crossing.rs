@@ -1,9 +1,9 @@
-//! What every tracer does at the boundary, whichever way it goes.
+//! Events at the boundary, common to camera and light tracing.
 
 use crate::geometry::Side;
 use crate::optics::boundary::Boundary;
 
-/// The other side.
+/// The opposite side of a boundary.
 #[inline]
 pub fn other(side: Side) -> Side {
     match side {

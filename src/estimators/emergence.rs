@@ -6,8 +6,8 @@
 //!
 //! The branch of refraction is taken with probability T21, so that what is gathered there must leave T21
 //! out. L_t follows the refracted ray to the other side with transmittance exp(-sigma_t* t), leaves with
-//! the transmittance of the boundary as a weight (what is reflected there is the model's business) and
-//! goes on outside as the same path.
+//! the transmittance of the boundary as a weight (the model accounts for what is reflected there) and
+//! continues outside as the same path.
 //!
 //! Bands that refract alike share a path; with dispersion each index has its own.
 
@@ -30,7 +30,7 @@ use crate::scene::Scene;
 #[derive(Debug)]
 pub(super) struct BssrdfScene {
     pub scene: Arc<Scene>,
-    /// Per band.
+    /// BSSRDF model of each band.
     pub models: Vec<Bssrdf>,
     /// Per band: index inside over outside.
     pub eta: Vec<f64>,
@@ -67,9 +67,9 @@ impl Emergence<'_> {
 
 /// The streams of one camera path beside its walk.
 pub(super) struct PathStreams {
-    /// Of light samples at entries.
+    /// Random numbers of light samples at entries.
     pub lights: Stream,
-    /// Of entries.
+    /// Random numbers of entry points.
     pub entries: Stream,
     /// Of the single-scattering term, which then shifts none of the others.
     pub single: Stream,
@@ -146,7 +146,7 @@ impl BssrdfScene {
         self.groups.iter().map(among).filter(|group| !group.is_empty()).collect()
     }
 
-    /// What camera paths cannot find.
+    /// Notes on light that camera paths cannot find.
     pub fn notes(&self) -> Vec<String> {
         let parallel = self.scene.lights.iter().filter(|light| light.is_directional());
         parallel
@@ -163,7 +163,7 @@ impl BssrdfScene {
     }
 
     /// Traces path `index` of a pass for one group of bands.
-    pub fn play(
+    pub fn trace(
         &self,
         bands: &[usize],
         index: usize,

@@ -1,4 +1,4 @@
-//! What every estimator does: the one open trait.
+//! The trait of estimators, the one open trait.
 
 use super::{Scores, TransportClass};
 use crate::sampling::stream::PassKey;
@@ -14,7 +14,7 @@ pub trait Estimator: Send + Sync {
         BandUse::EachAlone
     }
 
-    /// What the mean of the scores is.
+    /// What the mean of the scores converges to.
     fn bias(&self) -> Bias {
         Bias::Unbiased
     }
@@ -37,7 +37,7 @@ pub trait Estimator: Send + Sync {
         0
     }
 
-    /// What a reader of its results must know, as a transport that it cannot sample.
+    /// Notes for the reader of its results, such as transport that it cannot sample.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
@@ -63,10 +63,10 @@ pub struct HeavyTail {
     pub reason: String,
 }
 
-/// What the mean of an estimator's scores is.
+/// How the mean of an estimator's scores is related to the integral.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Bias {
-    /// The integral.
+    /// Equal to the integral for any number of passes.
     Unbiased,
     /// Something that tends to the integral as passes grow.
     Consistent,

@@ -1,11 +1,11 @@
-//! What a path did on its way, and the transport class that follows.
+//! History of a path, and the transport class that follows from it.
 
 /// Classes of light transport, told apart by a path's history, the same for every estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TransportClass {
     /// Reflected at the surface, or through the body without scattering.
     Surface,
-    /// One medium vertex.
+    /// Paths with one medium vertex.
     Single,
     /// One medium vertex and an internal reflection.
     SingleInternal,
@@ -37,7 +37,7 @@ impl TransportClass {
     }
 }
 
-/// What happened along a path so far.
+/// Events along a path so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct History {
     medium_vertices: u32,

@@ -1,4 +1,4 @@
-//! What a light sends to a point of the surface, and what of it goes in and comes out elsewhere: the
+//! Light that reaches a point of the surface, and the part of it that enters and leaves elsewhere: the
 //! part that all ways of choosing the point share.
 
 use super::choice::{choose_light, light_shares};
@@ -13,7 +13,7 @@ use crate::scene::Scene;
 /// Draws one light of a scene, and a direction from it.
 #[derive(Debug)]
 pub(super) struct Illumination {
-    /// Per band.
+    /// Probability of each light, `[band][light]`.
     shares: Vec<Vec<f64>>,
 }
 
@@ -21,7 +21,7 @@ pub(super) struct Illumination {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Arrival {
     pub light: usize,
-    /// Towards the light.
+    /// Unit direction towards the light.
     pub wi: DVec3,
     /// Radiance over the density of light and direction, W/mm^2.
     pub value: f64,
@@ -113,7 +113,7 @@ impl Entrance {
         Some(Entrance { cos: local.z, cos_inside: surface.cos_t, transmittance, dir })
     }
 
-    /// The same where nothing stands between the point and the light.
+    /// The same where nothing is between the point and the light.
     #[inline]
     pub fn lit(scene: &Scene, hit: &Hit, wi: DVec3, eta: f64, scores: &mut Scores) -> Option<Entrance> {
         let entrance = Entrance::at(hit, wi, eta, scores)?;

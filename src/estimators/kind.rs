@@ -1,4 +1,4 @@
-//! Kinds of estimators: under which name and with which options an experiment asks for one, and which
+//! Kinds of estimators: the name and the options under which an experiment asks for one, and which
 //! scenes it serves.
 
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use crate::scene::Scene;
 pub struct EstimatorKind {
     /// The name under which an `[[estimator]]` asks for it.
     pub kind: &'static str,
-    /// What it does, in one line.
+    /// Description of the method, in one line.
     pub doc: &'static str,
     /// The scenes that it serves. Its constructor refuses all others by [`EstimatorKind::check`].
     pub serves: Serves,
@@ -32,7 +32,7 @@ impl EstimatorKind {
     /// Refuses a scene that it does not serve.
     ///
     /// # Errors
-    /// What it lacks for this scene, and what to use instead.
+    /// Why it cannot serve this scene, and which estimator can.
     pub fn check(&self, scene: &Scene) -> Result<()> {
         self.serves.check(self.kind, scene)
     }

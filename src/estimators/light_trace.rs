@@ -1,6 +1,6 @@
 //! Analog tracing from the lights into sensors of finite extent.
 //!
-//! A photon takes a light, a direction from it and a place, and does what light does: it is reflected or
+//! A photon draws a light, a direction from it and a place, and follows the light: it is reflected or
 //! refracted at the boundary, flies distances of density sigma_t exp(-sigma_t t), is absorbed with
 //! probability 1 - albedo at every scattering event or turned by the phase function, and enters again
 //! where a body is not convex, until it leaves for good. Then the sensor receives it
@@ -11,8 +11,9 @@
 //!
 //! Power of a photon. Light of radiance L(w) from directions w towards it, drawn with density p(w) from
 //! a light that was chosen with probability P, carries in one of N photons
-//!   finite body     L / (p P N) * pi R^2: starting points are uniform on the disc of the bounding sphere's
-//!                   radius R across the direction, through which all light that can meet the body comes
+//!   finite body     L / (p P N) * pi R^2: starting points are uniform on the disc of the bounding
+//!                   sphere's radius R across the direction, through which all light that can meet
+//!                   the body comes
 //!   planar face     L / (p P N) * |cos|: power per area of the face on which the light shines, every
 //!                   point of which is alike; it comes in at the origin of the face
 //! with the irradiance in place of L / p for parallel light. Photons that miss the body score nothing:
@@ -54,7 +55,7 @@ use crate::scene::Scene;
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LightTraceOptions {
-    /// Photons whose sum is one pass; without it as many as the sensor has rays.
+    /// Photons whose sum is one pass; by default as many as the sensor has rays.
     #[schemars(range(min = 1, max = 1073741824))]
     pub paths: Option<usize>,
 }
@@ -89,8 +90,8 @@ impl LightTracer {
     /// For a scene; `photons` per band and pass, as many as the sensor has rays without it.
     ///
     /// # Errors
-    /// A scene that it does not serve: photons hit no single point or direction; a sensor whose unit does not fit
-    /// the body; no photons.
+    /// A scene that it does not serve: photons hit no single point or direction; a sensor whose unit
+    /// does not fit the body; no photons.
     pub fn new(scene: Arc<Scene>, photons: Option<usize>) -> Result<LightTracer> {
         LightTracer::KIND.check(&scene)?;
         let bounds = scene.shape.bounds();
@@ -116,7 +117,7 @@ impl Estimator for LightTracer {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         for &band in bands {
             for index in 0..self.photons {
-                Photon::play(self, band, index, key, scores);
+                Photon::trace(self, band, index, key, scores);
             }
         }
     }
@@ -138,7 +139,7 @@ impl Estimator for LightTracer {
 /// Part of a body's size by which rounding may put a medium vertex outside its bounding sphere.
 const ROUNDING: f64 = 1e-9;
 
-/// One photon.
+/// State of one photon.
 struct Photon<'a> {
     scene: &'a Scene,
     bounds: Option<BoundingSphere>,
@@ -182,7 +183,7 @@ fn start(
 
 impl<'a> Photon<'a> {
     /// Traces photon `index` of a pass; returns how many numbers its walk drew.
-    fn play(
+    fn trace(
         tracer: &'a LightTracer,
         band: usize,
         index: usize,
@@ -276,7 +277,7 @@ impl<'a> Photon<'a> {
         Some(())
     }
 
-    /// Flies on outside; where nothing is in the way the sensor receives the photon.
+    /// Continues outside; the sensor receives the photon where nothing occludes it.
     fn fly_outside(&mut self) -> Option<Hit> {
         self.scores.count(Cost::Rays);
         let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
@@ -289,7 +290,8 @@ impl<'a> Photon<'a> {
         hit
     }
 
-    /// Meets the boundary from `side`; the side the photon goes on to, `None` where it ends.
+    /// Meets the boundary from `side`; returns the side on which the photon continues, `None` where it
+    /// ends.
     fn cross(&mut self, hit: &Hit, side: Side) -> Option<Side> {
         self.from = Some(hit.face);
         self.ray.origin = hit.point;

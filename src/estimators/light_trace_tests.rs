@@ -55,7 +55,7 @@ fn flux(shape: &Shape, bins: usize) -> Sensor {
     }
 }
 
-/// Looks down on a body of this size; the screen stands inside it, 0.3 sizes above the middle.
+/// Looks down on a body of this size; the screen is inside it, 0.3 sizes above the middle.
 fn image(shape: &Shape, size: f64, height: f64) -> Sensor {
     let screen = Screen {
         width: 8,
@@ -103,7 +103,7 @@ fn traced(scene: Scene, passes: u64, test: &str) -> (Vec<(f64, f64)>, Scores) {
     measure(&tracer(scene), &layout, passes, test)
 }
 
-/// Sum over a flux's bins: totals stand before their five classes and, of several, the lights.
+/// Sum over a flux's bins: totals come before their five classes and, of several, the lights.
 fn total(means: &[(f64, f64)], stride: usize) -> f64 {
     means.iter().step_by(stride).map(|(mean, _)| mean).sum()
 }
@@ -272,7 +272,7 @@ fn draws_per_event() {
     let (mut absorbed, mut left) = (0, 0);
     for index in 0..1000 {
         let mut scores = Scores::new(layout.clone());
-        let draws = Photon::play(&tracer, 0, index, &key, &mut scores);
+        let draws = Photon::trace(&tracer, 0, index, &key, &mut scores);
         let [paths, rays, shadow_rays, medium_events, boundary_events, ..] = scores.cost;
         let out = u64::from(scores.observables[0] > 0.0);
         let survived = medium_events - (1 - out); // else the last event ended it
@@ -284,7 +284,7 @@ fn draws_per_event() {
     assert!(absorbed > 100 && left > 100, "{absorbed} {left}");
 }
 
-/// D9: bands with equal coefficients, played on one key, are equal to the last bit; on keys of their
+/// D9: bands with equal coefficients, traced on one key, are equal to the last bit; on keys of their
 /// own they are not.
 #[test]
 fn equal_bands_on_one_key_are_equal() {
@@ -316,7 +316,7 @@ fn scaled_scenes_give_the_same_bits() {
         |s| Shape::Box { half: DVec3::new(s, 0.7 * s, 0.9 * s) },
         |s| Shape::Mesh(procedural::bumpy_sphere(s, 3, 0.1, 7.0, true).expect("a mesh")),
     ];
-    let played = |make: MakeShape, boundary, scale: f64, pictured: bool| {
+    let run = |make: MakeShape, boundary, scale: f64, pictured: bool| {
         let lights = vec![sun(DVec3::Z, 1.0), cap(0.3, DVec3::X, 1.0, "half")];
         let shape = make(scale);
         let sensor = if pictured { image(&shape, scale, 0.2) } else { flux(&shape, 3) };
@@ -331,10 +331,10 @@ fn scaled_scenes_give_the_same_bits() {
             if pictured && !finite {
                 continue;
             }
-            let (unit, unit_scores) = played(make, boundary, 1.0, pictured);
+            let (unit, unit_scores) = run(make, boundary, 1.0, pictured);
             assert!(unit[0].0 > 0.0);
             for k in [-30, -3, 7, 40] {
-                let (scaled, scores) = played(make, boundary, f64::from(k).exp2(), pictured);
+                let (scaled, scores) = run(make, boundary, f64::from(k).exp2(), pictured);
                 let area = if finite && !pictured { f64::from(2 * k).exp2() } else { 1.0 };
                 assert_eq!(
                     scaled.iter().map(|m| m.0.to_bits()).collect::<Vec<_>>(),

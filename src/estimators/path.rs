@@ -9,7 +9,7 @@
 //!   matched boundary  at every medium vertex: phase pdf times the transmittance to the outside (the
 //!                     probability of flying there) against light pdf
 //!   smooth boundary   nothing to sample: only the interface can find the refracted direction, so light
-//!                     from a single direction is out of its reach (a note says so)
+//!                     from a single direction is out of its reach (stated in a note)
 //! One light is chosen per vertex, with probability proportional to its strength; that probability is
 //! part of the light pdf, so every pair of (lobe, light) is a MIS class of its own.
 //!
@@ -75,7 +75,7 @@ impl Estimator for PathTracer {
         for &band in bands {
             for index in 0..self.field.scene.sensor.rays_per_pass() {
                 let path = Path { field: &self.field, band, index, key };
-                CameraWalk::play(path, scores, Unrivalled, OneBand);
+                CameraWalk::trace(path, scores, Unrivalled, OneBand);
             }
         }
     }
@@ -86,8 +86,8 @@ impl Estimator for PathTracer {
         let parallel = scene.lights.iter().filter(|light| light.is_directional());
         let missing = parallel.filter(|_| smooth).map(|light| {
             format!(
-                "path cannot sample directional light `{}` through a smooth boundary: its share is missing \
-                 (exactly 0), not dark",
+                "path cannot sample directional light `{}` through a smooth boundary: its share is excluded \
+                 from this estimator's result (exactly 0)",
                 light.name
             )
         });

@@ -222,7 +222,7 @@ fn draws_per_event() {
     for index in 0..1000 {
         let mut scores = Scores::new(layout.clone());
         let path = Path { field: &tracer.field, band: 0, index, key: &key };
-        let draws = CameraWalk::play(path, &mut scores, Unrivalled, OneBand);
+        let draws = CameraWalk::trace(path, &mut scores, Unrivalled, OneBand);
         let [_, rays, _, medium_events, boundary_events, ..] = scores.cost;
         let out = u64::from(scores.observables[0] > 0.0); // it flew to the sky, and scored
         let survived = medium_events - (1 - out); // else the last event ended it
@@ -233,7 +233,7 @@ fn draws_per_event() {
     assert!(absorbed > 100 && escaped > 100, "{absorbed} {escaped}");
 }
 
-/// D9: bands with equal coefficients, played on one key, are equal to the last bit; on keys of
+/// D9: bands with equal coefficients, traced on one key, are equal to the last bit; on keys of
 /// their own they are not.
 #[test]
 fn equal_bands_on_one_key_are_equal() {
@@ -272,7 +272,7 @@ fn scaled_scenes_give_the_same_bits() {
     ];
     let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.2 };
     let boundaries = [Boundary::Rough { eta: 1.3, facets }, Boundary::Matched];
-    let played = |make: ShapeOfScale, boundary, scale: f64| {
+    let run = |make: ShapeOfScale, boundary, scale: f64| {
         let sun = Light {
             name: "sun".into(),
             emission: Emission::Directional { toward: DVec3::Z, irradiance: vec![1.0] },
@@ -284,10 +284,10 @@ fn scaled_scenes_give_the_same_bits() {
     };
     for make in shapes {
         for boundary in boundaries {
-            let (unit, unit_scores) = played(make, boundary, 1.0);
+            let (unit, unit_scores) = run(make, boundary, 1.0);
             assert!(unit[0].0 > 0.0);
             for k in [-30, -3, 7, 40] {
-                let (scaled, scores) = played(make, boundary, (f64::from(k)).exp2());
+                let (scaled, scores) = run(make, boundary, (f64::from(k)).exp2());
                 assert_eq!(
                     scaled.iter().map(|m| m.0.to_bits()).collect::<Vec<_>>(),
                     unit.iter().map(|m| m.0.to_bits()).collect::<Vec<_>>(),

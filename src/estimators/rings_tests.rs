@@ -70,7 +70,8 @@ fn measure(
     moments.into_iter().map(|(mean, m2)| (mean, (m2 / (n * (n - 1.0))).sqrt())).collect()
 }
 
-/// |z| < 5 in every region, and 5 standard errors of the difference are less than `detectable` of the second.
+/// |z| < 5 in every region, and 5 standard errors of the difference are less than `detectable` of the
+/// second.
 fn assert_alike(name: &str, ours: &[(f64, f64)], theirs: &[(f64, f64)], detectable: f64) {
     for (region, (a, b)) in ours.iter().zip(theirs).enumerate() {
         let error = (a.1 * a.1 + b.1 * b.1).sqrt();
@@ -81,7 +82,8 @@ fn assert_alike(name: &str, ours: &[(f64, f64)], theirs: &[(f64, f64)], detectab
 }
 
 /// Of the classical dipole's exitance the part cdf(r) lies within r,
-///   cdf(r) = sum over both sources of w_k (1 - z_k/d_k e^(s (z_k - d_k))),   w_k = e^(-s z_k) over their sum,
+///   cdf(r) = sum over both sources of w_k (1 - z_k/d_k e^(s (z_k - d_k))),
+///   w_k = e^(-s z_k) over their sum,
 /// in its total (alpha'/2) sum of e^(-s z_k). With radiance 1 from above and a Fresnel transmittance of
 /// mean P = int T12 mu dw / pi at both ends, a ring shows pi P^2 times its part. 512 passes of 1024
 /// paths; 5 standard errors are below 5 %.

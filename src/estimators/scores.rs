@@ -1,4 +1,4 @@
-//! Scores of one pass: `[observable][band]`, and counts of work and of what must not go unseen.
+//! Scores of one pass: `[observable][band]`, and counts of work and of anomalies.
 //!
 //! Observables: for each region of the sensor that is split, its total, its transport classes, and
 //! (with more than one light) each light's share; for the other regions the total. Pixels beside them.
@@ -64,7 +64,7 @@ impl Cost {
     }
 }
 
-/// Counts of what must not go unseen.
+/// Counts of anomalies, which reports always show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anomaly {
     /// A score that is not a finite number; it is not added and voids the claims that rest on it.
@@ -144,7 +144,7 @@ impl Layout {
         &self.regions
     }
 
-    /// The observables' names.
+    /// Names of the observables, in the order of their scores.
     pub fn observables(&self) -> &[ObservableName] {
         &self.names
     }
@@ -174,18 +174,18 @@ impl Layout {
 #[derive(Clone, Debug)]
 pub struct Scores {
     layout: Layout,
-    /// `[observable][band]`.
+    /// Scores of the pass, `[observable][band]`.
     pub observables: Vec<f64>,
     /// `[pixel][band]`; empty where the sensor has no pixels.
     pub pixels: Vec<f64>,
-    /// By [`Cost`].
+    /// Work counted, indexed by [`Cost`].
     pub cost: [u64; Cost::ALL.len()],
-    /// By [`Anomaly`].
+    /// Anomalies counted, indexed by [`Anomaly`].
     pub anomalies: [u64; Anomaly::ALL.len()],
 }
 
 impl Scores {
-    /// Zeros.
+    /// Scores of an empty pass: all zero.
     pub fn new(layout: Layout) -> Scores {
         Scores {
             observables: vec![0.0; layout.names.len() * layout.bands],
@@ -196,7 +196,7 @@ impl Scores {
         }
     }
 
-    /// Back to zeros for the next pass; counts go on.
+    /// Resets scores to zero for the next pass; counts continue.
     pub fn clear(&mut self) {
         self.observables.fill(0.0);
         self.pixels.fill(0.0);
@@ -231,7 +231,7 @@ impl Scores {
         }
     }
 
-    /// Counts work.
+    /// Adds one unit of this work.
     #[inline]
     pub fn count(&mut self, cost: Cost) {
         self.count_many(cost, 1);
@@ -243,7 +243,7 @@ impl Scores {
         self.cost[cost as usize] += times;
     }
 
-    /// Counts an anomaly.
+    /// Adds one anomaly of this kind.
     #[inline]
     pub fn note(&mut self, anomaly: Anomaly) {
         self.anomalies[anomaly as usize] += 1;

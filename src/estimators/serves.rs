@@ -7,15 +7,15 @@ use crate::scene::{Scene, Sensor};
 /// The scenes that an estimator serves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Serves {
-    /// The sensors.
+    /// Sensors that the estimator serves.
     pub sensors: &'static [SensorKind],
-    /// The boundaries.
+    /// Boundaries that the estimator serves.
     pub boundaries: &'static [BoundaryKind],
-    /// The bodies.
+    /// Extents of bodies that the estimator serves.
     pub bodies: Bodies,
 }
 
-/// Kinds of sensors that estimators tell apart.
+/// Kinds of sensors, as estimators distinguish them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorKind {
     /// Parallel rays through pixels.
@@ -26,7 +26,7 @@ pub enum SensorKind {
     Perspective,
     /// One ray from outside.
     Probe,
-    /// A medium vertex.
+    /// Sensor at a medium vertex.
     Vertex,
     /// Exitance or flux by the cosine of the exit direction.
     Flux,
@@ -34,7 +34,7 @@ pub enum SensorKind {
     Rings,
 }
 
-/// Kinds of boundaries.
+/// Kinds of boundaries, as scenes distinguish them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoundaryKind {
     /// The same index inside and outside.
@@ -45,17 +45,17 @@ pub enum BoundaryKind {
     Rough,
 }
 
-/// Extents of bodies.
+/// Which bodies are served, by extent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bodies {
-    /// All bodies.
+    /// Bounded and unbounded bodies.
     All,
     /// Bodies that a sphere bounds: neither half-spaces nor slabs.
     Finite,
 }
 
 impl Serves {
-    /// Every scene.
+    /// No restriction: every scene is served.
     pub const ALL: Serves = Serves {
         sensors: &[
             SensorKind::Orthographic,
@@ -83,7 +83,7 @@ impl Serves {
         ..Serves::ALL
     };
 
-    /// Scenes whose sensor looks from outside and does not ask where light came in.
+    /// Scenes whose sensor looks from outside and does not depend on where light entered.
     pub const WITHOUT_ENTRIES: Serves = Serves {
         sensors: &[
             SensorKind::Orthographic,
@@ -131,7 +131,7 @@ impl Serves {
         let served = |sensor| self.sensors.contains(&sensor);
         match sensor {
             SensorKind::Vertex => Error::input_help(
-                format!("{name} starts its paths outside the body, the sensor `vertex` stands inside"),
+                format!("{name} starts its paths outside the body, the sensor `vertex` is inside"),
                 "use two_bounce, or another sensor",
             ),
             SensorKind::Rings if served(SensorKind::Flux) => Error::input_help(

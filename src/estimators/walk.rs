@@ -2,12 +2,12 @@
 //! have.
 //!
 //! The walk is that of [`super::path`]; an estimator that adds techniques implements [`Rivals`]: it is
-//! called at every medium vertex, and says at every exit how densely its techniques draw the same path.
-//! Weights are those of the balance heuristic over all techniques. Their densities are written relative
-//! to U, the density with which the walk draws its medium vertices and the flight to the exit, so that U
-//! itself, which underflows in thick media, is never formed: a light sample has density p_L, a BSDF
-//! sample p_B, a rival p_R / U. Roulette is in no density: each walk divides by its own survival, and
-//! weights without it still sum to 1.
+//! called at every medium vertex, and states at every exit how densely its techniques draw the same
+//! path. Weights are those of the balance heuristic over all techniques. Their densities are written
+//! relative to U, the density with which the walk draws its medium vertices and the flight to the exit,
+//! so that U itself, which underflows in thick media, is never formed: a light sample has density p_L, a
+//! BSDF sample p_B, a rival p_R / U. Roulette is in no density: each walk divides by its own survival,
+//! and weights without it still sum to 1.
 
 use std::sync::Arc;
 
@@ -43,10 +43,10 @@ impl Default for Roulette {
     }
 }
 
-/// What all walks of an estimator share.
+/// Data that all walks of an estimator share.
 #[derive(Debug)]
 pub(super) struct Field {
-    /// The scene.
+    /// Scene that paths are traced in.
     pub scene: Arc<Scene>,
     /// Per band: probability of choosing each light.
     pub choice: Vec<Vec<f64>>,
@@ -55,7 +55,7 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// For a scene.
+    /// Prepares a scene for tracing with this roulette.
     pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Field {
         let choice = light_shares(&scene);
         Field { bounds: scene.shape.bounds(), roulette, choice, scene }
@@ -100,8 +100,8 @@ pub(super) trait Rivals: Sized {
     /// latest medium vertex: 1 or 0 each.
     fn unidirectional(&self) -> [f64; 2];
 
-    /// Sum over the rivals of their densities of the path that ends at `exit` and goes on towards `wi`,
-    /// light `light`, relative to the density of the walk's medium vertices.
+    /// Sum over the rivals of their densities of the path that ends at `exit` and continues towards
+    /// `wi`, light `light`, relative to the density of the walk's medium vertices.
     fn densities<B: WalkBands>(
         walk: &mut CameraWalk<'_, Self, B>,
         exit: &WalkExit,
@@ -110,7 +110,7 @@ pub(super) trait Rivals: Sized {
     ) -> f64;
 }
 
-/// No techniques but the walk's own.
+/// No techniques except the walk's own.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Unrivalled;
 
@@ -179,7 +179,7 @@ struct LightDraw {
     pdf: Option<f64>,
 }
 
-/// One path.
+/// State of one path that is traced from the sensor.
 pub(super) struct CameraWalk<'a, R, B> {
     pub scene: &'a Scene,
     choice: &'a [f64],
@@ -192,7 +192,7 @@ pub(super) struct CameraWalk<'a, R, B> {
     pub ray: Ray,
     from: Option<FaceId>,
     pub throughput: f64,
-    /// The throughput without radiance's eta^2: what roulette looks at.
+    /// The throughput without radiance's eta^2, which roulette compares with its threshold.
     survival: f64,
     pub history: History,
     drawn: DirectionDraw,
@@ -208,7 +208,7 @@ pub(super) struct CameraWalk<'a, R, B> {
 
 impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Traces a path; returns how many numbers its walk drew.
-    pub fn play(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
+    pub fn trace(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
         let walk = CameraWalk::start(path, scores, rivals, bands);
         walk.scores.count(Cost::Rays);
         match walk.scene.shape.intersect(&walk.ray, Side::Outside, None, f64::INFINITY) {
@@ -220,7 +220,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Traces the last two segments in the medium alone: the sensor's ray is the arrival at x_i, the
     /// next flight must end in the medium, the one after it at the boundary, and what leaves there must
     /// meet a light.
-    pub fn play_two_bounces(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> Option<()> {
+    pub fn trace_two_bounces(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> Option<()> {
         let mut walk = CameraWalk::start(path, scores, rivals, bands);
         walk.history.scatter();
         R::call(&mut walk);
@@ -383,7 +383,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
     }
 
-    /// Flies on outside; scores the lights where nothing is in the way.
+    /// Continues outside; scores the lights where nothing occludes them.
     fn fly_outside(&mut self) -> Option<Hit> {
         self.scores.count(Cost::Rays);
         let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
@@ -393,7 +393,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         hit
     }
 
-    /// Meets the boundary from `side`; the side the path goes on to, `None` where it ends.
+    /// Meets the boundary from `side`; returns the side on which the path continues, `None` where it
+    /// ends.
     fn cross(&mut self, hit: &Hit, side: Side) -> Option<Side> {
         self.from = Some(hit.face);
         let wo = -self.ray.dir;
@@ -471,7 +472,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
     }
 
-    /// What other techniques make of the path that leaves at the last exit, if there is one.
+    /// Densities of other techniques for the path that leaves at the last exit, if there is one.
     #[inline]
     fn rival_densities(&mut self, light: usize, wi: DVec3) -> f64 {
         match self.exit {
@@ -480,7 +481,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
     }
 
-    /// Which of BSDF and light sampling take part in what leaves at the last exit.
+    /// Which of BSDF and light sampling take part at the last exit.
     #[inline]
     fn taking_part(&self) -> [f64; 2] {
         if self.exit.is_some() { self.rivals.unidirectional() } else { [1.0, 1.0] }
@@ -633,7 +634,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     }
 }
 
-/// Russian roulette on a weight: above the threshold it goes on as it is, below it survives with
+/// Russian roulette on a weight: above the threshold it is unchanged, below it survives with
 /// probability weight / threshold. Returns the probability to divide by.
 #[inline]
 pub(super) fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> Option<f64> {
@@ -644,7 +645,7 @@ pub(super) fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> 
     (u() < probability).then_some(probability)
 }
 
-/// What every walk lacks of parallel light at a matched boundary.
+/// Notes on parallel light that every walk lacks at a matched boundary.
 pub(super) fn unscattered_notes(scene: &Scene) -> impl Iterator<Item = String> {
     let is_matched = scene.boundary.contains(&Boundary::Matched);
     let parallel = scene.lights.iter().filter(move |light| light.is_directional() && is_matched);

@@ -1,4 +1,4 @@
-//! From the words of a validated experiment to the scene: the one match from names to types.
+//! From a validated experiment to the scene: the one match from names to types.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
@@ -28,7 +28,7 @@ pub struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// For an experiment.
+    /// A builder of the experiment's scenes.
     pub fn new(experiment: &'a Experiment) -> Builder<'a> {
         let bands = experiment.file.bands.as_ref().map(bands).unwrap_or_default();
         Builder { experiment, bands, shapes: BTreeMap::new(), maps: BTreeMap::new() }
@@ -60,7 +60,7 @@ impl<'a> Builder<'a> {
         let sensor = cell.sensor.build(&shape)?;
         match sensor.position() {
             Some((point, Side::Outside)) if shape.covers(point) => Err(Error::input_help(
-                format!("the sensor at {point} mm stands inside or on the body (cell `{}`)", cell.label),
+                format!("the sensor at {point} mm is inside or on the body (cell `{}`)", cell.label),
                 "move it outside",
             )),
             Some((point, Side::Inside)) if !shape.contains(point) => Err(Error::input_help(

@@ -27,7 +27,7 @@ pub struct ClaimEntry {
     /// Two measurements do not agree (a control): the difference must be found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differs: Option<Differs>,
-    /// The record comes out again, bit for bit.
+    /// The record is reproduced bit for bit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reproduces: Option<Reproduces>,
     /// An estimator is more efficient than another.
@@ -46,7 +46,7 @@ pub struct ClaimEntry {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SamplerClaim {
-    /// Their names; all of them without it.
+    /// Their names; all by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
     pub samplers: Option<Vec<String>>,
@@ -74,19 +74,19 @@ pub enum Expect {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [{ "required": ["value"] }, { "required": ["column"] }]))]
 pub struct Equals {
-    /// The estimator; all of them without it.
+    /// The estimator; all by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub estimator: Option<String>,
-    /// The observable; the sensor's first one without it.
+    /// The observable; the sensor's first by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
-    /// The transport class; `all` without it.
+    /// The transport class; `all` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
-    /// The expected value.
+    /// Expected value of the quantity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// Its stated standard error; exact without it.
+    /// Its stated standard error; exact by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub error: Option<f64>,
@@ -102,7 +102,7 @@ pub struct Equals {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub detect: Option<f64>,
-    /// The band; every one without it.
+    /// The band; every band by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band: Option<String>,
     /// Only cells with these labels: axis -> label.
@@ -121,13 +121,13 @@ pub struct Differs {
     /// Axis of the sweep whose cells must differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub across: Option<String>,
-    /// The observable; the sensor's first one without it.
+    /// The observable; the sensor's first by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
-    /// The transport class; `all` without it.
+    /// The transport class; `all` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
-    /// The band; every one without it.
+    /// The band; every band by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band: Option<String>,
     /// Only cells with these labels: axis -> label.
@@ -135,12 +135,12 @@ pub struct Differs {
     pub only: BTreeMap<String, String>,
 }
 
-/// The first passes of every measurement, played again by one thread in blocks of another size, give the
+/// The first passes of every measurement, run again by one thread in blocks of another size, give the
 /// same bits; and, where a checksum is stated, the record's numbers are those.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Reproduces {
-    /// Passes that are played again, rounded up to whole batches.
+    /// Passes that are run again, rounded up to whole batches.
     #[schemars(range(min = 1, max = 1099511627776u64))]
     pub passes: u64,
     /// blake3 over the record's arrays, hex, as `summary.json` states it (`numbers`).
@@ -158,16 +158,16 @@ pub struct Agree {
     /// Axis of the sweep whose cells must agree.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub across: Option<String>,
-    /// The observable, or `each`; the sensor's first one without it.
+    /// The observable, or `each`; the sensor's first by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
-    /// The transport class, or `each` (all of them and their sum); `all` without it.
+    /// The transport class, or `each` (all of them and their sum); `all` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
     /// The largest relative difference that may go unseen.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub detect: f64,
-    /// The band; every one without it.
+    /// The band; every band by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band: Option<String>,
     /// Only cells with these labels: axis -> label.

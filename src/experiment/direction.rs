@@ -11,7 +11,7 @@ use crate::math::{DVec3, cos, sin};
 pub enum Direction {
     /// x, y, z; normalised when read.
     Vector([f64; 3]),
-    /// Spherical.
+    /// Spherical coordinates.
     Polar(Polar),
 }
 

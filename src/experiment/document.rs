@@ -71,11 +71,11 @@ pub enum Value {
 /// A value and its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
-    /// The value.
+    /// Parsed value.
     pub value: Value,
-    /// Where the value stands.
+    /// Where the value is.
     pub origin: Origin,
-    /// Where its key stands; none for elements of arrays and for the root.
+    /// Where its key is; none for elements of arrays and for the root.
     pub key: Option<Place>,
     /// Whether it is a table written in braces, that is, as one value.
     pub inline: bool,
@@ -125,7 +125,7 @@ impl Node {
         })
     }
 
-    /// The place to name for what is wrong with the whole of it: the key of a table, else the value.
+    /// The place to report for an error in the whole node: the key of a table, else the value.
     pub fn place(&self) -> &Place {
         match (&self.value, &self.key) {
             (Value::Table(_), Some(key)) if !self.inline => key,

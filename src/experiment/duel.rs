@@ -7,17 +7,17 @@ use serde::{Deserialize, Serialize};
 
 use super::schema::ClaimEntry;
 
-/// What follows the name of an estimator that is played a second time as a control.
+/// Suffix to the name of an estimator that is run a second time as a control.
 pub const CONTROL: &str = " (control)";
 
-/// What an estimator's work is measured by.
+/// Measure of an estimator's work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CostMeasure {
     /// Counts of rays, events and paths with fixed weights: the same on every machine.
     #[default]
     Counters,
-    /// CPU time. The estimators are played side by side, and the baseline twice, so that what the
+    /// CPU time. The estimators are run side by side, and the baseline twice, so that what the
     /// machine adds is seen.
     Cpu,
 }
@@ -30,7 +30,7 @@ pub enum CostMeasure {
 pub struct Faster {
     /// The estimator that is claimed to be the more efficient one.
     pub candidate: String,
-    /// The other.
+    /// Estimator that the candidate is compared with.
     pub baseline: String,
     /// What the efficiency ratio must exceed.
     #[serde(default = "one")]
@@ -39,11 +39,11 @@ pub struct Faster {
     /// What counts as cost.
     #[serde(default)]
     pub cost: CostMeasure,
-    /// The observable; the sensor's first one without it. `pixels` for the variance of a pixel, averaged
+    /// The observable; the sensor's first by default. `pixels` for the variance of a pixel, averaged
     /// over the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
-    /// The transport class; `all` without it.
+    /// The transport class; `all` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
     /// The largest relative difference of the two means that may go unseen.
@@ -63,7 +63,7 @@ pub struct Faster {
 pub struct NotSlower {
     /// The estimator that is claimed not to be slower.
     pub candidate: String,
-    /// The other.
+    /// Estimator that the candidate is compared with.
     pub baseline: String,
     /// What the ratio of inverse efficiencies must stay below.
     #[serde(default = "tenth_more")]
@@ -72,11 +72,11 @@ pub struct NotSlower {
     /// What counts as cost.
     #[serde(default)]
     pub cost: CostMeasure,
-    /// The observable; the sensor's first one without it. `pixels` for the variance of a pixel, averaged
+    /// The observable; the sensor's first by default. `pixels` for the variance of a pixel, averaged
     /// over the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
-    /// The transport class; `all` without it.
+    /// The transport class; `all` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
     /// The largest relative difference of the two means that may go unseen.
@@ -96,24 +96,24 @@ fn tenth_more() -> f64 {
     1.1
 }
 
-/// What both claims come to: an efficiency ratio that must exceed a bound.
+/// Common form of both claims: an efficiency ratio that must exceed a bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Duel<'a> {
     /// The estimator under test.
     pub candidate: &'a str,
-    /// The other.
+    /// Estimator that the candidate is compared with.
     pub baseline: &'a str,
     /// What variance times cost of the baseline over that of the candidate must exceed.
     pub exceeds: f64,
     /// What counts as cost.
     pub cost: CostMeasure,
-    /// The observable.
+    /// Observable whose variance is compared; the sensor's first by default.
     pub observable: &'a Option<String>,
-    /// The transport class.
+    /// Transport class whose variance is compared.
     pub class: &'a Option<String>,
     /// The largest relative difference of the two means that may go unseen.
     pub detect: Option<f64>,
-    /// Axis -> label.
+    /// Cells that the claim is on: label of each axis.
     pub only: &'a BTreeMap<String, String>,
 }
 

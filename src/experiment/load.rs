@@ -16,7 +16,7 @@ use super::validate::grammar::Grammar;
 use super::{Axis, CellSpec, Experiment, LoadOptions, origins, overrides, resolved};
 use crate::error::{Diagnostic, Error, Place, Result};
 
-/// Reads, overrides and validates the experiment in `text`, which stands at `path`.
+/// Reads, overrides and validates the experiment in `text`, which was read from `path`.
 ///
 /// # Errors
 /// Everything that is wrong with it, at once.

@@ -7,13 +7,13 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 
-/// From words to scenes.
+/// From entries to scenes.
 pub mod build;
 
-/// Words for claims.
+/// Claims as they are written.
 mod claim_words;
 
-/// Words for directions.
+/// Directions as they are written.
 mod direction;
 
 /// A TOML text as a tree with places.
@@ -31,7 +31,7 @@ mod origins;
 /// Setting values by dotted key.
 mod overrides;
 
-/// What pictures a file may ask for.
+/// Pictures that a file may ask for.
 pub mod picture;
 
 /// The kinds of estimators and samplers that a file may name.
@@ -46,16 +46,16 @@ mod resolved;
 /// Rules between values.
 mod rules;
 
-/// What a file may say.
+/// What a file may contain.
 pub mod schema;
 
 /// The JSON Schema of a file.
 pub mod schema_json;
 
-/// Words for sensors.
+/// Sensors as they are written.
 mod sensor;
 
-/// "Did you mean".
+/// Suggestions of similar names ("did you mean").
 pub mod suggest;
 
 /// Axes, points and cells.
@@ -84,7 +84,7 @@ pub struct Experiment {
     /// The file that it was read from.
     pub path: PathBuf,
     /// Name, seed, bands, estimators, pairing, budget, claims and display of all cells; object, sensor
-    /// and lights of the first. Sweeps stand in it as rows, CSV files read; settings are applied.
+    /// and lights of the first. Sweeps are in it as rows, CSV files read; settings are applied.
     pub file: ExperimentFile,
     /// The cells, the last axis fastest. Without a sweep there is one, labelled `base`; without a scene,
     /// none.
@@ -101,7 +101,7 @@ pub struct Experiment {
 /// An axis of the sweep.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// Its name.
+    /// Name of the experiment.
     pub name: String,
     /// The labels of its points in order.
     pub labels: Vec<String>,
@@ -112,13 +112,13 @@ pub struct Axis {
 pub struct CellSpec {
     /// The labels of its points, joined by commas.
     pub label: String,
-    /// Axis -> label.
+    /// Label of the cell on each axis of the sweep.
     pub axes: BTreeMap<String, String>,
-    /// The body.
+    /// Shape, boundary and medium of the body.
     pub object: Object,
-    /// What is measured.
+    /// Sensor of the cell.
     pub sensor: SensorEntry,
-    /// The lights.
+    /// Lights of the cell.
     pub light: Vec<LightEntry>,
     /// The columns of the rows that the cell took, as texts; where two axes have a column of one
     /// name, that of the first.
@@ -129,7 +129,7 @@ pub struct CellSpec {
     pub sweep_values: BTreeMap<String, Value>,
 }
 
-/// What the command line adds to a file.
+/// Overrides from the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
     /// `key=value` arguments, applied in order after the setting.

@@ -8,7 +8,7 @@ use super::validate::grammar::Grammar;
 use crate::error::Diagnostic;
 
 /// Sets `value` at the dotted `key`; missing tables are created on the way. Naming a variant of an
-/// enum, as `object.boundary.rough`, replaces the variant that stood there.
+/// enum, as `object.boundary.rough`, replaces the variant that was there.
 ///
 /// # Errors
 /// A key that leads through a value that is no table, or past the end of an array.
@@ -88,12 +88,12 @@ pub fn overlap(a: &str, b: &str) -> bool {
     words.all(|(a, b)| a == b)
 }
 
-/// Whether `key` is `outer` or stands below it.
+/// Whether `key` is `outer` or below it.
 pub fn is_within(key: &str, outer: &str) -> bool {
     overlap(key, outer) && key.split('.').count() >= outer.split('.').count()
 }
 
-/// What stands on the way to `next` where there was nothing: an array before `0`, else a table.
+/// What is created on the way to `next` where there was nothing: an array before `0`, else a table.
 fn fresh(value: &Node, next: Option<&str>) -> Node {
     let mut node = Node::empty_table(value.origin.clone());
     node.key = value.key.clone().or(node.key);

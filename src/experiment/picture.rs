@@ -1,4 +1,4 @@
-//! Pictures beside those of every run: what `[[picture]]` may say.
+//! Pictures beside those of every run: what `[[picture]]` may contain.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,22 +23,22 @@ pub struct PictureEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunningEntry {
-    /// The estimators; all of them without it.
+    /// The estimators; all by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
     pub estimators: Option<Vec<String>>,
-    /// The observable; the sensor's first one without it.
+    /// The observable; the sensor's first by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observable: Option<String>,
-    /// The transport class; `all` without it.
+    /// The transport class; `all` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
-    /// The band.
+    /// Band that is shown.
     pub band: String,
 }
 
 /// A grid of pictures, a picture a cell of the sweep: its left half by one estimator, its right half by
-/// another, shown alike. The caption says what CPU time each half took. Axes that are neither rows nor
+/// another, shown alike. The caption states what CPU time each half took. Axes that are neither rows nor
 /// columns give one grid per label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -59,7 +59,7 @@ pub struct SplitEntry {
     pub exposure_stops: Option<f64>,
 }
 
-/// What the results folder keeps of the pictures that a file asks for.
+/// The pictures that a file asks for, as the results folder keeps them.
 pub fn wanted(entries: &[PictureEntry]) -> Vec<Wanted> {
     entries.iter().filter_map(PictureEntry::wanted).collect()
 }

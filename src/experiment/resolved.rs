@@ -1,4 +1,4 @@
-//! Canonical content: what a cell and an experiment are, apart from how their file says it.
+//! Canonical content: what a cell and an experiment are, apart from how their file writes it.
 
 use serde::Serialize;
 use serde_json::{Value as Json, json};
@@ -9,12 +9,12 @@ use super::{CellSpec, Experiment};
 
 impl CellSpec {
     /// Object, sensor and lights with sorted keys, every number of a continuous quantity as f64.
-    /// Files (a mesh, a map) stand in it by their path.
+    /// Files (a mesh, a map) are in it by their path.
     pub fn content(&self) -> Json {
         json!({ "object": json(&self.object), "sensor": json(&self.sensor), "light": json(&self.light) })
     }
 
-    /// The content without what stands at the dotted `keys`: equal for cells that are paired over them.
+    /// The content without the values at the dotted `keys`: equal for cells that are paired over them.
     pub fn content_without(&self, keys: &[String]) -> Json {
         let mut content = self.content();
         for key in keys {
@@ -33,7 +33,7 @@ impl Experiment {
     }
 }
 
-/// The sweep with every row written out; columns of CSV files that set nothing stand in `columns`.
+/// The sweep with every row written out; columns of CSV files that set nothing are in `columns`.
 pub fn sweep(axes: &[SweepAxis]) -> Vec<Sweep> {
     axes.iter().map(axis).collect()
 }

@@ -1,8 +1,8 @@
-//! What an experiment file may say. The types below are the single source: `scatterproof schema`
+//! What an experiment file may contain. The types below are the single source: `scatterproof schema`
 //! prints the JSON Schema that they generate, and `validate` walks a file along that same schema.
 //! Keys carry units. Physics has no defaults; run control has.
 //!
-//! A file has a scene with estimators, or samplers, or both; `rules` says which keys belong together.
+//! A file has a scene with estimators, or samplers, or both; `rules` states which keys belong together.
 
 use std::collections::BTreeMap;
 
@@ -39,10 +39,10 @@ pub struct ExperimentFile {
     /// The wavelength bands; each is rendered by itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bands: Option<BandsEntry>,
-    /// The body.
+    /// The body: shape, boundary and medium.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<Object>,
-    /// What is measured.
+    /// The sensor, which defines what is measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor: Option<SensorEntry>,
     /// The lights, all shining at once.
@@ -59,18 +59,18 @@ pub struct ExperimentFile {
     /// Cells that share random streams.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pair: Option<PairEntry>,
-    /// How much work.
+    /// Number of passes, or CPU time, of every measurement.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<Budget>,
     /// Draws per sampler.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1000, max = 10000000000u64))]
     pub samples: Option<u64>,
-    /// The samplers whose draws are held against the densities that they claim.
+    /// The samplers whose draws are compared with the densities that they claim.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(min = 1))]
     pub sampler: Vec<SamplerEntry>,
-    /// What must hold.
+    /// Claims that `verify` tests.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub claim: Vec<ClaimEntry>,
     /// Pictures beside those of every run.
@@ -85,7 +85,7 @@ pub struct ExperimentFile {
     pub display: Display,
 }
 
-/// The wavelength bands.
+/// How the spectrum is divided into wavelength bands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum BandsEntry {
@@ -138,15 +138,15 @@ pub enum Spectrum {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Object {
-    /// Geometry.
+    /// Geometry of the body.
     pub shape: ShapeEntry,
-    /// The refractive surface.
+    /// Refractive surface of the body.
     pub boundary: BoundaryEntry,
     /// The homogeneous medium inside.
     pub medium: MediumEntry,
 }
 
-/// Geometry, mm. Bodies stand at the origin; the top face of `half_space` and `slab` is z = 0.
+/// Geometry, mm. Bodies are at the origin; the top face of `half_space` and `slab` is z = 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ShapeEntry {
@@ -254,7 +254,7 @@ pub enum ShapeEntry {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NormalsEntry {
-    /// The triangle's own.
+    /// Geometric normal of the triangle.
     Flat,
     /// Interpolated between vertex normals (the file's, or else angle-weighted).
     Interpolated,
@@ -273,7 +273,7 @@ pub enum BoundaryEntry {
     Rough {
         /// Distribution of microfacet normals.
         distribution: MicrofacetKind,
-        /// Its roughness.
+        /// Roughness alpha of the microfacet distribution.
         #[schemars(range(min = 0.0001, max = 1.0))]
         alpha: f64,
         /// Refractive index inside over outside.
@@ -289,7 +289,7 @@ pub enum BoundaryEntry {
 pub enum Eta {
     /// The same in every band.
     Grey(f64),
-    /// One per band.
+    /// One value per band.
     PerBand(Vec<f64>),
     /// By formula or from a built-in material.
     Formula(EtaFormula),
@@ -311,7 +311,7 @@ pub enum EtaFormula {
     },
     /// n^2 = 1 + sum_i b_i l^2 / (l^2 - c_i), l in um.
     Sellmeier {
-        /// Strengths.
+        /// Oscillator strengths b_i.
         #[schemars(length(min = 1))]
         b: Vec<f64>,
         /// Squared resonance wavelengths, um^2.
@@ -329,7 +329,7 @@ pub enum MediumEntry {
     Coefficients(Coefficients),
     /// A built-in measured material (`scatterproof list`), rgb bands only.
     Preset {
-        /// Its name.
+        /// Name of the built-in entry.
         name: String,
         /// Multiplies both coefficients: 2 is a body twice as large.
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -372,7 +372,7 @@ pub struct Coefficients {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [{ "required": ["directional"] }, { "required": ["solid_angle"] }, { "required": ["environment"] }]))]
 pub struct LightEntry {
-    /// Name in observables (`mean@sun`); without it `light_1`, `light_2`, ...
+    /// Name in observables (`mean@sun`); by default `light_1`, `light_2`, ...
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Parallel light.
@@ -403,7 +403,7 @@ pub struct Directional {
 pub struct SolidAngle {
     /// From the scene towards the middle of the disc.
     pub toward: Direction,
-    /// Its size, sr.
+    /// Solid angle of the disc, sr.
     #[schemars(extend("exclusiveMinimum" = 0), range(max = 12.566370614359172))]
     pub solid_angle_sr: f64,
     /// Radiance, W/(mm^2 sr).
@@ -429,7 +429,7 @@ pub struct Environment {
     /// is +x. Channels R, G, B for rgb bands, Y for any bands, else a channel named like each band.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<String>,
-    /// Multiplies the map.
+    /// Factor on the radiance of the map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub scale: Option<f64>,
@@ -478,7 +478,7 @@ impl SamplerEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
-    /// Name of the axis in tables and in `where`; without it the last word of its first key.
+    /// Name of the axis in tables and in `where`; by default the last word of its first key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// One dotted key, as `object.boundary.rough.alpha` or `light.0.solid_angle.solid_angle_sr`.
@@ -533,7 +533,7 @@ pub struct SweepCsv {
     pub columns: BTreeMap<String, String>,
 }
 
-/// Cells that differ only in these keys are played on the same random streams.
+/// Cells that differ only in these keys use the same random streams.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PairEntry {
@@ -570,7 +570,7 @@ pub struct RelativeError {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SmallValues {
-    /// The limit.
+    /// Values below this are small.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub below: f64,
     /// Largest standard error over value below it.

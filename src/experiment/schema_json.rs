@@ -31,7 +31,7 @@ pub fn editor_schema(registry: &Registry) -> Json {
 }
 
 /// Completes the definition `name` of one entry: its name and exactly one registered kind, of which a
-/// line of documentation and the schema of the options are given. What the options define stands at the
+/// line of documentation and the schema of the options are given. What the options define is at the
 /// root under names that begin with `prefix` and the kind.
 fn inject(name: &str, prefix: &str, kinds: Vec<(&'static str, &'static str, Json)>, schema: &mut Json) {
     let mut entry = schema["$defs"][name].clone();

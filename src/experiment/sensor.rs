@@ -1,4 +1,4 @@
-//! What an experiment file may say of its sensor, and the sensor that it means.
+//! The sensor in an experiment file, and how it is built.
 
 use std::f64::consts::PI;
 
@@ -65,7 +65,7 @@ pub enum SensorEntry {
     Probe {
         /// Its origin, mm; outside the body.
         point_mm: [f64; 3],
-        /// Its direction.
+        /// Direction of the ray.
         toward: Direction,
         /// Independent paths whose mean is one pass.
         #[serde(default = "default_paths_per_pass")]
@@ -99,8 +99,8 @@ pub enum SensorEntry {
     },
     /// Radiant exitance of a `half_space` or `slab` by how far from the exit its light came in.
     ///
-    /// Of the top face, W/mm^2; the distance is taken along the face. Observables `ring_i`, and `all` of every ring and
-    /// beyond.
+    /// Of the top face, W/mm^2; the distance is taken along the face. Observables `ring_i`, and `all` of
+    /// every ring and beyond.
     Rings {
         /// Edges of the rings, mm, increasing from 0 or more.
         #[schemars(length(min = 2, max = 1025))]
@@ -220,9 +220,10 @@ fn screen(
     Screen { width, height, right: pixel * right, down: pixel * down, view, has_tiles }
 }
 
-/// The middle of a plane before the body on which the parallel rays of `screen` start: where they start does not change
-/// what they see, as long as none starts behind a part of the body. The plane is moved back along the view until the
-/// whole of it is beyond the bounding sphere, or on the viewer's side of a half-space or slab.
+/// The middle of a plane before the body on which the parallel rays of `screen` start: where they start
+/// does not change what they see, as long as none starts behind a part of the body. The plane is moved
+/// back along the view until the whole of it is beyond the bounding sphere, or on the viewer's side of a
+/// half-space or slab.
 fn before(shape: &Shape, screen: &Screen, center: DVec3) -> DVec3 {
     let half_width = 0.5 * screen.width as f64 * screen.right;
     let half_height = 0.5 * screen.height as f64 * screen.down;
@@ -246,7 +247,8 @@ fn before(shape: &Shape, screen: &Screen, center: DVec3) -> DVec3 {
     center - back.max(0.0) * screen.view
 }
 
-/// How far outside a half-space or slab rays start, mm: of the body's own size, so that scaled scenes are the same.
+/// How far outside a half-space or slab rays start, mm: of the body's own size, so that scaled scenes
+/// are the same.
 fn outside(shape: &Shape) -> f64 {
     if let Shape::Slab { thickness } = shape { *thickness } else { 1.0 }
 }

@@ -13,7 +13,7 @@ pub fn nearest<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
     (likeness(best) >= NEAR).then_some(*best)
 }
 
-/// The help for an unknown name: the nearest known one, else all of them, called `what`.
+/// The help for an unknown name: the nearest known one, else all of them, introduced by `what`.
 pub fn help(name: &str, known: &[&str], what: &str) -> String {
     match nearest(name, known) {
         Some(near) => format!("did you mean `{near}`?"),

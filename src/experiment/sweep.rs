@@ -19,7 +19,7 @@ pub fn resolve_path(experiment: &Path, named: &str) -> PathBuf {
     experiment.parent().unwrap_or(Path::new("")).join(named)
 }
 
-/// Reads the axes of a document; none where something is wrong, the findings say what.
+/// Reads the axes of a document; none where something is wrong, the findings state what.
 /// `overridden` are the keys that a setting or `--set` has set, which a sweep must not set again.
 pub fn axes(
     root: &Node,
@@ -162,7 +162,7 @@ fn unique_labels(points: &[AxisPoint], findings: &Findings) -> bool {
     let mut labels = BTreeSet::new();
     let twice: Vec<&AxisPoint> = points.iter().filter(|point| !labels.insert(&point.label)).collect();
     for point in &twice {
-        findings.at(&point.place, format!("label `{}` stands twice on the axis", point.label), None);
+        findings.at(&point.place, format!("label `{}` occurs twice on the axis", point.label), None);
     }
     twice.is_empty()
 }

@@ -14,7 +14,7 @@ use super::sweep_point::{AxisPoint, RowField};
 use crate::error::Place;
 
 /// Reads the rows that the `csv` entry of a sweep names; `path` is that of the CSV file. None where
-/// something is wrong with it; the findings say what.
+/// something is wrong with it; the findings state what.
 pub fn points(entry: &Node, path: &Path, findings: &Findings) -> Option<Vec<AxisPoint>> {
     let path_node = entry.get("path")?;
     let text = match std::fs::read_to_string(path) {
@@ -98,7 +98,7 @@ impl File {
     }
 }
 
-/// A column that sets a key: its index, the dotted key, and where that key stands.
+/// A column that sets a key: its index, the dotted key, and where that key is.
 struct Set {
     index: usize,
     key: String,

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use super::document::Node;
 use crate::error::Place;
 
-/// One axis.
+/// One axis of the sweep.
 #[derive(Clone, Debug)]
 pub struct SweepAxis {
-    /// Its name.
+    /// Name of the axis.
     pub name: String,
     /// Its points in order.
     pub points: Vec<AxisPoint>,
@@ -17,9 +17,9 @@ pub struct SweepAxis {
 /// One point of an axis.
 #[derive(Clone, Debug)]
 pub struct AxisPoint {
-    /// Its label.
+    /// Label of the point on its axis.
     pub label: String,
-    /// Where it stands.
+    /// Place in the file.
     pub place: Place,
     /// The dotted keys that it sets, and the values.
     pub sets: Vec<(String, Node)>,
@@ -32,8 +32,8 @@ pub struct AxisPoint {
 /// One field of a row.
 #[derive(Clone, Debug)]
 pub struct RowField {
-    /// Its text.
+    /// The value as text.
     pub text: String,
-    /// Where it stands.
+    /// Place in the file.
     pub place: Place,
 }

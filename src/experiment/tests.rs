@@ -16,11 +16,11 @@ use crate::samplers;
 #[serde(deny_unknown_fields)]
 #[allow(dead_code)]
 struct StubOptions {
-    /// The longest path.
+    /// Largest number of bounces.
     #[serde(default)]
     #[schemars(range(min = 1))]
     max_bounces: Option<u32>,
-    /// How it samples.
+    /// Sampling strategy.
     #[serde(default)]
     strategy: Option<StubStrategy>,
 }

@@ -7,7 +7,7 @@ use crate::math::DVec3;
 /// A source of uniform numbers in [0, 1).
 pub type Uniforms<'a> = &'a mut dyn FnMut() -> f64;
 
-/// What [`audit_aim`] found.
+/// Counts of [`audit_aim`]: rays from inside that must meet the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AimAudit {
     /// Rays from inside.
@@ -16,7 +16,7 @@ pub struct AimAudit {
     pub lost: u64,
 }
 
-/// What [`audit_walk`] found.
+/// Counts of [`audit_walk`]: flights of random walks inside a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WalkAudit {
     /// Flights of the walk.

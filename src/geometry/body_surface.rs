@@ -39,7 +39,7 @@ pub struct BodyPoint {
 pub enum BodySampler {
     /// Of a sphere about the origin.
     Sphere {
-        /// mm.
+        /// Radius, mm.
         radius: f64,
     },
     /// Of a box about the origin.
@@ -49,7 +49,7 @@ pub enum BodySampler {
         /// How faces are chosen.
         choice: FaceChoice,
     },
-    /// Of a mesh.
+    /// Triangles of a mesh, by area.
     Triangles(SurfaceSampler),
 }
 

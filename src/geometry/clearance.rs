@@ -17,7 +17,7 @@ const VOXEL: f64 = 32.0;
 /// Squared distance, in voxels, of what has no occupied voxel in sight.
 const FAR: u32 = u32::MAX / 2;
 
-/// The grid.
+/// Grid of lower bounds of the distance to the surface.
 #[derive(Clone, Debug)]
 pub struct Clearance {
     /// Least corner, units of the frame.

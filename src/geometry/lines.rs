@@ -4,7 +4,8 @@
 //! A line's axis is the point's normal (probability 1/2) or one of two tangents (1/4 each); it passes
 //! the point at a distance r that a radial density draws, in a uniform azimuth. The expected number of
 //! crossings per area at an offset from the point, where the surface has normal n, is
-//!   sum over axes a of P(a) |n . a| times the mean over bands of sum over their densities of share pdf(r_a),
+//!   sum over axes a of P(a) |n . a| times the mean over bands of sum over their densities of share
+//!   pdf(r_a),
 //! r_a being the distance of the offset from the axis a through the point: the disc's density, carried
 //! from the disc across a to the surface. All axes, bands and densities that could have made a crossing
 //! are in the sum, whichever made it.
@@ -35,7 +36,7 @@ pub struct Line {
     pub radius: f64,
 }
 
-/// What following a line took.
+/// Work of following a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Met {
     /// Closest-hit queries.

@@ -14,11 +14,11 @@ use crate::math::DVec3;
 pub struct Mesh {
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
-    /// What shading normals are interpolated from; none for flat shading.
+    /// Vertex normals that shading normals are interpolated from; none for flat shading.
     normals: Option<Normals>,
     bounds: BoundingSphere,
     tree: BoxTree,
-    /// The triangles in the tree's order, their corners at hand.
+    /// The triangles in the tree's order, with their corners.
     leaves: Vec<Leaf>,
     clearance: Clearance,
     /// How far rounding may put a point of the surface off it, mm: a point is a sum of three corners
@@ -129,7 +129,7 @@ impl Mesh {
         &self.triangles
     }
 
-    /// What shading normals are interpolated from; none for flat shading.
+    /// Vertex normals that shading normals are interpolated from; none for flat shading.
     pub fn normals(&self) -> Option<&Normals> {
         self.normals.as_ref()
     }
@@ -378,8 +378,8 @@ mod tests {
         assert!(hits > BRUTE_FORCE_RAYS / 3, "{hits}");
     }
 
-    /// A walk that meets the surface at an edge goes on from a point that rounding may have put outside
-    /// of the neighbouring face: it leaves through that face at once, and is not lost.
+    /// A walk that meets the surface at an edge continues from a point that rounding may have put
+    /// outside of the neighbouring face: it leaves through that face at once, and is not lost.
     #[test]
     fn rays_from_edges_and_corners_leave() {
         let mut u = Uniform::named("rays_from_edges_and_corners_leave");

@@ -51,7 +51,7 @@ impl Ray {
 pub enum Side {
     /// In the vacuum around the body.
     Outside,
-    /// In the medium.
+    /// On the side of the medium.
     Inside,
 }
 
@@ -71,16 +71,16 @@ pub struct Hit {
     pub normal: DVec3,
     /// Shading normal: interpolated on smooth meshes, else equal to `normal`.
     pub shading_normal: DVec3,
-    /// The primitive.
+    /// The primitive that was hit.
     pub face: FaceId,
 }
 
 /// A sphere that holds a whole body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundingSphere {
-    /// Its middle, mm.
+    /// Centre, mm.
     pub center: DVec3,
-    /// Its radius, mm.
+    /// Radius, mm.
     pub radius: f64,
 }
 
@@ -113,7 +113,7 @@ fn extent(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one body in a scene")]
 pub enum Shape {
-    /// z < 0.
+    /// The half-space z < 0.
     HalfSpace,
     /// -thickness < z < 0.
     Slab {

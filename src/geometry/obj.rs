@@ -128,7 +128,7 @@ mod tests {
         load_obj(&path, longest_side_mm, interpolated)
     }
 
-    /// The file is refused with exit code 2, named, and told these things.
+    /// The file is refused with exit code 2; the message contains its name and these texts.
     fn refused(text: &str, parts: &[&str]) {
         let error = load(text).expect_err("refused");
         let message = error.to_string();

@@ -1,4 +1,4 @@
-//! What the tests of geometry share: a small uniform source, directions, and test bodies.
+//! Common to the tests of geometry: a small uniform source, directions, and test bodies.
 
 use super::{Mesh, Shape, procedural};
 use crate::math::DVec3;

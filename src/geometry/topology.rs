@@ -1,5 +1,5 @@
-//! What makes triangles the boundary of a body: closed, consistently oriented, a 2-manifold, and
-//! not inside out.
+//! Conditions for triangles to be the boundary of a body: closed, consistently oriented, a 2-manifold,
+//! and not inside out.
 
 use super::triangle::Sheared;
 use super::{Ray, Side, extent};

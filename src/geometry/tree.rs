@@ -1,7 +1,7 @@
 //! The border between f32 culling and f64 intersection. Door for `obvhs`.
 //!
 //! The tree only rules triangles out; every number a result sees is computed in f64 by the caller.
-//! What culls is conservative, so results do not depend on the tree.
+//! Culling is conservative, so results do not depend on the tree.
 //!
 //! # Frame
 //!
@@ -22,7 +22,7 @@
 //! | source | error | bound |
 //! |---|---|---|
 //! | rounding of the origin | u abs(o) | 1.1e-4 |
-//! | direction, inverse, two products, sum | 5 u (q e + abs(p - o)), q e <= 2100, abs(p - o) <= 2810 | 1.5e-3 |
+//! | direction, inverse, products | 5 u (q e + abs(p - o)), q e <= 2100, abs(p - o) <= 2810 | 1.5e-3 |
 //! | node corner and 8-bit steps from rounded differences | 2 u 2048 | 2.5e-4 |
 //! | step exponent from a rounded log2, box cut at 255 steps | 2048 3e-7 | 6e-4 |
 //! | `safe_inverse` takes components below 2^-23 as 2^-23 | 2^-22 tau, tau <= 3600 | 8.6e-4 |
@@ -51,7 +51,7 @@ pub const PAD: f64 = 0.0078125;
 /// so forgets a part of the mesh, when there are more.
 const MAX_DEPTH: usize = 32;
 
-/// The normalised units.
+/// Map from mm to the units of the mesh's tree.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshFrame {
     center: DVec3,
@@ -164,7 +164,7 @@ impl BoxTree {
         });
     }
 
-    /// Whether `visit` says yes to any slot whose box the ray may meet; it is not asked again.
+    /// Whether `visit` returns true for any slot whose box the ray may meet; it is not asked again.
     pub fn any(&self, ray: &Ray, mut visit: impl FnMut(usize) -> bool) -> bool {
         let Some((cull_ray, _)) = self.frame.cull_ray(ray, f64::INFINITY) else { return false };
         // Not `ray_traverse_anyhit`, which visits all boxes on the ray.

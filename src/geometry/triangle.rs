@@ -10,7 +10,7 @@
 //! - a zero (the ray meets the very edge) counts as a hit on both sides of the edge.
 //!
 //! So for the projected surface the test is exact and closed, and the triangles whose signs agree
-//! with the wanted orientation cover whatever the ray leaves through.
+//! with the wanted orientation cover every face that the ray may leave through.
 //!
 //! Along the ray nothing is exact: a walk that starts on an edge starts from a rounded point, which may
 //! lie beyond the neighbouring face, and the crossing by which it leaves would then lie behind it. So a

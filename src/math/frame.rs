@@ -9,13 +9,13 @@ pub struct Frame {
     pub s: DVec3,
     /// Second tangent.
     pub t: DVec3,
-    /// The normal.
+    /// Normal.
     pub n: DVec3,
 }
 
 impl Frame {
     /// A frame about the unit vector `n` (Duff et al. 2017, "Building an Orthonormal Basis,
-    /// Revisited": no branch but the sign of n.z, accurate for every n).
+    /// Revisited": no branch except the sign of n.z, accurate for every n).
     pub fn about(n: DVec3) -> Frame {
         let sign = 1f64.copysign(n.z);
         let a = -1.0 / (sign + n.z);

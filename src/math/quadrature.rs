@@ -3,7 +3,7 @@
 /// An integral and a bound of its error.
 #[derive(Clone, Copy, Debug)]
 pub struct Integral {
-    /// The value.
+    /// Estimate of the integral.
     pub value: f64,
     /// Sum of |K15 - G7| over the accepted intervals: pessimistic.
     pub error: f64,
@@ -42,7 +42,7 @@ fn rule(f: &mut dyn FnMut(f64) -> f64, a: f64, b: f64) -> Integral {
 }
 
 /// Integrates `f` over [a, b] to the absolute tolerance, bisecting the interval with the largest
-/// error first; at most 2000 intervals, after which `error` says how far it came.
+/// error first; at most 2000 intervals, after which `error` states the accuracy reached.
 pub fn integrate(mut f: impl FnMut(f64) -> f64, a: f64, b: f64, tolerance: f64) -> Integral {
     let mut parts = vec![(a, b, rule(&mut f, a, b))];
     loop {

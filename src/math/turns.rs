@@ -2,7 +2,7 @@
 //!
 //! With u in turns the reduction is exact: k = round(4u), r = (pi/2)(4u - k), |r| <= pi/4. There the
 //! Taylor sums below are truncated after r^17 and r^16: the first terms left out, r^19/19! and r^18/18!,
-//! are below 2.1e-18. No table, no branch but the quadrant; absolute error below 2.3e-16 (tested).
+//! are below 2.1e-18. No table, no branch except the quadrant; absolute error below 2.3e-16 (tested).
 
 /// `(sin 2 pi u, cos 2 pi u)` for |u| < 2^50.
 #[inline]

@@ -31,7 +31,7 @@ pub enum Boundary {
     Rough {
         /// Index inside over outside, not 1.
         eta: f64,
-        /// Its microfacets.
+        /// Microfacet distribution and roughness.
         facets: Microfacets,
     },
     /// No surface; light passes straight through.
@@ -41,13 +41,13 @@ pub enum Boundary {
 /// How densely a direction was sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Density {
-    /// Per solid angle.
+    /// Density per solid angle, 1/sr.
     Finite(f64),
     /// A delta lobe: no other technique can draw this direction.
     Delta,
 }
 
-/// What happened at the surface.
+/// Event at the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// `wi` is on the side of `wo`.
@@ -59,13 +59,13 @@ pub enum Event {
 /// A sampled direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundarySample {
-    /// Towards the light.
+    /// Unit direction towards the light.
     pub wi: DVec3,
     /// f |cos_i| / pdf.
     pub weight: f64,
     /// Density of `wi`, the choice of lobe included.
     pub density: Density,
-    /// Which lobe.
+    /// Lobe that was sampled: reflection or refraction.
     pub event: Event,
 }
 

@@ -38,7 +38,7 @@ static CMF: LazyLock<Vec<DVec3>> = LazyLock::new(|| {
     .collect()
 });
 
-/// The colours of an experiment's bands, by what is known of them.
+/// The colours of an experiment's bands, from their wavelengths or names.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BandColours<'a> {
     /// Bands that are red, green and blue themselves.

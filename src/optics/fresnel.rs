@@ -1,6 +1,6 @@
 //! Exact reflectance of a smooth dielectric for unpolarised light.
 
-/// What a smooth dielectric does with light at one angle.
+/// Reflectance of a smooth dielectric and refracted cosine at one angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fresnel {
     /// Reflected fraction; 1 under total internal reflection.

@@ -1,9 +1,9 @@
 //! Directions of a single bounce towards a point, in proportion to phase function and geometry together.
 //!
-//! Light that arrives at a vertex along `w_in`, goes on along w to x, and from there to a given point b,
-//! carries phase(w_in.w) / (|x - a|^2 |x - b|^2). Over the distance along an infinite ray the geometry
-//! integrates to (pi - theta) / (R sin theta) ([`crate::sampling::towards`]), so the direction's density
-//! has to be in proportion to
+//! Light that arrives at a vertex along `w_in`, continues along w to x, and from there to a given point
+//! b, carries phase(w_in.w) / (|x - a|^2 |x - b|^2). Over the distance along an infinite ray the
+//! geometry integrates to (pi - theta) / (R sin theta) ([`crate::sampling::towards`]), so the
+//! direction's density has to be in proportion to
 //!   target(w) = phase(w_in.w) (pi - theta) / sin(theta),     theta the angle between w and b,
 //! and the distance equiangular (joint importance sampling: Georgiev, Krivanek, Hachisuka,
 //! Nowrouzezahrai & Jarosz 2013; Kulla & Fajardo 2012; the phase function of the next vertex is left
@@ -381,7 +381,7 @@ mod tests {
         isotropic_mean(&frame, 6, square) / (norm * norm)
     }
 
-    /// What the head says of both ways of drawing, at 20, 90 and 160 degrees: table, mixture.
+    /// What the head states of both ways of drawing, at 20, 90 and 160 degrees: table, mixture.
     const MOMENTS: [(f64, [f64; 3], [f64; 3]); 4] = [
         (0.0, [1.0, 1.0, 1.0], [1.137, 1.137, 1.137]),
         (0.5, [1.001, 1.002, 1.001], [1.809, 1.148, 1.048]),
@@ -425,7 +425,7 @@ mod tests {
         assert_eq!(by_mixture.towards(w_in, TO).pdf(DVec3::X), mixture.pdf(DVec3::X));
     }
 
-    /// What building, drawing and asking cost; `cargo test --release joint::tests::cost -- --ignored
+    /// Cost of building, drawing and evaluating; `cargo test --release joint::tests::cost -- --ignored
     /// --nocapture`.
     #[test]
     #[ignore = "times, for people"]

@@ -67,7 +67,7 @@ mod tests {
         }
     }
 
-    /// The table that the verification experiment is held against is this solution.
+    /// The table that the verification experiment compares with is this solution.
     #[test]
     fn the_table_of_the_experiment_is_this_solution() {
         let table = include_str!("../../experiments/verify/chandrasekhar_brdf.csv");

@@ -1,4 +1,4 @@
-//! What the views of a record are made from.
+//! Input of the views of a record.
 
 use super::document::ViewerBlock;
 use super::plots::Section;
@@ -28,6 +28,6 @@ pub struct ReportData {
     pub viewers: Vec<ViewerBlock>,
     /// Grids of split pictures.
     pub splits: Vec<SplitFigure>,
-    /// Plots.
+    /// Sections of plots, in the report's order.
     pub plots: Vec<Section>,
 }

@@ -2,10 +2,10 @@
 
 use super::table::Table;
 
-/// A page.
+/// One page of a report.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Document {
-    /// Its title.
+    /// Title of the page.
     pub title: String,
     /// Its blocks, from the top.
     pub blocks: Vec<PageBlock>,
@@ -18,7 +18,7 @@ pub enum PageBlock {
     Heading(u8, String),
     /// A paragraph of plain text.
     Text(String),
-    /// Plain items.
+    /// Unordered list.
     List(Vec<String>),
     /// Preformatted lines, such as a command.
     Code(String),
@@ -41,7 +41,7 @@ pub struct TableBlock {
     pub name: String,
     /// What it shows and how to read it, in one or two sentences.
     pub caption: String,
-    /// Its fields.
+    /// Rows and columns.
     pub table: Table,
 }
 
@@ -55,22 +55,22 @@ impl TableBlock {
 /// The file of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PictureFile {
-    /// PNG.
+    /// Bytes of a PNG file.
     Png(Vec<u8>),
-    /// SVG.
+    /// Text of an SVG file.
     Svg(String),
 }
 
-/// One picture.
+/// One picture with its caption.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigureBlock {
     /// Path relative to the page.
     pub path: String,
-    /// What is shown.
+    /// File that is shown.
     pub picture: PictureFile,
-    /// What it is, in a few words.
+    /// Short description.
     pub title: String,
-    /// What it shows.
+    /// Caption.
     pub caption: String,
 }
 

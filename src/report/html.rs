@@ -90,8 +90,9 @@ fn table(of: &TableBlock) -> String {
         false => format!("<p class=\"caption\">{}</p>\n", inline(caption)),
     };
     format!(
-        "<section class=\"table\" id=\"table-{name}\">\n{caption}<div class=\"scroll\" tabindex=\"0\" role=\"region\" \
-         aria-label=\"{name}\"><table>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}</tbody>\n</table></div>\n{}</section>\n",
+        "<section class=\"table\" id=\"table-{name}\">\n{caption}<div class=\"scroll\" tabindex=\"0\" \
+         role=\"region\" aria-label=\"{name}\"><table>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}</tbody>\n\
+         </table></div>\n{}</section>\n",
         head.collect::<String>(),
         table.rows.iter().map(row).collect::<String>(),
         sources(of)

@@ -3,7 +3,9 @@
 use super::document::{Document, FigureBlock, PageBlock, PictureFile};
 use super::table::Table;
 
-const PREAMBLE: &str = "% pdflatex report.tex, in its own folder. Plots are SVG, and what the page folds away is long: both stand in files.
+const PREAMBLE: &str =
+    "% pdflatex report.tex, in its own folder. Plots are SVG, and what the page folds away is long: \
+                        both are in files.
 \\documentclass[a4paper,landscape]{article}
 \\usepackage[utf8]{inputenc}
 \\usepackage[T1]{fontenc}
@@ -203,8 +205,9 @@ mod tests {
     fn a_table_that_floats_and_one_that_does_not() {
         let mut table = Table::new(&["cell", "ratio"]);
         table.push(vec!["a_b".into(), "21.4 [20.1, 22.8]".into()]);
-        let latex = "\\begin{table}\n\\centering\n\\caption{How fast.}\\label{tab:x}\n\\begin{tabular}{lr}\n  \\toprule\n  \
-                     cell & ratio \\\\\n  \\midrule\n  a\\_b & 21.4 [20.1, 22.8] \\\\\n  \\bottomrule\n\\end{tabular}\n\\end{table}\n";
+        let latex = "\\begin{table}\n\\centering\n\\caption{How fast.}\\label{tab:x}\n\\begin{tabular}{lr}\n  \
+                     \\toprule\n  cell & ratio \\\\\n  \\midrule\n  a\\_b & 21.4 [20.1, 22.8] \\\\\n  \
+                     \\bottomrule\n\\end{tabular}\n\\end{table}\n";
         assert_eq!(to_latex(&table, "x", "How fast."), latex);
         (0..40).for_each(|i| table.push(vec![i.to_string(), "1".into()]));
         let long = to_latex(&table, "x", "How fast.");

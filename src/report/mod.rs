@@ -15,7 +15,7 @@ use crate::verify::verdict::{self, Verdict};
 
 /// Base64, for data URIs.
 mod base64;
-/// What the views are made from.
+/// Input of the views.
 pub mod data;
 /// A page as blocks, in Markdown.
 pub mod document;

@@ -106,9 +106,10 @@ fn claims(data: &ReportData) -> Vec<PageBlock> {
     let failed = verdicts.iter().filter(|v| v.outcome == Outcome::Fail).count();
     let text = format!(
         "{green} of {} comparisons hold, {failed} fail, {} could not be judged. The probability of any false \
-         failure in the verification that judged them is at most {FAMILY_LEVEL:.0e} (Holm). \"detectable\" is the smallest true difference, relative \
-         to the expected value (absolute where that is 0), that its test would have found with 99 % probability. \
-         That the tests find planted defects and hold their levels is measured: docs/verification.md of the program.",
+         failure in the verification that judged them is at most {FAMILY_LEVEL:.0e} (Holm). \"detectable\" is \
+         the smallest true difference, relative to the expected value (absolute where that is 0), that its test \
+         would have found with 99 % probability. That the tests find planted defects and hold their levels is \
+         measured: docs/verification.md of the program.",
         verdicts.len(),
         verdicts.len() - green - failed,
     );
@@ -175,7 +176,8 @@ fn pictures(data: &ReportData) -> Vec<PageBlock> {
 fn measured(data: &ReportData) -> Vec<PageBlock> {
     let record = &data.stored.record;
     let bands: Vec<String> = record.bands.iter().map(|band| band.name.clone()).collect();
-    let text = "Every observable, by class: means over passes; in brackets one standard error in units of the last digit.";
+    let text = "Every observable, by class: means over passes; in brackets one standard error in units of the \
+                last digit.";
     let mut blocks = vec![heading("Measurements")];
     blocks.extend(summary::means(&data.stored, &data.rows).map(PageBlock::Table));
     blocks.push(PageBlock::Text(text.into()));

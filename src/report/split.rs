@@ -22,7 +22,7 @@ const WHITE: f64 = 0.95;
 const WIDE_ENOUGH: usize = 192;
 /// Gap between the halves of a picture, in pixels of the sheet.
 const SEAM: usize = 1;
-/// Gap between pictures.
+/// Gap between pictures, pixels.
 const GAP: usize = 6;
 
 /// A grid of split pictures in the report.
@@ -32,7 +32,7 @@ pub struct SplitFigure {
     pub stem: String,
     /// Estimators, and the labels of the axes that are neither rows nor columns.
     pub title: String,
-    /// The PNG file.
+    /// Bytes of the PNG file.
     pub png: Vec<u8>,
     /// How to read it.
     pub caption: String,

@@ -1,4 +1,5 @@
-//! Tests of split pictures: which half is whose, one white for both, and what is said of the time.
+//! Tests of split pictures: which half is whose, one white for both, and the caption's statement of
+//! times.
 
 use super::*;
 use crate::results::image::decoded;
@@ -92,7 +93,7 @@ fn halves_are_whose_they_should_be_and_share_a_white() {
 }
 
 #[test]
-fn equal_time_is_said_where_it_is_so() {
+fn equal_time_is_stated_where_it_is_true() {
     let (_folder, figures) = write(&grid(|_| 1.0, [2.0, 2.1]), &wanted(None));
     let caption = &figures[0].caption;
     assert!(caption.contains("Equal time") && caption.contains("at most 5.0 %"), "{caption}");
@@ -154,7 +155,7 @@ fn axes_that_are_neither_rows_nor_columns_give_grids() {
 }
 
 #[test]
-fn an_image_that_is_not_there_is_said() {
+fn a_missing_image_is_noted() {
     let mut stored = grid(|_| 1.0, [2.0, 2.0]);
     stored.record.cells[3].runs.truncate(1);
     let (_folder, figures) = write(&stored, &wanted(None));

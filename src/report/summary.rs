@@ -9,8 +9,8 @@ use crate::results::store::Stored;
 use crate::verify::comparisons::EfficiencyRow;
 use crate::verify::model_errors::ModelError;
 
-/// The rows by one measure of cost that stand for a pair of estimators: all classes together, and pixels rather than
-/// their mean. Second arms of one estimator are left out.
+/// The rows by one measure of cost that represent a pair of estimators: all classes together, and pixels
+/// rather than their mean. Second arms of one estimator are left out.
 pub fn chosen<'a>(
     stored: &Stored,
     rows: &'a [EfficiencyRow],
@@ -60,8 +60,8 @@ pub fn efficiency(stored: &Stored, rows: &[EfficiencyRow], cost: CostMeasure) ->
         CostMeasure::Cpu => ("CPU time", "of this machine, one after the other"),
     };
     let mut caption = format!(
-        "Efficiency: A / B is the variance of {what} times {cost} ({how}) of B over that of A; above 1 A is the better. In \
-         brackets the 95 % interval."
+        "Efficiency: A / B is the variance of {what} times {cost} ({how}) of B over that of A; above 1 A is the \
+         better. In brackets the 95 % interval."
     );
     if rows.iter().any(|row| row.quoted().is_some() && !row.resolved) {
         caption += " An asterisk: not resolved, more passes may move the ratio out of its interval.";
@@ -99,7 +99,8 @@ pub fn means(stored: &Stored, rows: &[Measurement]) -> Option<TableBlock> {
         text: with_error(row.mean, row.std_error),
     };
     let caption = format!(
-        "Mean of `{observable}`, all transport classes together; in brackets one standard error in units of the last digit."
+        "Mean of `{observable}`, all transport classes together; in brackets one standard error in units of the \
+         last digit."
     );
     Some(TableBlock::new("means", caption, pivot(stored, &["band"], rows.iter().map(entry).collect())))
 }
@@ -121,8 +122,8 @@ pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> 
     };
     let table = pivot(stored, &["band", "observable"], rows.iter().map(entry).collect());
     let mut caption = format!(
-        "What the mean of each model is off by, per cent of that of `{truth}`, which is light transport itself. In brackets \
-         the 95 % interval."
+        "Error of each model's mean, per cent of that of `{truth}`, which is light transport itself. \
+         In brackets the 95 % interval."
     );
     if rows.iter().any(|row| !row.note.is_empty()) {
         caption += " An asterisk: the interval is not to be trusted, for the reason that model_errors.csv gives.";
@@ -211,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn no_ratio_is_said_to_be_none() {
+    fn a_missing_ratio_is_shown_as_missing() {
         let mut stored = sample::stored(0.1);
         sample::set_observables(&mut stored, "snee", |i, _, band| {
             let off = if band == 0 { 0.3 } else { 0.0 };

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Puts `bytes` at `path`. On failure what stood there before is untouched and nothing else is left.
+/// Puts `bytes` at `path`. On failure an earlier file is untouched and nothing else is left.
 /// `doing` completes the sentence "could not ..".
 pub fn write(path: &Path, bytes: &[u8], doing: &str) -> Result<()> {
     write_with(path, doing, |file| file.write_all(bytes))

@@ -1,4 +1,4 @@
-//! A sheet of 8-bit sRGB values on which pictures are painted side by side.
+//! A canvas of 8-bit sRGB values on which pictures are painted side by side.
 
 use std::ops::Range;
 
@@ -23,14 +23,14 @@ pub struct Unshown {
 }
 
 impl Canvas {
-    /// White.
+    /// A white canvas, width by height in pixels.
     pub fn new(width: usize, height: usize) -> Canvas {
         Canvas { width, height, data: vec![255; 3 * width * height] }
     }
 
     /// Paints the columns `columns` of a picture, radiance times `gain`, every pixel as a square of
-    /// `zoom` by `zoom`, with its top left corner at `(x, y)`. What lies beyond the sheet is not
-    /// painted.
+    /// `zoom` by `zoom`, with its top left corner at `(x, y)`. What lies beyond the canvas is
+    /// not painted.
     pub fn paint(
         &mut self,
         picture: &Picture,
@@ -62,7 +62,7 @@ impl Canvas {
     /// The file.
     ///
     /// # Errors
-    /// A sheet without pixels.
+    /// A canvas without pixels.
     pub fn to_png(&self) -> Result<Vec<u8>> {
         encoded(self.width, self.height, &self.data)
     }
@@ -88,7 +88,7 @@ mod tests {
         assert_eq!(at(3, 1), show([0.4, 0.5, 0.0], 1.5).bytes);
         assert_eq!(at(4, 4), [255, 255, 0]);
         assert!([at(0, 0), at(5, 1), at(0, 4)].iter().all(|pixel| *pixel == [255; 3]), "paper");
-        // Beyond the sheet.
+        // Beyond the canvas.
         canvas.paint(&picture, 0..3, 1.0, 4, (3, 3));
         assert_eq!(canvas.data.len(), 3 * 6 * 5);
     }

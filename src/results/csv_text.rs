@@ -19,8 +19,8 @@ pub fn to_text(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> 
     String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
 }
 
-/// Structs as CSV text: the columns are the fields, in their order, with their names. What is absent or not
-/// a number is an empty field.
+/// Structs as CSV text: the columns are the fields, in their order, with their names. What is absent or
+/// not a number is an empty field.
 pub fn table<T: Serialize + Default>(rows: &[T]) -> String {
     let fields = |row: &T| {
         let mut fields = Fields::default();
@@ -31,8 +31,8 @@ pub fn table<T: Serialize + Default>(rows: &[T]) -> String {
     to_text(&fields(&T::default()).names, rows.iter().map(|row| fields(row).texts))
 }
 
-/// The shortest text that reads back as the same number; empty for NaN. `csv`'s own serializer would write
-/// small numbers with many zeros.
+/// The shortest text that reads back as the same number; empty for NaN. `csv`'s own serializer would
+/// write small numbers with many zeros.
 pub fn number(x: f64) -> String {
     if x.is_nan() { String::new() } else { format!("{x:?}") }
 }
@@ -86,7 +86,7 @@ macro_rules! displayed {
     };
 }
 
-/// What is no field of a row.
+/// An error: not a field of a row.
 macro_rules! refused {
     ($($method:ident($($argument:ty),*) -> $result:ty;)*) => {
         $(fn $method(self, $(_: $argument),*) -> Result<$result, fmt::Error> {

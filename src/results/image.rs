@@ -64,9 +64,9 @@ impl<'a> Picture<'a> {
 /// A tone-mapped image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Png {
-    /// The file.
+    /// Bytes of the PNG file.
     pub bytes: Vec<u8>,
-    /// Pixels with a channel above 1 after exposure, shown as 1: brighter than the picture can say.
+    /// Pixels with a channel above 1 after exposure, shown as 1: brighter than the picture can show.
     pub clipped: usize,
     /// Pixels with a channel below 0 (outside the sRGB gamut) or not finite; negatives and NaN show as
     /// 0.
@@ -95,7 +95,7 @@ pub fn gain(exposure_stops: f64) -> f64 {
 
 /// A pixel on a display.
 pub(super) struct Shown {
-    /// sRGB.
+    /// Colour as sRGB bytes.
     pub bytes: [u8; 3],
     /// A channel above 1 is shown as 1.
     pub clipped: bool,
@@ -126,7 +126,7 @@ pub(super) fn encoded(width: usize, height: usize, data: &[u8]) -> Result<Vec<u8
     encode((width, height), png::ColorType::Rgb, data, set)
 }
 
-/// Writes the PNG and says what it could not show.
+/// Writes the PNG and returns what it could not show.
 pub fn write_png(path: &Path, picture: &Picture, exposure_stops: f64) -> Result<Png> {
     let png = to_png(picture, exposure_stops)?;
     atomic::write(path, &png.bytes, "write the picture")?;
@@ -223,7 +223,7 @@ fn srgb_transfer(x: f64) -> f64 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * math::pow(x, 1.0 / 2.4) - 0.055 }
 }
 
-/// Width, height and values of a PNG file, which says that they are sRGB.
+/// Width, height and values of a PNG file, which is marked as sRGB.
 #[cfg(test)]
 pub(crate) fn decoded(bytes: &[u8]) -> (usize, usize, Vec<u8>) {
     let (is_srgb, decoded) = decoded_plane(bytes);
@@ -231,7 +231,7 @@ pub(crate) fn decoded(bytes: &[u8]) -> (usize, usize, Vec<u8>) {
     decoded
 }
 
-/// The same of any PNG file, and whether it says that they are sRGB.
+/// The same of any PNG file, and whether it is marked as sRGB.
 #[cfg(test)]
 pub(crate) fn decoded_plane(bytes: &[u8]) -> (bool, (usize, usize, Vec<u8>)) {
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().expect("a PNG");

@@ -15,7 +15,7 @@ pub fn canonical(value: &impl Serialize) -> String {
     format!("{value:#}\n")
 }
 
-/// blake3 of bytes.
+/// blake3 hash of `bytes`.
 pub fn hash_bytes(bytes: &[u8]) -> [u8; 32] {
     *blake3::hash(bytes).as_bytes()
 }

@@ -1,6 +1,6 @@
-//! `manifest.json`: what remains of a result where its arrays are not kept. It holds the passes of every
-//! run, for `run --passes-of`; the hash of every array, to tell whether a re-run reproduces it; and the
-//! hash of every table, plot and picture, so that one changed by hand is found.
+//! `manifest.json`: the summary of a result that is kept without its arrays. It holds the passes of
+//! every run, for `run --passes-of`; the hash of every array, to tell whether a re-run reproduces it;
+//! and the hash of every table, plot and picture, so that one changed by hand is found.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,10 +16,10 @@ use crate::error::{Error, Result};
 /// The file's name in a results folder.
 pub const MANIFEST: &str = "manifest.json";
 
-/// Version of this layout; a reader refuses others. A new layout of records is no new one of manifests.
+/// Version of this layout; a reader refuses others. A new layout of records does not change it.
 const VERSION: u32 = 1;
 
-/// Folders of views, and the form of each that is for people.
+/// Folders of views, and the file type of each that is hashed.
 const VIEWS: [(&str, &str); 3] = [("images", "png"), ("plots", "svg"), ("tables", "md")];
 
 /// A result without its arrays.
@@ -56,7 +56,7 @@ pub struct ManifestRun {
 }
 
 impl Manifest {
-    /// What a record holds, without hashes of views.
+    /// The manifest of a record, without hashes of views.
     pub fn of(record: &Record) -> Manifest {
         let cells = record.cells.iter().enumerate();
         let runs = cells.flat_map(|(index, cell)| {
@@ -96,7 +96,7 @@ fn arrays(record: &Record, run: &EstimatorRun) -> BTreeMap<String, String> {
 }
 
 impl RecordFolder {
-    /// Writes `manifest.json` of a record and of the views that stand beside it.
+    /// Writes `manifest.json` of a record and of the views beside it.
     pub fn write_manifest(&self, record: &Record) -> Result<()> {
         let mut manifest = Manifest::of(record);
         for (folder, extension) in VIEWS {
@@ -105,10 +105,10 @@ impl RecordFolder {
         self.write_view(MANIFEST, canonical(&manifest).as_bytes())
     }
 
-    /// What the record here says of itself, or where there is none `manifest.json`.
+    /// The manifest of the record here, or `manifest.json` where there is none.
     ///
     /// # Errors
-    /// Neither is there, or what is there is damaged or of another version.
+    /// Neither exists, or it is damaged or of another version.
     pub fn manifest(&self) -> Result<Manifest> {
         let path = self.root().join(MANIFEST);
         if self.exists() || !path.exists() {
@@ -152,7 +152,7 @@ mod tests {
     use crate::results::sample;
 
     #[test]
-    fn a_manifest_stands_for_a_record_that_is_gone() {
+    fn a_manifest_replaces_a_missing_record() {
         let temp = tempfile::tempdir().expect("a folder");
         let folder = RecordFolder::new(temp.path().join("sample"));
         let told = folder.manifest().expect_err("nothing is there").to_string();

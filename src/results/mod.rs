@@ -3,7 +3,7 @@
 
 /// Files that are there whole or not at all.
 pub mod atomic;
-/// A sheet of pictures.
+/// A canvas for pictures.
 pub mod canvas;
 /// Comma-separated text.
 pub mod csv_text;
@@ -13,24 +13,24 @@ pub mod exr_file;
 pub mod image;
 /// Canonical JSON and content hashes.
 pub mod json;
-/// What of a result is kept where its arrays are not.
+/// The summary of a result that is kept without its arrays.
 pub mod manifest;
 /// The table of everything that was measured.
 pub mod measurements;
 /// NumPy's array files.
 pub mod npy;
-/// What pictures an experiment asks for.
+/// Pictures that an experiment asks for.
 pub mod pictures;
-/// What built and ran it.
+/// Build and machine of a run.
 pub mod provenance;
 /// The record's layout.
 pub mod record;
 /// A small made-up record.
 #[cfg(test)]
 pub mod sample;
-/// What a record holds of samplers.
+/// Samplers in a record.
 pub mod sampler;
 /// A record's folder.
 pub mod store;
-/// What it cost in time.
+/// Times of a run.
 pub mod timing;

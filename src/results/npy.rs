@@ -11,7 +11,7 @@ const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
 pub struct Array {
     /// Lengths of the axes.
     pub shape: Vec<usize>,
-    /// The elements.
+    /// Elements in C order.
     pub data: Vec<f64>,
 }
 

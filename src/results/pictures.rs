@@ -1,5 +1,5 @@
-//! `pictures.json`: the pictures that an experiment asks for beside those of every run. It stands beside
-//! the record and not in it: how a record is shown changes none of its bits.
+//! `pictures.json`: the pictures that an experiment asks for beside those of every run. It is stored
+//! beside the record and not in it: how a record is shown changes none of its bits.
 
 use serde::{Deserialize, Serialize};
 
@@ -36,10 +36,10 @@ pub struct Split {
 pub struct Running {
     /// The estimators, or all.
     pub estimators: Option<Vec<String>>,
-    /// The observable; the sensor's first one without it.
+    /// The observable; the sensor's first by default.
     pub observable: Option<String>,
-    /// The transport class.
+    /// Transport class that is shown.
     pub class: String,
-    /// The band.
+    /// Band that is shown.
     pub band: String,
 }

@@ -1,4 +1,4 @@
-//! What built and ran it.
+//! Build and machine of a run.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,23 +16,23 @@ pub const NUMERICAL_VERSION: u32 = 3;
 /// The crates whose arithmetic enters a stored number.
 const NUMERICAL_CRATES: [&str; 4] = ["libm", "rand_pcg", "glam", "obvhs"];
 
-/// The crates that a reader of results may ask about.
+/// Further crates whose versions are reported.
 const NOTED_CRATES: [&str; 10] =
     ["blake3", "exr", "glam", "libm", "obvhs", "png", "rand_pcg", "serde_json", "statrs", "tobj"];
 
 const LOCK: &str = include_str!("../../Cargo.lock");
 
-/// `provenance.json`.
+/// Content of `provenance.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
     /// This crate's version.
     pub version: String,
-    /// What fixes the bits.
+    /// Fingerprint of what fixes the bits.
     pub fingerprint: String,
-    /// blake3 of the program itself, hex: what another build has left is not gone on with.
+    /// blake3 of the program itself, hex: the states of another build are not resumed.
     pub build: String,
-    /// Commit of the source tree the program was built from, as it stood when it ran.
+    /// Commit of the source tree the program was built from, as it was when it ran.
     pub commit: Option<String>,
     /// True where that tree had uncommitted changes.
     pub dirty: Option<bool>,
@@ -46,7 +46,7 @@ pub struct Provenance {
     pub target_features: Vec<String>,
     /// The processor's name.
     pub cpu: String,
-    /// Worker threads.
+    /// Number of worker threads.
     pub threads: usize,
     /// When the run ended, UTC, ISO 8601.
     pub date: String,
@@ -110,7 +110,7 @@ pub fn fingerprint() -> String {
 /// Version of a crate that this one depends on; `absent` where the lock file does not have it.
 ///
 /// Where the lock file holds several versions, this package's own entry names the one it uses
-/// (`"glam 0.34.2"`); otherwise that entry says `"libm"` and there is one to find.
+/// (`"glam 0.34.2"`); otherwise that entry is `"libm"` and there is one to find.
 fn locked_version(name: &str) -> &'static str {
     let after = |text: &'static str, mark: String| text.split_once(&mark).map(|(_, rest)| rest);
     let own = after(LOCK, format!("name = \"{}\"\n", env!("CARGO_PKG_NAME")));
@@ -132,7 +132,7 @@ fn checkout(folder: &Path) -> (Option<String>, Option<bool>) {
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_string())
     };
     let commit = git(&["rev-parse", "HEAD"]);
-    // What runs write makes no other program.
+    // The output of runs does not change the program.
     let changes = ["status", "--porcelain", "--untracked-files=no", "--", ".", ":(exclude)results"];
     let status = commit.as_ref().and_then(|_| git(&changes));
     (commit, status.map(|s| !s.is_empty()))

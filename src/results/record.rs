@@ -10,7 +10,7 @@ use super::sampler::SamplerRun;
 /// Version of this layout; a reader refuses others.
 pub const SCHEMA_VERSION: u32 = 4;
 
-/// `record.json`: everything but the arrays, which stand in `.npy` files beside it.
+/// `record.json`: everything except the arrays, which are in `.npy` files beside it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
@@ -30,30 +30,30 @@ pub struct Record {
     pub claims_hash: String,
     /// The claims as the file states them.
     pub claims: serde_json::Value,
-    /// What verification needs of each of `claims`, in their order.
+    /// Statement of each of `claims`, in their order.
     pub statements: Vec<Claim>,
-    /// Indices of claims that were changed or added when passes had already been played: they are not
+    /// Indices of claims that were changed or added when passes had already been run: they are not
     /// evidence.
     pub post_hoc: Vec<usize>,
-    /// The claims expanded over cells, bands and tables, with the values they are held against.
+    /// The claims expanded over cells, bands and tables, with the values they are compared with.
     pub comparisons: Vec<Comparison>,
     /// The claims on samplers expanded: one entry for each sampler that a claim speaks of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sampler_comparisons: Vec<SamplerComparison>,
-    /// What `reproduces` claims had played again.
+    /// Passes run again for `reproduces` claims.
     pub replays: Vec<Replay>,
     /// The bands, in the order of every array's band axis.
     pub bands: Vec<Band>,
     /// The cells in the order of the sweep.
     pub cells: Vec<Cell>,
-    /// What was drawn from each sampler.
+    /// Counts of each sampler.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub samplers: Vec<SamplerRun>,
     /// blake3 of every array file, hex, by its path relative to the record's folder.
     pub checksums: BTreeMap<String, String>,
 }
 
-/// The first passes of one measurement, played again.
+/// The first passes of one measurement, run again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Replay {
@@ -61,11 +61,11 @@ pub struct Replay {
     pub cell: usize,
     /// Estimator name.
     pub estimator: String,
-    /// Passes that were played again.
+    /// Passes that were run again.
     pub passes: u64,
     /// blake3 of their moments as recorded, hex.
     pub recorded: String,
-    /// blake3 of their moments as replayed, hex.
+    /// blake3 of the moments of the second run, hex.
     pub replayed: String,
 }
 
@@ -93,12 +93,13 @@ pub struct Cell {
     pub content_hash: String,
     /// The regions of the sensor, after which observables are named.
     pub regions: Vec<ObservedRegion>,
-    /// What each estimator measured here.
+    /// Measurement of each estimator in this cell.
     pub runs: Vec<EstimatorRun>,
 }
 
 impl Cell {
-    /// The region that an observable measures with all lights together; none for one light's share of a region.
+    /// The region that an observable measures with all lights together; none for one light's share of a
+    /// region.
     pub fn region_of(&self, observable: &Observable) -> Option<&ObservedRegion> {
         self.regions.iter().find(|region| region.name == observable.name)
     }
@@ -110,7 +111,8 @@ impl Cell {
 pub struct ObservedRegion {
     /// The name of its observables; that of one light's share has `@light` appended.
     pub name: String,
-    /// Which part of an image it is the mean of; none where that is the whole, or where there is no image.
+    /// Which part of an image it is the mean of; none where that is the whole, or where there is no
+    /// image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tile: Option<Tile>,
 }
@@ -146,7 +148,7 @@ pub struct EstimatorRun {
     pub control_of: Option<String>,
     /// Its kind, as `path`.
     pub kind: String,
-    /// What it promises of its mean.
+    /// How its mean is related to the integral.
     pub bias: StatedBias,
     /// The model whose integral it estimates; none where it is light transport itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -154,7 +156,7 @@ pub struct EstimatorRun {
     /// Where its mean is known beforehand to be far from normal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub heavy_tails: Vec<StatedTail>,
-    /// What a reader must know (a transport that it cannot sample).
+    /// Notes for the reader, such as transport that it cannot sample.
     pub notes: Vec<String>,
     /// Number of independent passes.
     pub passes: u64,
@@ -170,7 +172,7 @@ pub struct EstimatorRun {
     pub image: Option<Image>,
     /// Deterministic counts of work done, summed over bands and passes.
     pub cost: BTreeMap<String, u64>,
-    /// Counts of what must not go unseen, by name (`nonfinite`, `lost_ray`, `wrong_side`).
+    /// Counts of anomalies, by name (`nonfinite`, `lost_ray`, `wrong_side`).
     pub anomalies: BTreeMap<String, u64>,
 }
 
@@ -182,11 +184,11 @@ pub struct StatedTail {
     pub band: usize,
     /// In this class, and in `all`.
     pub class: String,
-    /// Why.
+    /// Why the mean has no valid interval.
     pub reason: String,
 }
 
-/// What an estimator promises of its mean.
+/// How an estimator's mean is related to the integral.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StatedBias {
@@ -209,8 +211,9 @@ pub struct Observable {
     pub class: String,
 }
 
-/// The observable of claims of efficiency that stands for all pixels at once: its variance is that of a
-/// pixel, averaged over the pixels. It has no mean; that of the sensor's first observable stands for it.
+/// The observable of claims of efficiency that denotes all pixels at once: its variance is that of a
+/// pixel, averaged over the pixels. It has no mean; that of the sensor's first observable is reported
+/// for it.
 pub const PIXELS: &str = "pixels";
 
 impl Observable {
@@ -219,7 +222,7 @@ impl Observable {
         Observable { name: PIXELS.into(), class: "all".into() }
     }
 
-    /// Is it [`Observable::pixels`]?
+    /// Whether this is [`Observable::pixels`].
     pub fn is_pixels(&self) -> bool {
         self.name == PIXELS
     }
@@ -250,19 +253,19 @@ pub struct Quantity {
     pub cell: usize,
     /// Estimator name.
     pub estimator: String,
-    /// The observable.
+    /// Observable that is measured.
     pub observable: Observable,
     /// Index into [`Record::bands`].
     pub band: usize,
 }
 
-/// What a claim says of itself.
+/// What a claim states.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Claim {
     /// Its name, or its kind and place in the file.
     pub label: String,
-    /// What it states.
+    /// Kind of statement.
     pub kind: ClaimKind,
     /// The outcome that makes it green.
     pub expects: ExpectedOutcome,
@@ -270,7 +273,7 @@ pub struct Claim {
     pub each: bool,
 }
 
-/// Kinds of claims.
+/// Kinds of statements that claims make.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ClaimKind {
@@ -280,7 +283,7 @@ pub enum ClaimKind {
     Agree,
     /// Two measurements differ.
     Differs,
-    /// The record comes out again, bit for bit.
+    /// The record is reproduced bit for bit.
     Reproduces {
         /// The checksum that the record's numbers must have.
         numbers: Option<String>,
@@ -308,7 +311,7 @@ impl ClaimKind {
     }
 }
 
-/// The outcome that makes a claim green; any but a pass makes it a control.
+/// The outcome that makes a claim green; any except a pass makes it a control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExpectedOutcome {
@@ -342,21 +345,21 @@ pub struct Comparison {
     pub claim: usize,
     /// The number under test.
     pub quantity: Quantity,
-    /// What it is held against.
+    /// What it is compared with.
     pub against: Against,
     /// The largest relative defect that may go unseen; a coarser test is underpowered.
     pub detect: Option<f64>,
 }
 
-/// What a quantity is held against.
+/// What a quantity is compared with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Against {
     /// A published or computed value with its stated error (one standard error; 0 = exact).
     Value {
-        /// The expected value.
+        /// Expected value.
         value: f64,
-        /// Its stated error.
+        /// Stated error of the expected value.
         error: f64,
         /// Where it comes from.
         source: String,
@@ -365,7 +368,7 @@ pub enum Against {
     Quantity {
         /// The other quantity.
         other: Quantity,
-        /// True where both were played on the same random streams, pass by pass.
+        /// True where both were run on the same random streams, pass by pass.
         paired: bool,
     },
     /// Another estimator of the same integral, by efficiency: the baseline's variance times cost over
@@ -375,12 +378,12 @@ pub enum Against {
         baseline: Quantity,
         /// The bound of the ratio.
         exceeds: f64,
-        /// What costs.
+        /// Measure of cost.
         cost: CostMeasure,
     },
 }
 
-/// What an estimator's work is measured by.
+/// Measure of an estimator's work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CostMeasure {

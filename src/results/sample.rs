@@ -55,7 +55,7 @@ pub fn quantity(estimator: &str, band: usize) -> Quantity {
     Quantity { cell: 0, estimator: estimator.into(), observable, band }
 }
 
-/// Replaces an estimator's moments by what `score(pass, observable, band)` says.
+/// Replaces an estimator's moments by `score(pass, observable, band)`.
 pub fn set_observables(stored: &mut Stored, estimator: &str, score: impl Fn(u64, usize, usize) -> f64) {
     let path = observables_path(0, index_of(stored, estimator));
     stored.arrays.insert(path, moments(PASSES, score));
@@ -71,7 +71,7 @@ pub fn pairs(noise: f64, first: u64) -> impl Fn(u64, usize) -> f64 {
     }
 }
 
-/// Replaces the spread of an estimator's pixels by what `spread(pair, band)` says.
+/// Replaces the spread of an estimator's pixels by `spread(pair, band)`.
 pub fn set_spread(stored: &mut Stored, estimator: &str, spread: impl Fn(u64, usize) -> f64) {
     let run = index_of(stored, estimator);
     set_spread_of(&mut stored.arrays, run, spread);
@@ -141,7 +141,7 @@ pub fn claim(name: &str, kind: ClaimKind) -> Claim {
     Claim { label: name.into(), kind, expects: ExpectedOutcome::Pass, each: false }
 }
 
-/// A record whose estimator `mis`, band 0, is held against exact values, each a claim with a name.
+/// A record whose estimator `mis`, band 0, is compared with exact values, each a claim with a name.
 pub fn judged(claims: &[(&str, f64)]) -> Stored {
     let mut stored = stored(0.1);
     stored.record.statements = claims.iter().map(|(name, _)| claim(name, ClaimKind::Equals)).collect();

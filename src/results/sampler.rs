@@ -1,4 +1,4 @@
-//! What a record holds of samplers: counts, and the masses that their densities give the same bins.
+//! Samplers in a record: counts, and the masses of the same bins under their densities.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct SamplerRun {
     /// The name the experiment gives it.
     pub sampler: String,
-    /// Its kind.
+    /// Kind of the sampler.
     pub kind: String,
     /// Number of draws.
     pub samples: u64,
@@ -54,23 +54,23 @@ pub const OWN_DENSITY: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Delta {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its probability.
+    /// Probability of the outcome.
     pub mass: f64,
-    /// Draws of it.
+    /// Number of draws with this outcome.
     pub observed: u64,
-    /// Those whose value was not what it has to be.
+    /// Draws whose value was not the stated one.
     pub inexact: u64,
 }
 
-/// How often a sampler returns nothing.
+/// Probability that a sampler returns no sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NullMass {
-    /// Never.
+    /// The event has probability zero.
     Never,
-    /// With this probability.
+    /// The event has this probability.
     Stated(f64),
     /// With what the densities leave of 1.
     Remainder,
@@ -80,7 +80,7 @@ pub enum NullMass {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ContrastRun {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Count, mean, and the sums of second, third and fourth powers of deviations from the mean.
     pub moments: [f64; 5],
@@ -90,7 +90,7 @@ pub struct ContrastRun {
     pub bound: f64,
 }
 
-/// Where the bins of sampler number `index` stand, relative to the record's folder.
+/// Path of the bins of sampler number `index`, relative to the record's folder.
 pub fn bins_path(index: usize, which: &str) -> String {
     format!("samplers/{index:03}.{which}.npy")
 }

@@ -1,7 +1,7 @@
 //! A record's folder, `results/<experiment>/`:
 //!
 //! ```text
-//! record/record.json              everything but the arrays (see results::record)
+//! record/record.json              everything except the arrays (see results::record)
 //! record/record.json.b3           its hash, as b3sum writes and checks it
 //! record/cells/<CELL>/<RUN>.observables.npy, .costs.npy, .pixels.npy, .spread.npy
 //! record/samplers/<NNN>.coarse.npy, .fine.npy, .serial.npy
@@ -31,31 +31,31 @@ pub type Arrays = BTreeMap<String, Array>;
 /// A record with its arrays.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stored {
-    /// The record.
+    /// Content of `record.json`.
     pub record: Record,
-    /// Its arrays.
+    /// Arrays of the record.
     pub arrays: Arrays,
-    /// What it cost in time, where that was measured; no part of the record, and nothing guards it.
+    /// Times, where they were measured; not part of the record, without a checksum.
     pub timing: Option<Timing>,
 }
 
-/// Where a run's moments of the observables stand, relative to the record's folder: `run` is its index
+/// Path of a run's moments of the observables, relative to the record's folder: `run` is its index
 /// among the cell's runs. Files are numbered, so that no name is ever a path.
 pub fn observables_path(cell: usize, run: usize) -> String {
     array_path(cell, run, "observables")
 }
 
-/// Where a run's counts of work stand.
+/// Path of a run's counts of work.
 pub fn costs_path(cell: usize, run: usize) -> String {
     array_path(cell, run, "costs")
 }
 
-/// Where a run's pixels stand.
+/// Path of a run's pixels.
 pub fn pixels_path(cell: usize, run: usize) -> String {
     array_path(cell, run, "pixels")
 }
 
-/// Where the spread of a run's pixels stands.
+/// Path of the spread of a run's pixels.
 pub fn spread_path(cell: usize, run: usize) -> String {
     array_path(cell, run, "spread")
 }
@@ -105,7 +105,7 @@ impl Stored {
         (band < bands).then(|| (0..batches).map(row).collect())
     }
 
-    /// The bins that stand at `path`.
+    /// The bins stored at `path`.
     pub fn bins(&self, path: &str) -> Option<Bins<'_>> {
         let array = self.arrays.get(path)?;
         let n = array.data.len() / 3;
@@ -113,7 +113,7 @@ impl Stored {
         (array.shape.first() == Some(&3)).then(|| Bins { observed: row(0), mass: row(1), bound: row(2) })
     }
 
-    /// What does not fit together, as a sentence.
+    /// The first inconsistency of the record, as a sentence.
     fn defect(&self) -> Option<String> {
         let bands = self.record.bands.len();
         for run in self.record.cells.iter().flat_map(|cell| &cell.runs) {
@@ -150,7 +150,7 @@ impl Stored {
 /// Bins of a run: one row each of what was counted, masses, bounds.
 #[derive(Clone, Copy, Debug)]
 pub struct Bins<'a> {
-    /// Draws, or pairs.
+    /// Number of draws, or of pairs, in each bin.
     pub observed: &'a [f64],
     /// Masses, which sum to 1 where the density is one.
     pub mass: &'a [f64],
@@ -158,7 +158,7 @@ pub struct Bins<'a> {
     pub bound: &'a [f64],
 }
 
-/// What does not fit together in the record of a sampler, as a sentence.
+/// The first inconsistency in the record of a sampler, as a sentence.
 fn sampler_defect(record: &Record, arrays: &Arrays) -> Option<String> {
     record.samplers.iter().find_map(|run| {
         let paths = [Some(&run.coarse), run.fine.as_ref(), run.serial.as_ref()];
@@ -239,7 +239,7 @@ impl RecordFolder {
         }
     }
 
-    /// Where the second look at this record stands.
+    /// Folder of the second look at this record.
     pub fn retest(&self) -> RecordFolder {
         RecordFolder::new(self.root.join("retest"))
     }
@@ -391,7 +391,7 @@ fn read_record(path: &Path) -> Result<Record> {
     let bytes = fs::read(path).map_err(Error::io(path, "read the record"))?;
     let value: serde_json::Value = serde_json::from_slice(&bytes)
         .map_err(|e| Error::record(path, format!("truncated or not JSON ({e}); run it again")))?;
-    // The version first: another version's layout and hash say nothing to this program.
+    // The version first: another version's layout and hash mean nothing to this program.
     let version = value.get("schema_version").and_then(|v| v.as_u64());
     if version != Some(u64::from(SCHEMA_VERSION)) {
         let found = version.map_or("none".to_string(), |v| v.to_string());

@@ -1,4 +1,4 @@
-//! What it cost in time: measured, kept apart from the record, and never byte-identical.
+//! Times of a run: measured, kept apart from the record, and never byte-identical.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub struct Timing {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Batches {
-    /// Number of processes that played them: more than one where a run was stopped and went on.
+    /// Number of processes that ran them: more than one where a run was stopped and resumed.
     pub processes: u64,
     /// CPU seconds of a batch.
     pub cpu_seconds: Vec<f64>,
@@ -62,7 +62,7 @@ impl Timing {
         self.batches.get(cell)?.get(estimator)
     }
 
-    /// What was measured of one estimator in one cell.
+    /// Times of one estimator in one cell.
     pub fn of(&self, cell: &str, estimator: &str) -> Option<&Cost> {
         self.cells.get(cell)?.get(estimator)
     }

@@ -1,4 +1,4 @@
-//! From what jobs gave to the record, its arrays, and the timing.
+//! From the results of jobs to the record, its arrays, and the timing.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,9 +27,9 @@ use crate::scene::sensor::{PixelRectangle, SensorRegion};
 pub struct Assembled {
     /// The record; checksums are filled in when it is written.
     pub record: Record,
-    /// Its arrays.
+    /// Arrays of the record.
     pub arrays: Arrays,
-    /// What it cost.
+    /// Seconds and processes, `timing.json`.
     pub timing: Timing,
 }
 
@@ -43,7 +43,7 @@ pub fn claim_hashes(experiment: &Experiment) -> Vec<String> {
     experiment.file.claim.iter().map(hash_json).collect()
 }
 
-/// Puts what a plan's jobs measured into a record.
+/// Assembles the measurements of a plan's jobs into a record.
 pub fn assemble(
     experiment: &Experiment,
     plan: &Plan,

@@ -1,8 +1,8 @@
-//! States of jobs on disk, so that a run goes on where it was stopped and nothing is computed twice.
+//! States of jobs on disk, so that a run resumes where it was stopped and nothing is computed twice.
 //!
 //! One file a job, named by its identity: a header in JSON, the numbers as little-endian f64, and a
-//! blake3 of both. A file that does not fit (another job, truncated, damaged) is as good as none. A
-//! state holds what a larger budget goes on from and which claims stood before the first pass: of an
+//! blake3 of both. A file that does not fit (another job, truncated, damaged) is ignored. A
+//! state holds what a larger budget resumes from and which claims were made before the first pass: of an
 //! estimator at most 128 batches of 40 bytes per observable and band, and an image of 16 bytes per pixel
 //! and band for each bit that is set in the number of passes; of a sampler its counts.
 
@@ -23,7 +23,7 @@ use crate::results::store::RecordFolder;
 use crate::results::timing::Cost;
 use crate::stats::moments::{ImageMoments, Moments};
 
-/// What stands before the numbers of a state.
+/// The header of a state, before its numbers.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Header<T> {
@@ -80,8 +80,8 @@ pub fn prepare(root: &Path) -> Result<()> {
     atomic::sweep(&folder(root))
 }
 
-/// The record is complete: no larger budget goes on from the states of jobs other than these. Of those
-/// remains what stood before their first pass, because their passes were seen.
+/// The record is complete: a larger budget resumes from no states of jobs other than these. Of those
+/// the claims made before their first pass are kept, because their passes were seen.
 pub fn reduce_others<'a>(root: &Path, identities: impl Iterator<Item = &'a str>) -> Result<()> {
     let kept: Vec<String> = identities.map(name).collect();
     let folder = folder(root);
@@ -131,8 +131,8 @@ fn read<T: DeserializeOwned>(path: &Path) -> Option<(Header<T>, Vec<f64>)> {
     Some((header, numbers))
 }
 
-/// What stood before the first passes or draws of a job's state, whether or not the job can go on from
-/// it: they were seen.
+/// The claims made before the first passes or draws of a job's state, whether or not the job can resume
+/// from it: they were seen.
 pub fn start(path: &Path, identity: &str) -> Option<Start> {
     load::<IgnoredAny>(path, identity).map(|(header, _)| header.start)
 }
@@ -260,7 +260,7 @@ mod tests {
         let path = folder.path().join("a.state");
         let block = block(13, 2);
         save_passes(&path, "me", &Start::default(), &block).expect("saved");
-        // How many bands an image has is said by what runs next.
+        // How many bands an image has is known from the next run.
         assert_eq!(load_passes(&path, "me", 2), Some(Block { bands: 0, ..block.clone() }));
         assert!(load_passes(&path, "you", 2).is_none(), "another job");
         assert!(load_passes(&path, "me", 1).is_none(), "coarser than asked");

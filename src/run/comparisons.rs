@@ -1,5 +1,5 @@
-//! Claims expanded: every elementary statement, with the value that it is held against. Expected values
-//! come into the record here, so that verification needs nothing but the record.
+//! Claims expanded: every elementary statement, with the value that it is compared with. Expected values
+//! come into the record here, so that verification needs only the record.
 
 use std::collections::BTreeMap;
 
@@ -50,7 +50,7 @@ pub fn expand_samplers(claims: &[ClaimEntry], drawn: &[SamplerRun]) -> Vec<Sampl
     claims.flat_map(of_claim).collect()
 }
 
-/// What claims say of themselves.
+/// The statements that claims make.
 pub fn statements(claims: &[ClaimEntry]) -> Vec<Claim> {
     let of_claim = |(index, entry): (usize, &ClaimEntry)| {
         let each = |word: &Option<String>| word.as_deref() == Some(EACH);
@@ -93,7 +93,7 @@ fn statement(
     Claim { label, kind, expects, each }
 }
 
-/// What `agree` and `differs` have in common.
+/// Fields that `agree` and `differs` share.
 struct Pairs<'a> {
     estimators: &'a [String],
     across: Option<&'a String>,
@@ -353,7 +353,7 @@ impl Scope<'_> {
     }
 }
 
-/// Is the cell one of those that a claim's `where` chooses?
+/// Whether a claim's `where` chooses the cell.
 pub(super) fn is_in(cell: &CellSpec, only: &BTreeMap<String, String>) -> bool {
     only.iter().all(|(axis, label)| cell.axes.get(axis) == Some(label))
 }

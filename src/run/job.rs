@@ -1,5 +1,5 @@
-//! Units of work: an estimator in a cell, or a sampler; and the passes of an estimator with what they
-//! leave.
+//! Units of work: an estimator in a cell, or a sampler; and the passes of an estimator with their
+//! results.
 
 use std::time::Instant;
 
@@ -15,16 +15,16 @@ use crate::stats::tree::{Counter, Merge};
 
 /// One unit of work.
 pub struct Job {
-    /// What people call it: cell and estimator, or the sampler.
+    /// Label in messages: cell and estimator, or the sampler.
     pub label: String,
     /// Hash of all that its result depends on except the number of passes, hex: its state is kept under
     /// it.
     pub identity: String,
-    /// What is to be done.
+    /// The task.
     pub task: Task,
 }
 
-/// What a job does.
+/// Task of a job.
 pub enum Task {
     /// Runs passes of an estimator in a cell.
     Estimate(Box<Passes>),
@@ -33,7 +33,7 @@ pub enum Task {
 }
 
 impl Job {
-    /// Its passes, where it is of an estimator.
+    /// The passes, where the job is of an estimator.
     pub fn passes(&self) -> Option<&Passes> {
         match &self.task {
             Task::Estimate(passes) => Some(passes),
@@ -41,7 +41,7 @@ impl Job {
         }
     }
 
-    /// Its draws, where it is of a sampler.
+    /// The draws, where the job is of a sampler.
     pub fn draws(&self) -> Option<&Draws> {
         match &self.task {
             Task::Estimate(_) => None,
@@ -53,11 +53,11 @@ impl Job {
 /// A run of an estimator in a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
-    /// The estimator's name, or that of its control.
+    /// Name of the estimator, or of its control.
     pub name: String,
     /// A second arm of the same estimator, on streams of its own.
     pub is_control: bool,
-    /// It is timed side by side with the other arms of its cell that are.
+    /// Whether it is timed side by side with other arms of its cell.
     pub is_timed: bool,
 }
 
@@ -69,13 +69,13 @@ pub struct Passes {
     pub entry: usize,
     /// Which run of the estimator it is.
     pub arm: Arm,
-    /// What its passes are for.
+    /// Stage that the passes belong to.
     pub stage: Stage,
-    /// Their number, where it is not the budget's to say.
+    /// Number of passes, where the budget does not state it.
     pub count: Option<u64>,
-    /// Runs passes.
+    /// Estimator that runs the passes.
     pub estimator: Box<dyn Estimator>,
-    /// Its observables.
+    /// Observables and bands of the scores.
     pub layout: Layout,
     /// Bands that one call runs together, with their streams.
     pub groups: Vec<Group>,
@@ -85,7 +85,7 @@ pub struct Passes {
 
 /// Bands that one call runs together.
 pub struct Group {
-    /// Their indices.
+    /// Indices of the bands.
     pub bands: Vec<usize>,
     /// Key of the run, or of the second look.
     pub main: StreamKey,
@@ -93,7 +93,7 @@ pub struct Group {
     pub pilot: StreamKey,
 }
 
-/// What a run of passes left behind.
+/// Moments and counts of a run of passes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Block {
     /// Moments of `[observable][band]`, kept by batch.
@@ -116,11 +116,11 @@ pub struct Block {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Start {
-    /// Hashes of the claims: what is claimed later is claimed with the result in sight.
+    /// Hashes of the claims: later claims are made with the result in sight.
     pub claims: Vec<String>,
     /// Hash of the budget that was turned into passes.
     pub budget: String,
-    /// Those passes: the same budget is not turned into others.
+    /// Passes that the budget was turned into, fixed once.
     pub passes: u64,
 }
 
@@ -128,11 +128,11 @@ pub struct Start {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Work {
-    /// By [`Cost`].
+    /// Work counted, indexed by [`Cost`].
     pub cost: [u64; Cost::ALL.len()],
     /// CPU time of the passes alone, seconds.
     pub cpu_seconds: f64,
-    /// How many of them were timed side by side with their rivals, by a worker that was warm.
+    /// How many passes were timed side by side with their rivals, by a worker that was warm.
     pub settled: u64,
 }
 
@@ -149,7 +149,7 @@ impl Merge for Work {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tally {
-    /// By [`Anomaly`].
+    /// Anomalies counted, indexed by [`Anomaly`].
     pub anomalies: [u64; Anomaly::ALL.len()],
     /// Wall time, seconds.
     pub wall_seconds: f64,
@@ -248,7 +248,7 @@ impl Block {
     }
 }
 
-/// What a finished job has measured: its batches, and one image instead of the tree's many.
+/// Measurement of a finished job: its batches, and one image instead of the tree's many.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finished {
     /// Number of passes.
@@ -273,7 +273,7 @@ impl Finished {
 }
 
 impl Block {
-    /// All passes are done: folds what the tree still holds apart.
+    /// All passes are done: merges the nodes that the tree still keeps separate.
     pub fn finish(self) -> Finished {
         Finished {
             passes: self.next_pass(),
@@ -287,7 +287,7 @@ impl Block {
 }
 
 impl Passes {
-    /// Number of the group of jobs that are timed side by side, where it is of one.
+    /// Number of the group of jobs that are timed side by side, where the job belongs to one.
     pub fn side_by_side(&self) -> Option<usize> {
         self.arm.is_timed.then_some(self.cell)
     }
@@ -354,7 +354,7 @@ mod tests {
     }
 
     /// Passes of images of 3 pixels in 2 bands.
-    fn played(start: u64, end: u64, keep_level: u32) -> Block {
+    fn run(start: u64, end: u64, keep_level: u32) -> Block {
         let mut block = Block { bands: 2, ..Block::empty(start, keep_level) };
         for pass in start..end {
             block.pair_with(&image(pass));
@@ -373,16 +373,16 @@ mod tests {
         assert_eq!(spread(&[], &[], 2), []);
     }
 
-    // Pairs are of passes 2i and 2i + 1, whatever blocks these stood in; a last pass alone is in none.
+    // Pairs are of passes 2i and 2i + 1, whatever blocks these were in; a last pass alone is in none.
     #[test]
     fn pairs_do_not_know_of_blocks() {
         for (cuts, keep_level) in
             [(vec![0, 1, 2, 3, 4, 5], 0), (vec![0, 3, 4, 9, 16], 1), (vec![0, 7, 8, 15, 29], 2)]
         {
             let end = cuts[cuts.len() - 1];
-            let whole = played(0, end, keep_level);
+            let whole = run(0, end, keep_level);
             let mut joined = Block::empty(0, keep_level);
-            cuts.windows(2).for_each(|cut| joined.append(played(cut[0], cut[1], keep_level)));
+            cuts.windows(2).for_each(|cut| joined.append(run(cut[0], cut[1], keep_level)));
             assert_eq!((&joined.spread, &joined.pixels), (&whole.spread, &whole.pixels), "{cuts:?}");
             let batches = joined.spread.batches();
             let pairs: u64 = batches.iter().map(|batch| batch[0].n).sum();

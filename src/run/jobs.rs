@@ -24,23 +24,23 @@ use crate::samplers::Sampler;
 use crate::sampling::stream::StreamKey;
 use crate::scene::Scene;
 
-/// What a run will do.
+/// Plan of a run.
 pub struct Plan {
-    /// The bands.
+    /// Bands of the experiment.
     pub bands: Vec<Band>,
     /// One job per cell and arm of an estimator, cells outermost; then one per sampler.
     pub jobs: Vec<Job>,
     /// The claims on estimators, expanded.
     pub comparisons: Vec<Comparison>,
-    /// What the passes are for.
+    /// Stage that the passes belong to.
     pub stage: Stage,
     scene_bytes: usize,
-    /// Passes per job, where the budget says them.
+    /// Passes per job, where the budget states them.
     passes: Option<u64>,
 }
 
 impl Plan {
-    /// Estimate of the memory it takes.
+    /// Estimate of the run's memory.
     pub fn memory(&self, threads: usize) -> MemoryEstimate {
         MemoryEstimate::new(&self.jobs, self.scene_bytes, threads, self.passes)
     }
@@ -58,7 +58,7 @@ pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
     plan_stage(experiment, registry, Stage::Main)
 }
 
-/// The same for the passes of `stage`.
+/// Plans the passes of `stage`.
 pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: Stage) -> Result<Plan> {
     if !experiment.cells.is_empty() && experiment.file.budget.is_none() {
         return Err(Error::input_help(
@@ -93,7 +93,7 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
     Ok(Plan { jobs, comparisons, stage, scene_bytes: builder.memory_bytes(), passes, bands })
 }
 
-/// A cell, built.
+/// A cell with its scene.
 struct BuiltCell<'a> {
     spec: &'a CellSpec,
     scene: Arc<Scene>,
@@ -108,7 +108,7 @@ fn cells<'a>(experiment: &'a Experiment, builder: &mut Builder) -> Result<Vec<Bu
         if let Some(twin) = known.insert(hash_json(&spec.content()), &spec.label) {
             return Err(Error::input_help(
                 format!("cells `{twin}` and `{}` are the same scene", spec.label),
-                "equal scenes run on equal streams, so one says nothing about the other: drop one",
+                "equal scenes run on equal streams, so neither is evidence about the other: drop one",
             ));
         }
         let scene = Arc::new(builder.scene(spec)?);
@@ -125,7 +125,7 @@ fn cells<'a>(experiment: &'a Experiment, builder: &mut Builder) -> Result<Vec<Bu
     Ok(cells)
 }
 
-/// What every job of a plan is made from.
+/// Input common to every job of a plan.
 struct Planner<'a> {
     experiment: &'a Experiment,
     registry: &'a Registry,
@@ -199,7 +199,7 @@ impl Planner<'_> {
         let file = &self.experiment.file;
         let words = &file.sampler[index];
         let (kind, sampler) = build_sampler(words, self.registry)?;
-        // Absent on purpose: the number of draws, claims, threads, the order of the file.
+        // Intentionally absent: the number of draws, claims, threads, the order of the file.
         let mut name = json!({
             "version": KEY_VERSION,
             "experiment": file.name,
@@ -239,7 +239,7 @@ fn build_sampler<'a>(
     Ok((kind, (registered.build)(options)?))
 }
 
-/// Builds every scene and every sampler, as `check` wants it: meshes, maps, the sensor's place and the
+/// Builds every scene and every sampler, for `check`: meshes, maps, the sensor's place and the
 /// options of samplers show only then.
 ///
 /// # Errors
@@ -250,10 +250,10 @@ pub fn build_all(experiment: &Experiment, registry: &Registry) -> Result<()> {
     experiment.file.sampler.iter().try_for_each(|words| build_sampler(words, registry).map(|_| ()))
 }
 
-/// What claims compare by CPU time: estimators that run side by side, and baselines that run twice,
+/// Arms that claims compare by CPU time: estimators that run side by side, and baselines that run twice,
 /// because the same estimator against itself shows what the machine adds.
 struct Duels<'a> {
-    /// Where, candidate, baseline.
+    /// Cells chosen, candidate, baseline.
     duels: Vec<(&'a BTreeMap<String, String>, &'a str, &'a str)>,
 }
 

@@ -5,22 +5,22 @@ use serde_json::{Value, json};
 use crate::results::json::{canonical, hash_bytes};
 use crate::sampling::stream::StreamKey;
 
-/// Version of what enters a key; raising it re-rolls every experiment's dice.
+/// Version of what enters a key; raising it changes the random numbers of every experiment.
 pub const KEY_VERSION: u32 = 1;
 
-/// What a sequence of passes is for.
+/// Stage that a sequence of passes belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// The short run that turns a budget into passes.
     Pilot,
-    /// The run itself.
+    /// Passes of the run.
     Main,
     /// The second look at what failed in the first.
     Retest,
 }
 
 impl Stage {
-    /// Its name in keys and records.
+    /// Name in keys and records.
     pub fn name(self) -> &'static str {
         match self {
             Stage::Pilot => "pilot",
@@ -30,15 +30,15 @@ impl Stage {
     }
 }
 
-/// Everything that names a sequence of passes. Absent on purpose: claims, budget, threads, block size,
-/// the order of a sweep, an estimator's options (so that options can be compared on one stream).
+/// Everything that names a sequence of passes. Intentionally absent: claims, budget, threads, block
+/// size, the order of a sweep, an estimator's options (so that options can be compared on one stream).
 #[derive(Clone, Debug)]
 pub struct StreamName<'a> {
     /// Name of the experiment.
     pub experiment: &'a str,
     /// Its seed, where it has one.
     pub seed: Option<u64>,
-    /// What a fresh look mixes in.
+    /// Text that a fresh look adds to the key.
     pub fresh: Option<&'a str>,
     /// The cell's physics in canonical form, without the keys that the experiment pairs over.
     pub content: &'a Value,
@@ -46,7 +46,7 @@ pub struct StreamName<'a> {
     pub bands: &'a [&'a str],
     /// Name of the estimator.
     pub estimator: &'a str,
-    /// Stage.
+    /// Stage that the streams belong to.
     pub stage: Stage,
 }
 

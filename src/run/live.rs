@@ -1,9 +1,9 @@
-//! Images on show while they are made: what is sent to a viewer, and when.
+//! Live view: which images are sent to a viewer while they are rendered, and when.
 //!
 //! The collector makes an image of what it has in order, from a copy: nothing here reaches a record. It
 //! does so at most twice a second, only where the one before is on its way, and for a twentieth of its
 //! time. A thread of its own sends, and one image waits at most: a viewer that is slow or hangs stalls
-//! nothing. A job's last image that finds the place taken is sent when all jobs are played.
+//! nothing. A job's last image that finds the place taken is sent when all jobs are done.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -21,10 +21,10 @@ use crate::stats::moments::ImageMoments;
 const EVERY: Duration = Duration::from_millis(500);
 /// An image is due when this many times what the last one took has passed.
 const SHARE: u32 = 20;
-/// What a run that is played waits at most for a viewer to take its last images.
+/// How long a finished run waits at most for a viewer to take its last images.
 const LAST_WAIT: Duration = Duration::from_secs(10);
 
-/// A viewer that is there, for all experiments of one call.
+/// Connection to a viewer, for all experiments of one call.
 #[derive(Debug)]
 pub struct Live {
     address: Address,
@@ -38,12 +38,12 @@ struct Shared {
     changed: Condvar,
 }
 
-/// What lies between the collector and the thread that sends.
+/// Mailbox between the collector and the thread that sends.
 #[derive(Debug, Default)]
 struct Post {
     waiting: Option<TevImage>,
     is_sending: bool,
-    /// Nothing can be sent any more, for this reason, which nobody has told yet.
+    /// Why nothing can be sent any more, until it has been reported.
     lost: Option<String>,
     is_closed: bool,
 }
@@ -62,11 +62,11 @@ impl Live {
     /// Connects to a viewer.
     ///
     /// # Errors
-    /// There is none, in words for the person who asked for it.
+    /// No viewer answers; the message is for the user.
     pub fn connect(address: &Address) -> Result<Live, String> {
         let connection = Connection::open(address).map_err(|error| {
             let why = reason(&error);
-            format!("no tev viewer at {address} ({why}): start tev, or leave --tev out; the run goes on without")
+            format!("no tev viewer at {address} ({why}): start tev, or leave --tev out; the run continues without")
         })?;
         let shared = Arc::new(Shared::default());
         let sending = Arc::clone(&shared);
@@ -74,13 +74,13 @@ impl Live {
         Ok(Live { address: address.clone(), shared, pace: Mutex::default() })
     }
 
-    /// What is there to be told: that the viewer has gone, once.
+    /// Reports once that the viewer has gone.
     pub fn complaint(&self) -> Option<String> {
         let why = self.shared.post().lost.take()?;
-        Some(format!("tev at {} takes no more images ({why}): the run goes on without", self.address))
+        Some(format!("tev at {} takes no more images ({why}): the run continues without", self.address))
     }
 
-    /// Puts an image where it is taken from, unless another one waits there.
+    /// Hands an image to the sending thread, unless another one waits.
     fn offer(&self, frame: impl FnOnce() -> TevImage) -> bool {
         let is_free = |post: &Post| post.waiting.is_none() && !post.is_closed;
         if !is_free(&self.shared.post()) {
@@ -115,7 +115,7 @@ impl Shared {
         self.post.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Sends what waits, until nobody puts anything there or nobody takes it.
+    /// Sends waiting images until either end is dropped.
     fn send_all(&self, mut connection: Connection) {
         let mut created = BTreeMap::new();
         while let Some(frame) = self.take() {
@@ -163,26 +163,26 @@ fn reason(error: &io::Error) -> String {
     if error.raw_os_error().is_some() { error.kind().to_string() } else { error.to_string() }
 }
 
-/// The images of one experiment on show.
+/// The images of one experiment in the live view.
 #[derive(Clone, Copy)]
 pub struct Show<'a> {
-    /// Where.
+    /// Viewer that images are sent to.
     pub live: &'a Live,
     /// The experiment's name.
     pub experiment: &'a str,
-    /// Its bands.
+    /// Bands of the experiment.
     pub bands: &'a [Band],
-    /// Its jobs.
+    /// Jobs whose images are shown.
     pub jobs: &'a [Job],
 }
 
 impl Show<'_> {
-    /// Is there anything to see?
+    /// Whether any job has an image.
     pub fn has_images(&self) -> bool {
         self.jobs.iter().any(|job| image_size(job).is_some())
     }
 
-    /// A job has come this far.
+    /// Offers the image of a job under way.
     pub fn under_way(&self, job: usize, done: &Block) {
         let Some(size) = image_size(&self.jobs[job]) else { return };
         let mut pace = self.live.pace.lock().unwrap_or_else(PoisonError::into_inner);
@@ -199,13 +199,13 @@ impl Show<'_> {
         }
     }
 
-    /// A job has come to its end; false where its image has to be sent later.
+    /// Offers the last image of a finished job; false where its image has to be sent later.
     pub fn done(&self, job: usize, finished: &Finished) -> bool {
         image_size(&self.jobs[job])
             .is_none_or(|size| self.live.offer(|| self.frame(job, size, &finished.image)))
     }
 
-    /// All jobs are played: sends the images of those that are `owed`. What there is to say, where some
+    /// All jobs are done: sends the images of those that are `owed`. Returns a message where some
     /// were not sent.
     pub fn close(&self, owed: &[(usize, &Finished)]) -> Option<String> {
         let until = Instant::now() + LAST_WAIT;
@@ -217,7 +217,7 @@ impl Show<'_> {
             sent += 1;
         }
         if self.live.wait(until, true) {
-            return None; // all is sent, or the viewer has gone, which is told elsewhere
+            return None; // all is sent, or the viewer has gone, which is reported elsewhere
         }
         let (left, seconds) = (owed.len() - sent, LAST_WAIT.as_secs());
         let address = &self.live.address;

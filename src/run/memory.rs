@@ -1,4 +1,4 @@
-//! What a run holds in memory, and whether it fits.
+//! Memory of a run, and whether it fits.
 
 use super::job::{Job, Passes};
 use crate::error::{Error, Result};
@@ -6,16 +6,16 @@ use crate::error::{Error, Result};
 /// Estimate of a run's largest memory, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MemoryEstimate {
-    /// Meshes and maps.
+    /// Meshes and maps, bytes.
     pub shapes: usize,
     /// Moments of observables and images of everything measured, kept until the record is written.
     pub results: usize,
-    /// What the threads and the collector hold on top during the run.
+    /// Additional memory of the threads and the collector during the run, bytes.
     pub working: usize,
 }
 
 impl MemoryEstimate {
-    /// For jobs on a number of threads, whose scenes hold `shapes` bytes.
+    /// Estimate for jobs on a number of threads, whose scenes hold `shapes` bytes.
     ///
     /// An image keeps mean and M2, 16 bytes a pixel and band. A finished job holds one, and the record's
     /// array beside it; and 128 batches of 5 moments per observable, likewise twice. A job under way
@@ -40,7 +40,7 @@ impl MemoryEstimate {
         }
     }
 
-    /// All of it.
+    /// Total, bytes.
     pub fn total(&self) -> usize {
         self.shapes + self.results + self.working
     }
@@ -65,7 +65,7 @@ impl MemoryEstimate {
     }
 }
 
-/// Memory that the system can give without swapping, bytes; `None` where it does not say.
+/// Memory that the system can give without swapping, bytes; `None` where it does not report it.
 pub fn available() -> Option<usize> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;

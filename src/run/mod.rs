@@ -49,20 +49,20 @@ pub struct Options {
     pub out: PathBuf,
     /// Number of threads.
     pub threads: usize,
-    /// Passes per block; chosen by time without it.
+    /// Passes per block; chosen by time by default.
     pub block_passes: Option<u64>,
-    /// No progress bar.
+    /// Do not show a progress bar.
     pub quiet: bool,
-    /// Folder that holds a results folder per experiment, whose records say how many passes are run;
+    /// Folder that holds a results folder per experiment, whose records state how many passes are run;
     /// without it the budget does. A budget in seconds gives another number of passes each time that it
     /// is measured anew: this is how such a record is reproduced bit for bit.
     pub passes_of: Option<PathBuf>,
-    /// A viewer that shows images while they are made.
+    /// Viewer that shows images while they are rendered.
     pub live: Option<Arc<Live>>,
 }
 
 impl Options {
-    /// Into `out`, on all cores.
+    /// Options that write into `out` and use all cores.
     pub fn new(out: impl Into<PathBuf>) -> Options {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Options {
@@ -85,7 +85,7 @@ impl Options {
 ///
 /// # Errors
 /// Bad input found while building; a run that does not fit in memory; I/O; an interruption, after which
-/// the same call goes on where this one stopped.
+/// the same call resumes where this one stopped.
 pub fn run(
     experiment: &Experiment,
     registry: &Registry,
@@ -102,20 +102,20 @@ pub fn run(
     Ok((folder, stored))
 }
 
-/// Has every estimator run as many passes as the record in `from` has of it.
+/// Sets the passes of every estimator to those of the record in `from`.
 fn take_passes(plan: &mut Plan, experiment: &Experiment, from: &RecordFolder) -> Result<()> {
     if plan.jobs.iter().all(|job| job.passes().is_none()) {
         let name = &experiment.file.name;
         return Err(Error::input_help(
             format!("`{name}` draws from samplers: it has no passes to take from a record"),
-            "leave --passes-of out: its file says how many draws",
+            "leave --passes-of out: its file states how many draws",
         ));
     }
     let manifest = from.manifest()?;
     if manifest.experiment_hash != assemble::experiment_hash(experiment) {
         let words = "the record there is of another experiment than the file";
-        let help = "`scatterproof compare` of the two results says what was changed; run without --passes-of to take the \
-                    passes from the budget";
+        let help = "`scatterproof compare` of the two results reports what was changed; run without --passes-of \
+                    to take the passes from the budget";
         return Err(Error::record(from.root(), format!("{words}; {help}")));
     }
     for job in &mut plan.jobs {
@@ -126,7 +126,7 @@ fn take_passes(plan: &mut Plan, experiment: &Experiment, from: &RecordFolder) ->
     Ok(())
 }
 
-/// Carries a plan out into the results folder `root`.
+/// Executes a plan and writes the results folder `root`.
 fn execute(
     experiment: &Experiment,
     plan: &Plan,
@@ -141,7 +141,7 @@ fn execute(
     let show = options.live.as_deref();
     let show = show.map(|live| Show { live, experiment: name, bands: &plan.bands, jobs: &plan.jobs });
     if show.is_some_and(|show| !show.has_images()) {
-        progress.say(&format!("note: `{name}` has no image: tev has nothing to show of it"));
+        progress.say(&format!("note: `{name}` has no image: tev cannot show it"));
     }
     let settings = workers::Settings {
         threads: options.threads.max(1),
@@ -167,7 +167,7 @@ fn execute(
     Ok((folder, stored))
 }
 
-/// The first passes once more, as `reproduces` claims want it.
+/// Runs the first passes again where `reproduces` claims ask for it.
 fn replays(
     experiment: &Experiment,
     plan: &Plan,
@@ -182,7 +182,7 @@ fn replays(
         .map(|(job, finished)| replay::replay(job, finished, count, &|| interrupt.raised()))
         .collect();
     replays.ok_or_else(|| {
-        Error::Interrupted("all passes are done and kept; the same command goes on from there".into())
+        Error::Interrupted("all passes are done and kept; the same command resumes from there".into())
     })
 }
 

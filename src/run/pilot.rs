@@ -51,8 +51,8 @@ fn for_seconds(job: &Passes, seconds: f64, stop: &dyn Fn() -> bool) -> Option<u6
     }
 }
 
-/// A pilot has at least this part of the passes that it asks for, so that its variance rests on a good
-/// part of the run and not on luck.
+/// A pilot has at least this part of the passes that it asks for, so that its variance rests on a
+/// substantial part of the run.
 const PILOT_SHARE: u64 = 16;
 /// Standard deviations by which both estimates below are taken to err.
 const SURENESS: f64 = 2.5;

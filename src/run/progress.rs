@@ -38,7 +38,7 @@ impl Progress {
         self.bar.suspend(|| eprintln!("{what}"));
     }
 
-    /// Removes the bar.
+    /// Removes the progress bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }

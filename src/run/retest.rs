@@ -11,19 +11,19 @@ use crate::experiment::registry::Registry;
 use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 
-/// What is measured again.
+/// Quantities and samplers to measure again.
 pub struct Remeasured<'a> {
     /// The record of the first look.
     pub main: &'a Record,
-    /// Quantities of estimators: all that their run measures.
+    /// Quantities of estimators; each brings all that its run measures.
     pub quantities: Vec<Quantity>,
     /// Samplers by name.
     pub samplers: Vec<String>,
-    /// How many times the passes and draws of the first look.
+    /// Factor on the passes and draws of the first look.
     pub factor: u64,
 }
 
-/// Measures again what `look` says, and writes the record into `retest/` beside the first. What an
+/// Measures again what `look` lists, and writes the record into `retest/` beside the first. What an
 /// earlier call has measured is not measured again.
 ///
 /// # Errors

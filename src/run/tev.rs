@@ -47,7 +47,7 @@ impl FromStr for Address {
             Some((host, port)) if !host.is_empty() && !host.contains(['[', ']', '/']) => {
                 Ok(Address { host: host.into(), port })
             }
-            _ => Err(format!("HOST:PORT is needed, as {}; files stand before --tev", Address::USUAL)),
+            _ => Err(format!("HOST:PORT is needed, as {}; files come before --tev", Address::USUAL)),
         }
     }
 }
@@ -161,7 +161,7 @@ impl Connection {
     /// Connects to a viewer.
     ///
     /// # Errors
-    /// Nobody listens there, or nobody answers.
+    /// No program listens at the address, or none answers.
     pub fn open(address: &Address) -> io::Result<Connection> {
         let mut last = io::Error::new(io::ErrorKind::NotFound, "the host has no address");
         for socket in (address.host.as_str(), address.port).to_socket_addrs()? {
@@ -191,7 +191,7 @@ impl Connection {
         })
     }
 
-    /// What is written after the viewer has gone is lost without a word, at first; that it has gone can
+    /// What is written after the viewer has gone is lost silently, at first; that it has gone can
     /// be read.
     ///
     /// # Errors

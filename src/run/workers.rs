@@ -8,7 +8,7 @@
 //! Jobs that are timed side by side run by quadruples: one worker runs two batches of every arm in the
 //! order A B .. B A, so that whatever drifts steadily (clock rate, temperature, other load) adds the
 //! same to each arm. A worker's first quadruple of a group warms it up, and one of which an earlier
-//! process had played a part is not in that order: neither counts as timed (`Work::settled`).
+//! process had run a part is not in that order: neither counts as timed (`Work::settled`).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -33,38 +33,38 @@ pub struct Settings<'a> {
     pub threads: usize,
     /// Passes per block, where the user sets them.
     pub block_passes: Option<u64>,
-    /// The stop flag.
+    /// Flag that asks to stop.
     pub interrupt: &'a Interrupt,
     /// Folder of the experiment's results.
     pub root: &'a Path,
-    /// Shows how far it is.
+    /// Progress bar.
     pub progress: &'a Progress,
-    /// Shows images as they are made.
+    /// Viewer of images while they are rendered.
     pub show: Option<Show<'a>>,
-    /// How much work a job with an estimator is; none where there is no such job.
+    /// Budget of a job with an estimator; none where there is no such job.
     pub budget: Option<&'a Budget>,
     /// Hashes of the experiment's claims, hex.
     pub claims: &'a [String],
 }
 
-/// What a job gave, and what stood before its first pass or draw.
+/// Result of a job, and the claims made before its first pass or draw.
 pub struct Completed {
-    /// What was fixed beforehand.
+    /// What was fixed before the first pass.
     pub start: Start,
-    /// What came out.
+    /// Result of the job.
     pub output: Output,
 }
 
-/// What came out of a job.
+/// Result of a job.
 pub enum Output {
-    /// Of an estimator.
+    /// Passes of an estimator.
     Passes(Box<Finished>),
-    /// Of a sampler.
+    /// Counts of a sampler's draws.
     Draws(Box<Sampled>),
 }
 
 impl Completed {
-    /// What passes measured, where the job is of an estimator.
+    /// The measurement, where the job is of an estimator.
     pub fn passes(&self) -> Option<&Finished> {
         match &self.output {
             Output::Passes(finished) => Some(finished),
@@ -117,7 +117,7 @@ struct Span {
     keep_level: u32,
 }
 
-/// What a worker does in one go.
+/// Unit of work of a worker.
 enum Unit {
     /// All draws from a sampler.
     Draws(usize),
@@ -143,7 +143,7 @@ struct Pool<'a> {
     queue: Mutex<Queue>,
 }
 
-/// Does every job and returns what came out in the order of the jobs. Where the run is interrupted, all
+/// Runs every job and returns the results in the order of the jobs. Where the run is interrupted, all
 /// states are saved first.
 pub fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed>> {
     let queue = Mutex::new(Queue { next_group: 0, active: None });
@@ -159,7 +159,7 @@ pub fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed>> {
         drop(sender);
         let collected = Collector::new(jobs, settings).collect(receiver);
         if collected.is_err() {
-            settings.interrupt.raise(); // workers stop; the error is what is told
+            settings.interrupt.raise(); // workers stop; the error is reported
         }
         collected
     })
@@ -180,7 +180,7 @@ fn groups(jobs: &[Job]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Two batches of every arm in the order A B .. B A, without what is done already; and whether nothing
+/// Two batches of every arm in the order A B .. B A, except what is done already; and whether nothing
 /// of it was.
 fn quadruple(lanes: &[Lane], number: u64) -> (Vec<Span>, bool) {
     let span = |lane: &Lane, batch: u64| {
@@ -195,7 +195,7 @@ fn quadruple(lanes: &[Lane], number: u64) -> (Vec<Span>, bool) {
     (spans.into_iter().filter(|span| span.start < span.end).collect(), is_whole)
 }
 
-/// Stops the other threads where one panics: the run is lost, and they should not go on to its end.
+/// Stops the other threads where one panics: the run is lost, and they should not continue to its end.
 struct StopOnPanic<'a>(&'a Interrupt);
 
 impl Drop for StopOnPanic<'_> {
@@ -245,7 +245,7 @@ impl Pool<'_> {
         Some(())
     }
 
-    /// Draws from a sampler, unless an earlier run has; threads that no sampler is left for help.
+    /// Draws from a sampler, unless an earlier run has; threads without a sampler help.
     fn draw(&self, index: usize, sender: &mpsc::SyncSender<Message>) -> Option<()> {
         let job = &self.jobs[index];
         let draws: &Draws = job.draws()?;
@@ -263,8 +263,8 @@ impl Pool<'_> {
         sender.send(Message::Sampled { job: index, start, sampled, is_new }).ok()
     }
 
-    /// The claims that stood before the first pass or draw: those of an earlier state, whether or not
-    /// the job goes on from it.
+    /// The claims made before the first pass or draw: those of an earlier state, whether or not
+    /// the job resumes from it.
     fn claims(&self, earlier: Option<&Start>) -> Vec<String> {
         earlier.map_or_else(|| self.settings.claims.to_vec(), |start| start.claims.clone())
     }
@@ -273,7 +273,7 @@ impl Pool<'_> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What is to be done next; begins the next group where the last one has none left.
+    /// The next unit of work; begins the next group where the last one has none left.
     fn next(&self, sender: &mpsc::SyncSender<Message>) -> Option<Unit> {
         let mut queue = self.lock();
         loop {
@@ -329,7 +329,7 @@ impl Pool<'_> {
         self.settings.block_passes.unwrap_or(timed.min(fair)).max(1)
     }
 
-    /// Fixes a job's passes and finds what is done of it. Other workers wait meanwhile.
+    /// Fixes a job's passes and finds which are done. Other workers wait meanwhile.
     fn begin(&self, index: usize, passes: &Passes, sender: &mpsc::SyncSender<Message>) -> Option<Lane> {
         let identity = &self.jobs[index].identity;
         let path = checkpoint::path(self.settings.root, identity);
@@ -354,7 +354,7 @@ impl Pool<'_> {
     }
 }
 
-/// Puts blocks in order.
+/// Appends blocks in the order of their passes.
 struct Collector<'a> {
     jobs: &'a [Job],
     settings: &'a Settings<'a>,
@@ -381,7 +381,7 @@ impl<'a> Collector<'a> {
     }
 
     fn collect(mut self, receiver: mpsc::Receiver<Message>) -> Result<Vec<Completed>> {
-        // Owned: where this returns early, senders that wait fail instead of waiting for ever.
+        // Owned: where this returns early, waiting senders fail instead of blocking for ever.
         for message in receiver {
             let job = match message {
                 Message::Begin { job, start, done } => {
@@ -425,13 +425,13 @@ impl<'a> Collector<'a> {
         let done = self.completed.len();
         Err(Error::Interrupted(format!(
             "{done} of {} measurements are complete and the passes done of the others are kept in {}; the \
-             same command goes on from there",
+             same command resumes from there",
             self.jobs.len(),
             self.settings.root.display()
         )))
     }
 
-    /// Takes a block; whether passes were appended, of this or of earlier ones that waited for it.
+    /// Takes a block; true where passes were appended, of this block or of others that waited for it.
     fn take(&mut self, job: usize, block: Block) -> Result<bool> {
         let Some(running) = self.under_way.get_mut(&job) else { return Ok(false) };
         let before = running.done.next_pass();

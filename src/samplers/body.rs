@@ -28,7 +28,7 @@ pub const KIND: SamplerKind = sampler_kind!(
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct BodyOptions {
-    /// The body.
+    /// Shape of the body.
     shape: BodyShape,
     /// How a side of a box is chosen.
     #[serde(default)]

@@ -129,8 +129,8 @@ impl ViewSide {
 ///   total reflection    between q_c and q_r: beside the cone at both sides of it in Y, and before and
 ///                       beyond it in X, where the cone is not met.
 /// In the plane of view a facet turned by angle xi has m = cos(theta + xi): the ends in X are the
-/// tangents of -(pi/4 + theta/2) and pi/4 - theta/2 for q_r, of -theta - gamma and -theta + gamma for q_c (cos gamma
-/// = m_c), and (r - s) / c for q_w, the root of q_w = 1 + X^2.
+/// tangents of -(pi/4 + theta/2) and pi/4 - theta/2 for q_r, of -theta - gamma and -theta + gamma for
+/// q_c (cos gamma = m_c), and (r - s) / c for q_w, the root of q_w = 1 + X^2.
 ///
 /// Jacobians: about wo, h is at the polar angle g, wi at b(g) and the same azimuth, so that
 /// d omega_i / d omega_h = |sin b b'| / sin g. Reflection: b = 2g, 4 cos g. Refraction: b = pi + g -
@@ -152,13 +152,13 @@ pub struct RoughSampler {
 #[derive(Clone, Copy)]
 struct SlopeRegion {
     slopes: Slopes,
-    /// r.
+    /// Relative refractive index r.
     relative: f64,
     /// m_c^2; 0 where nothing is reflected totally.
     critical2: f64,
 }
 
-/// One piece.
+/// One piece of the chart of slopes.
 #[derive(Clone, Copy)]
 struct SlopePiece {
     name: &'static str,
@@ -240,9 +240,9 @@ struct SlopeEdges {
     disc: [f64; 2],
     cone: [f64; 2],
     wrong_side: f64,
-    /// q_r = q_c.
+    /// Parameter where q_r = q_c.
     corner: f64,
-    /// q_w = q_c.
+    /// Parameter where q_w = q_c.
     touch: f64,
     horizon: f64,
 }
@@ -317,14 +317,14 @@ impl RoughSampler {
         self.parts.iter().position(|part| part.reach == reach)
     }
 
-    /// A direction with its event and the density that the code says it has.
+    /// A direction with its event and the density that the code claims.
     fn drawn(&self, stream: &mut Stream) -> Option<(Event, DVec3, f64)> {
         if self.is_forced {
             let wi = self.boundary.sample_refraction(self.wo, stream.draw2())?;
             return Some((Event::Refract, wi, self.boundary.pdf_refraction(self.wo, wi)));
         }
         let BoundarySample { wi, density, event, .. } = self.boundary.sample(self.wo, stream.draw3())?;
-        // The rough surface has no delta lobe: a density that says so is wrong.
+        // The rough surface has no delta lobe: a density that claims one is wrong.
         let pdf = if let Density::Finite(pdf) = density { pdf } else { f64::NAN };
         Some((event, wi, pdf))
     }

@@ -12,8 +12,8 @@ use crate::sampling::stream::Stream;
 
 /// One way of drawing a point of a chart's domain, and its density.
 pub trait Technique<C: Chart>: Send + Sync {
-    /// Draws a point, with the density that the code under test says of it. Without that density the
-    /// sample is said to have the one of its chart coordinates.
+    /// Draws a point, with the density that the code under test claims for it. Without that density the
+    /// sample has the one of its chart coordinates.
     fn sample(&self, stream: &mut Stream) -> (C::Point, Option<f64>);
 
     /// Density at a point, in the domain's measure.
@@ -28,7 +28,7 @@ pub trait Chart: Send + Sync {
     /// A point of the domain.
     type Point: Copy;
 
-    /// The piece.
+    /// The piece that the chart covers.
     fn piece(&self) -> Piece;
 
     /// The coordinates of a point, with the domain's measure per unit of them.
@@ -43,7 +43,7 @@ pub trait Chart: Send + Sync {
 pub struct Measure(pub [f64; 3]);
 
 impl Measure {
-    /// A measure of one factor.
+    /// A measure with one factor; the other two are 1.
     pub fn of(factor: f64) -> Measure {
         Measure([factor, 1.0, 1.0])
     }
@@ -62,7 +62,7 @@ pub struct Charted<T, C> {
 }
 
 impl<T: Technique<C>, C: Chart> Charted<T, C> {
-    /// Of both.
+    /// A technique tested in this chart.
     pub fn new(technique: T, chart: C) -> Charted<T, C> {
         Charted { technique, chart }
     }
@@ -237,7 +237,7 @@ pub enum PlaneChart {
 pub struct PolarPoint {
     /// Distance from the origin.
     pub r: f64,
-    /// Azimuth.
+    /// Azimuth, turns.
     pub turns: f64,
 }
 

@@ -27,7 +27,7 @@ struct BandOptions {
     weights: Vec<f64>,
 }
 
-/// One band of many, and whether its table says the probability that was asked for.
+/// One band of many, and whether its table has the probability that was asked for.
 pub struct BandSampler {
     table: Cumulative,
     probabilities: Vec<f64>,

@@ -54,7 +54,7 @@ pub fn view(cos: f64) -> DVec3 {
 pub struct Slopes {
     /// Unit tangent of the view, its projection onto the surface.
     along: DVec3,
-    /// Its perpendicular.
+    /// Unit vector perpendicular to it.
     across: DVec3,
     /// Cosine of the view.
     pub cos: f64,
@@ -184,16 +184,16 @@ fn unbend([from, to]: [f64; 2], angle: f64) -> f64 {
 /// Normals of a distribution of microfacets, all of them or those seen from a direction.
 pub struct NormalSampler {
     facets: Microfacets,
-    /// The direction of view; without it the plain normals.
+    /// The direction of view; the plain normals by default.
     view: Option<DVec3>,
     chart: SlopeChart,
 }
 
-/// All of Y.
+/// The whole range of the slope Y.
 pub const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 impl NormalSampler {
-    /// The plain normals.
+    /// Sampler of the plain distribution of facet normals.
     pub fn plain(facets: Microfacets) -> NormalSampler {
         let chart = SlopeChart::new(Slopes::about(view(0.5)), facets.alpha, EVERYWHERE);
         NormalSampler { facets, view: None, chart }

@@ -1,4 +1,4 @@
-//! Kinds of samplers: under which name and with which options an experiment asks for one.
+//! Kinds of samplers: the name and the options under which an experiment asks for one.
 
 use schemars::Schema;
 use serde::Deserialize;
@@ -36,7 +36,7 @@ pub fn read_options<T: for<'a> Deserialize<'a>>(options: &Json) -> Result<T> {
     T::deserialize(options).map_err(|error| Error::input(format!("sampler options: {error}")))
 }
 
-/// A sampler that its options must make possible.
+/// A sampler whose options may be refused.
 pub(super) fn some<T>(sampler: Option<T>) -> Result<T> {
     sampler.ok_or_else(|| {
         Error::input(

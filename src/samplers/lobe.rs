@@ -79,7 +79,7 @@ impl Technique<Directions<PowerGrade>> for PowerLobe {
     /// With a = s^2 the mean of cos(theta) = 2 / (1 + v) - 1 is 2 I - 1,
     ///   I = int_0^inf a / ((a + v)^2 (1 + v)) dv = (1 - a + a ln a) / (1 - a)^2   (1/2 for a = 1);
     /// and half of all lies within v = a. The cosine of a narrow lobe is 1 except for few draws far out,
-    /// whose mean says little of the rest: there it is not asked.
+    /// whose mean tells little about the rest: there it is not tested.
     fn contrasts(&self, chart: &Directions<PowerGrade>) -> Vec<Contrast> {
         let grade = chart.grade;
         let a = grade.width * grade.width;

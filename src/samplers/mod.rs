@@ -1,14 +1,14 @@
-//! The sampler catalogue: every way of drawing a sample, beside what it says it draws from.
+//! The sampler catalogue: every way of drawing a sample, beside the density that it claims.
 //!
 //! A sampler's outcomes fall apart into nothing at all (`Null`), discrete outcomes (`Delta`), and points
 //! of continuous pieces. A piece has a *chart*: one or two coordinates over a box, in which the density
-//! is smooth but for its stated kinks, graded so that a narrow lobe is as wide as the box. Densities
+//! is smooth except at its stated kinks, graded so that a narrow lobe is as wide as the box. Densities
 //! here are per unit of the chart (the code's density times the chart's Jacobian, which is written down
-//! beside the chart and not taken from the sampler). What a sampler draws and what its density says come
-//! from different functions of the code under test, so that each is held against the other.
+//! beside the chart and not taken from the sampler). What a sampler draws and the density that it claims
+//! come from different functions of the code under test, so that each is checked by the other.
 //!
 //! Samplers of directions, of distances along a line and of points of a plane need no chart of their
-//! own: [`chart`] has one for each of these domains. A sampler's file also says under which name and
+//! own: [`chart`] has one for each of these domains. A sampler's file also states under which name and
 //! with which options an experiment asks for it ([`SamplerKind`]); [`KINDS`] lists them all.
 
 pub mod body;

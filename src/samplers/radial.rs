@@ -27,13 +27,13 @@ pub const KIND: SamplerKind = sampler_kind!(
 enum RadialOptions {
     /// Exponential radius.
     Exponential {
-        /// 1/mm.
+        /// Rate of the exponential, 1/mm.
         #[schemars(extend("exclusiveMinimum" = 0))]
         sigma_per_mm: f64,
     },
     /// A Gaussian of the plane.
     Gaussian {
-        /// Along each axis.
+        /// Variance along each axis, mm^2.
         #[schemars(extend("exclusiveMinimum" = 0))]
         variance_mm2: f64,
         /// Radius of the disc that it is cut to; left out, it is not.
@@ -42,7 +42,7 @@ enum RadialOptions {
     },
     /// Normalized diffusion (Christensen & Burley 2015).
     NormalizedDiffusion {
-        /// Its parameter d.
+        /// Parameter d of the profile, mm.
         #[schemars(extend("exclusiveMinimum" = 0))]
         d_mm: f64,
     },

@@ -1,4 +1,4 @@
-//! What every sampler of the catalogue says of itself: its draws, and the distribution that it claims.
+//! What every sampler of the catalogue declares: its draws, and the distribution that it claims.
 
 use std::f64::consts::TAU;
 
@@ -7,21 +7,21 @@ use crate::sampling::stream::Stream;
 
 /// One sampler with its parameters: what it draws, and the distribution that it claims to draw from.
 pub trait Sampler: Send + Sync {
-    /// Draws once.
+    /// Draws one outcome.
     fn draw(&self, stream: &mut Stream) -> Draw;
 
-    /// The continuous pieces.
+    /// The continuous pieces of the distribution.
     fn pieces(&self) -> Vec<Piece>;
 
     /// Density of piece `piece` per unit of its chart, from the code's own density function.
     fn density(&self, piece: usize, at: [f64; 2]) -> f64;
 
-    /// The discrete outcomes.
+    /// The discrete outcomes of the distribution.
     fn deltas(&self) -> Vec<Discrete> {
         Vec::new()
     }
 
-    /// How often it returns nothing.
+    /// Probability that it returns no sample.
     fn null(&self) -> Null {
         Null::Never
     }
@@ -37,10 +37,10 @@ pub trait Sampler: Send + Sync {
     }
 }
 
-/// One outcome.
+/// Outcome of one draw.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Draw {
-    /// The sampler returned nothing.
+    /// The sampler returned no sample.
     Null,
     /// Discrete outcome `index`; `exact` is false where its value is farther than 1e-12 from what it
     /// has to be.
@@ -50,7 +50,7 @@ pub enum Draw {
         /// Whether its value is right.
         exact: bool,
     },
-    /// A point of piece `piece`; `density` is what the sampler itself says of it, per unit of the chart.
+    /// A point of piece `piece`; `density` is the sampler's own density there, per unit of the chart.
     Point {
         /// Index into [`Sampler::pieces`].
         piece: usize,
@@ -66,7 +66,7 @@ pub enum Draw {
 pub struct Piece {
     /// Its name in tables.
     pub name: String,
-    /// The coordinates.
+    /// Coordinates of the piece.
     pub axes: [Coordinate; 2],
     /// 1 where the second coordinate is not used (its axis is then [0, 1]).
     pub dimensions: usize,
@@ -75,7 +75,7 @@ pub struct Piece {
 /// One coordinate of a chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coordinate {
-    /// From and to.
+    /// Lower and upper limit.
     pub range: [f64; 2],
     /// Values at which the density or its slope jumps, besides the ends.
     pub kinks: Vec<f64>,
@@ -88,11 +88,11 @@ pub struct Coordinate {
 pub struct Discrete {
     /// Its name in tables.
     pub name: String,
-    /// Its probability.
+    /// Probability of the outcome.
     pub mass: f64,
 }
 
-/// How often a sampler returns nothing.
+/// Probability that a sampler returns no sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Null {
     /// Never; one null is an error.

@@ -39,7 +39,7 @@ pub const MESH: SamplerKind = sampler_kind!(
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct MeshOptions {
-    /// The mesh.
+    /// Shape of the mesh.
     shape: UnevenShape,
     /// How a triangle is chosen.
     triangles: FaceChoice,
@@ -94,7 +94,7 @@ fn area(Triangle([a, b, c]): &Triangle) -> f64 {
     0.25 * ((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))).sqrt()
 }
 
-/// One triangle.
+/// Sampler of uniform points on one triangle.
 pub struct TriangleSampler {
     triangle: Triangle,
 }

@@ -1,4 +1,4 @@
-//! The catalogue as `experiments/verify/samplers.toml` lists it: what can be said of every sampler
+//! The catalogue as `experiments/verify/samplers.toml` lists it: what holds for every sampler
 //! without statistics.
 
 use serde_json::{Map, Value};
@@ -42,7 +42,7 @@ fn every_kind_is_in_the_file_and_every_name_once() {
     assert_eq!(names.len(), count);
 }
 
-/// D5 and D10: a sample says of itself what is said of its place, lies inside its chart, is exact where
+/// D5 and D10: a sample carries the density of its place, lies inside its chart, is exact where
 /// it is discrete, and takes as many numbers as every other.
 #[test]
 fn samples_agree_with_their_density() {
@@ -137,8 +137,8 @@ fn contrasts_have_their_means() {
     assert!(known > 60, "{known} means are known");
 }
 
-/// A density that is off by a thousandth, a mirrored one and one of the wrong place are told apart: the
-/// tests above can fail.
+/// A density that is off by a thousandth, a mirrored one and one of the wrong place are distinguished:
+/// the tests above can fail.
 #[test]
 fn wrong_densities_are_seen() {
     let (_, right) = build(

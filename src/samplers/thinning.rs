@@ -2,13 +2,13 @@
 //! neighbours independently, and so many in all as independence has it.
 //!
 //! The cloud is fixed, on a sphere of diameter D. One draw is one query. Views:
-//!   distance   a point j is chosen, and the query stands at distance d from it, uniform in [0, D], in a
+//!   distance   a point j is chosen, and the query is at distance d from it, uniform in [0, D], in a
 //!              uniform direction; the outcome is the chart coordinate d/D where j is accepted (density
 //!              p(d) per unit), else nothing. The density that the sampler reports is 1 over the weight
 //!              that it gave.
-//!   pair       the query stands still; of a random pair of neighbours in the tree neither, one or both
+//!   pair       the query is fixed; of a random pair of neighbours in the tree neither, one or both
 //!              are accepted.
-//!   number     the query stands still; how many points are accepted, whose law is Poisson-binomial.
+//!   number     the query is fixed; how many points are accepted, whose law is Poisson-binomial.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -38,12 +38,12 @@ pub struct ThinningOptions {
     /// How accepted points are found.
     #[serde(default)]
     pub search: Search,
-    /// What of a query is looked at.
+    /// Which outcome of a query is tested.
     pub view: QueryView,
     /// Points of the cloud, on a sphere.
     #[schemars(range(min = 2, max = 1048576))]
     pub points: usize,
-    /// Its radius, mm.
+    /// Radius, mm.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius_mm: f64,
 }
@@ -62,15 +62,15 @@ pub enum NumericRule {
     Proportional([f64; 2]),
 }
 
-/// What of a query is looked at.
+/// Which outcome of a query is tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum QueryView {
     /// A single point, by its distance.
     Distance,
-    /// Two neighbours.
+    /// Which of two neighbours are accepted.
     Pair,
-    /// How many points.
+    /// Number of points that are accepted.
     Number,
 }
 
@@ -97,7 +97,7 @@ pub struct ThinningSampler {
     search: Search,
     view: QueryView,
     diameter: f64,
-    /// Where a query stands that does not move.
+    /// Place of a query that does not move.
     at: DVec3,
     /// Numbers of points that are outcomes of their own; what is less or more counts as the first or
     /// last.
@@ -105,7 +105,7 @@ pub struct ThinningSampler {
     masses: Vec<f64>,
 }
 
-/// Mass of numbers below which they are not told apart.
+/// Mass below which numbers of points are not distinguished.
 const RARE: f64 = 1e-5;
 
 impl ThinningSampler {

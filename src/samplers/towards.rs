@@ -78,7 +78,7 @@ struct JointOptions {
 /// the first coordinate; the azimuth alone is [`DIRECTION`]'s.
 struct JointSampler {
     code: TowardsPoint,
-    /// The point.
+    /// Position relative to the point.
     offset: DVec3,
     t_max: f64,
 }

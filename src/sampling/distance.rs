@@ -139,7 +139,7 @@ pub struct DistanceMixture {
     pub sigma_t: f64,
     /// Length of the ray, mm; may be infinite. The equiangular part is built with the same.
     pub t_max: f64,
-    /// The equiangular part.
+    /// Equiangular part of the mixture.
     pub equiangular: Equiangular,
     /// The exponential part's probability.
     pub share_exponential: f64,
@@ -308,8 +308,8 @@ mod tests {
         }
     }
 
-    /// The point on the line is the clamp's business, the point at the origin nobody's; vectors and
-    /// their two numbers say the same.
+    /// A point on the line is handled by the clamp, a point at the origin is refused; vectors and
+    /// their two numbers agree.
     #[test]
     fn equiangular_limits() {
         assert_eq!(Equiangular::new(0.0, 0.0, 1.0), None);

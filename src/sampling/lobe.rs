@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 
 use crate::math::{DVec3, Frame, sin_cos_turns};
 
-/// The lobe.
+/// Power-cosine lobe about an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerLobe {
     frame: Frame,

@@ -12,7 +12,7 @@ use crate::math::{exp, lambert_excess, ln_1p, sin_cos_turns};
 pub enum Radial {
     /// The radius is exponential: sigma e^(-sigma r) / (2 pi r) per area.
     Exponential {
-        /// 1/mm, positive.
+        /// Rate sigma, 1/mm; positive.
         sigma: f64,
     },
     /// e^(-r^2 / 2v) inside the disc of radius `r_max`, 0 outside it.
@@ -25,7 +25,7 @@ pub enum Radial {
     /// Normalized diffusion (Christensen & Burley 2015): (e^(-r/d) + e^(-r/(3d))) / (8 pi d r), in
     /// radius one part of Exp(d) and three parts of Exp(3d).
     NormalizedDiffusion {
-        /// d, positive.
+        /// Parameter d, mm; positive.
         d: f64,
     },
     /// The dipole of Jensen et al. 2001; see [`Dipole`].

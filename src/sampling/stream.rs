@@ -1,6 +1,6 @@
 //! Random streams by key. Door for `rand_pcg`.
 //!
-//! A key says *what* is sampled, never who runs it: experiment, cell, bands, estimator and stage are
+//! A key states *what* is sampled, never who runs it: experiment, cell, bands, estimator and stage are
 //! hashed into 256 bits (`StreamKey::new`); pass, index (pixel or path) and purpose are mixed in on
 //! top. The result seeds both words of the generator, because consecutive raw seeds or streams of a
 //! PCG are measurably correlated. Number of threads, blocks, budgets and claims never enter.
@@ -15,7 +15,7 @@ pub enum Purpose {
     Sensor = 1,
     /// The walk: distances, directions, lobes, roulette.
     Walk = 2,
-    /// Light samples.
+    /// Numbers of light samples.
     Light = 3,
     /// Connections from medium vertices through the boundary.
     Connection = 4,
@@ -55,7 +55,7 @@ impl StreamKey {
         StreamKey([word(0), word(1), word(2), word(3)])
     }
 
-    /// The key that a name stands for: tests and benches are seeded by their names, so that nobody
+    /// The key of a name: tests and benches are seeded by their names, so that nobody
     /// chooses a seed. FNV-1a over the text, four times with different offsets, finalised.
     pub fn named(name: &str) -> StreamKey {
         let lane = |offset: u64| {
@@ -118,13 +118,13 @@ impl Stream {
         self.generator.next_u64()
     }
 
-    /// The next two.
+    /// The next two uniform numbers.
     #[inline]
     pub fn draw2(&mut self) -> [f64; 2] {
         [self.draw(), self.draw()]
     }
 
-    /// The next three.
+    /// The next three uniform numbers.
     #[inline]
     pub fn draw3(&mut self) -> [f64; 3] {
         [self.draw(), self.draw(), self.draw()]

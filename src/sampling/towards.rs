@@ -1,6 +1,6 @@
 //! Direction and distance together, so that both squared distances of a connection cancel.
 //!
-//! Light that scatters at a vertex a, then at x, and goes on to a given point b carries the geometry
+//! Light that scatters at a vertex a, then at x, and continues to a given point b carries the geometry
 //! 1 / (|x - a|^2 |x - b|^2). For an isotropic phase function that is all of the integrand that varies
 //! fast, and it can be sampled exactly (Kulla & Fajardo 2012; Georgiev et al. 2013, joint importance
 //! sampling): with theta the angle at a between x and b, R = |b - a|,

@@ -10,9 +10,9 @@ use crate::sampling::warp::{pdf_cap, square_to_cap};
 /// A light, with its radiance (or irradiance) per band.
 #[derive(Debug)]
 pub struct Light {
-    /// Name in observables.
+    /// Name of the light in observables.
     pub name: String,
-    /// What it sends.
+    /// Radiance or irradiance by direction and band.
     pub emission: Emission,
 }
 
@@ -21,7 +21,7 @@ pub struct Light {
 pub enum Emission {
     /// Parallel light.
     Directional {
-        /// Towards the light.
+        /// Unit direction towards the light.
         toward: DVec3,
         /// On a plane that faces it, W/mm^2, per band.
         irradiance: Vec<f64>,
@@ -42,7 +42,7 @@ pub enum Emission {
 /// A direction drawn from a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
-    /// Towards the light.
+    /// Unit direction towards the light.
     pub wi: DVec3,
     /// Radiance, W/(mm^2 sr); for parallel light the irradiance, W/mm^2.
     pub radiance: f64,

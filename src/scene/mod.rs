@@ -14,7 +14,7 @@ use crate::geometry::Shape;
 use crate::optics::boundary::Boundary;
 use crate::optics::medium::Medium;
 
-/// A body, what shines on it, what looks at it. Optical properties stand per band.
+/// A body, its lights and its sensor. Optical properties are per band.
 #[derive(Debug)]
 pub struct Scene {
     /// Geometry of the body; cells of a sweep share it.
@@ -25,7 +25,7 @@ pub struct Scene {
     pub medium: Vec<Medium>,
     /// The lights, all shining at once.
     pub lights: Vec<Light>,
-    /// What is measured.
+    /// Sensor, which defines what is measured.
     pub sensor: Sensor,
 }
 

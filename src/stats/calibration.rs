@@ -1,9 +1,9 @@
-//! The verifier verified: every kind of test plays null hypotheses that are true by construction, and its
-//! p-values must be uniform (or conservative, where that is all it promises). Driven by ChaCha, a generator
-//! of another family than the program's; seeds are hashes of names.
+//! The verifier verified: every kind of test is run on null hypotheses that are true by construction,
+//! and its p-values must be uniform (or conservative, where that is all it promises). Driven by ChaCha,
+//! a generator of another family than the program's; seeds are hashes of names.
 //!
-//! The short versions run with every test command. The long one writes `results/published/calibration.csv`
-//! and `calibration.md`:
+//! The short versions run with every test command. The long one writes
+//! `results/published/calibration.csv` and `calibration.md`:
 //!
 //! ```text
 //! cargo test --release --lib -- --ignored the_calibration_is_published
@@ -77,7 +77,7 @@ fn masses(count: usize) -> Vec<f64> {
     (0..count).map(|i| cdf((i + 1) as f64 / n) - cdf(i as f64 / n)).collect()
 }
 
-/// What a kind of test promises of its p-values under a true hypothesis.
+/// Guarantee of a kind of test on its p-values under a true hypothesis.
 #[derive(Clone, Copy, PartialEq)]
 enum Promise {
     /// P(p <= x) = x.
@@ -209,20 +209,22 @@ const KINDS: [Kind; 10] = [
     },
 ];
 
-/// The weight e^(sigma d), d ~ Exp(lambda), if the flight was accepted (with probability e^(-sigma d)), else
+/// The weight e^(sigma d), d ~ Exp(lambda), if the flight was accepted (with probability e^(-sigma d)),
+/// else
 /// 0. Its mean is 1.
 fn reweighted(d: &mut Draws, lambda_over_sigma: f64) -> f64 {
     let tau = d.exponential() / lambda_over_sigma;
     if d.uniform() < (-tau).exp() { tau.exp() } else { 0.0 }
 }
 
-/// The levels whose rejections are counted: a distance between distributions says nothing of their tails.
+/// The levels whose rejections are counted: a distance between distributions does not bound their
+/// tails.
 const LEVELS: [f64; 2] = [1e-2, 1e-3];
 
 /// Each check of a kind may alarm by chance with this probability.
 const ALARM: f64 = 1e-4;
 
-/// What many runs of a null hypothesis showed.
+/// Result of many runs of a null hypothesis.
 struct Calibration {
     runs: u64,
     distance: f64,
@@ -267,8 +269,8 @@ fn alarming(runs: u64) -> (u64, f64) {
     (count.expect("a count"), distance.expect("a distance"))
 }
 
-// 600 runs a kind: a distance of 0.092 from the uniform distribution alarms, and a test that rejects 5 % at the
-// level 1e-2 alarms with a probability of 98 %. The published calibration has 4000 runs.
+// 600 runs a kind: a distance of 0.092 from the uniform distribution alarms, and a test that rejects 5 %
+// at the level 1e-2 alarms with a probability of 98 %. The published calibration has 4000 runs.
 #[test]
 fn every_kind_of_test_keeps_its_level() {
     let (count, distance) = alarming(600);
@@ -321,8 +323,8 @@ fn heavy_tails(lambda_over_sigma: f64, runs: u64) -> Calibration {
     Calibration::of(p_values, Promise::Conservative)
 }
 
-// Why a mean of weights of infinite variance is refused and not tested: at finite variance the z-test keeps
-// its level; at infinite variance it alarms 12 % and 37 % of the time at the level 1 %.
+// Why a mean of weights of infinite variance is refused and not tested: at finite variance the z-test
+// keeps its level; at infinite variance it alarms 12 % and 37 % of the time at the level 1 %.
 #[test]
 fn a_z_test_does_not_survive_heavy_tails() {
     for (ratio, at_least, at_most) in [(4.0, 0.0, 0.03), (0.5, 0.06, 0.2), (0.25, 0.27, 0.47)] {
@@ -371,9 +373,9 @@ const SHAPES: [Distribution; 6] = [
     },
 ];
 
-/// Of intervals at 95 and 99.9 %, over 64 blocks of 256 passes an arm: how often they hold the true ratio, 1;
-/// the median width of the former in the logarithm; how often the ratio was resolved; and how often an F
-/// interval at 95 % holds it.
+/// Of intervals at 95 and 99.9 %, over 64 blocks of 256 passes an arm: how often they hold the true
+/// ratio, 1; the median width of the former in the logarithm; how often the ratio was resolved; and how
+/// often an F interval at 95 % holds it.
 struct Coverage {
     runs: u64,
     at_95: u64,
@@ -407,9 +409,10 @@ fn coverage(shape: &Distribution, runs: u64) -> Coverage {
     c
 }
 
-// 500 runs know a coverage within +-0.01 (one standard deviation). Bounds: 93 to 97 % for arms of one shape and
-// 91 % for the mixed row, 3.3 standard deviations further out, so that a true 95 % (92 %) passes and
-// the 25 % of an F interval does not. The published calibration has 2000 runs and the bounds themselves.
+// 500 runs know a coverage within +-0.01 (one standard deviation). Bounds: 93 to 97 % for arms of one
+// shape and 91 % for the mixed row, 3.3 standard deviations further out, so that a true 95 % (92 %)
+// passes and the 25 % of an F interval does not. The published calibration has 2000 runs and the bounds
+// themselves.
 #[test]
 fn efficiency_intervals_cover() {
     for (shape, low, high) in [(1, 0.90, 0.99), (2, 0.90, 0.99), (5, 0.87, 0.98)] {

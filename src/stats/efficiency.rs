@@ -1,32 +1,33 @@
-//! Efficiency at equal cost: the log ratio of two estimators' variance times cost, with an interval from a
-//! block jackknife, and the conditions under which such a number means anything.
+//! Efficiency at equal cost: the log ratio of two estimators' variance times cost, with an interval from
+//! a block jackknife, and the conditions under which such a number means anything.
 //!
-//! For arms A and B, R = log(V_A c_A) - log(V_B c_B): V is the variance of one pass, pooled over all blocks,
-//! c the cost of one pass, sum cost / sum n. At R < 0, A reaches an error at less cost: exp(-R) is its gain.
+//! For arms A and B, R = log(V_A c_A) - log(V_B c_B): V is the variance of one pass, pooled over all
+//! blocks, c the cost of one pass, sum cost / sum n. At R < 0, A reaches an error at less cost: exp(-R)
+//! is its gain.
 //!
-//! *Why a jackknife.* An F interval for V_A/V_B believes in normal values and covers 25 % instead of 95 % on
-//! lognormal ones; the mean of per-block log variances is biased by the concavity of the logarithm, and
-//! differently for two shapes. Leaving out one block at a time and recomputing the pooled ratio measures
-//! its spread whatever the shape, and V and c together, which are correlated: long paths cost more and
-//! vary more.
+//! *Why a jackknife.* An F interval for V_A/V_B believes in normal values and covers 25 % instead of 95
+//! % on lognormal ones; the mean of per-block log variances is biased by the concavity of the logarithm,
+//! and differently for two shapes. Leaving out one block at a time and recomputing the pooled ratio
+//! measures its spread whatever the shape, and V and c together, which are correlated: long paths cost
+//! more and vary more.
 //!
-//! *Unequal blocks* (a partial last one). With n_k of n passes in block k and h_k = n / n_k, the pseudo-value
-//! of f is h_k f - (h_k - 1) f(without k), and
+//! *Unequal blocks* (a partial last one). With n_k of n passes in block k and h_k = n / n_k, the
+//! pseudo-value of f is h_k f - (h_k - 1) f(without k), and
 //!   J = sum pseudo_k / h_k,   var J = (1/B) sum (pseudo_k - J)^2 / (h_k - 1)
-//! (F. Busing, E. Meijer, R. van der Leeden, "Delete-m jackknife for unequal m" (1999)). With equal blocks
-//! this is Tukey's (B - 1)/B sum (f(without k) - mean)^2. As R is a difference of a function of A's blocks and
-//! one of B's, deleting block k of both arms changes it by the sum of the two changes: with
-//! e_k = (pseudo_k - J) / sqrt(B (h_k - 1)) in each arm, the joint variance is sum (e_k(A) - e_k(B))^2, which
-//! keeps the covariance of blocks that ran side by side. Arms with different numbers of blocks are
-//! independent: their variances add, and Satterthwaite's dof holds.
+//! (F. Busing, E. Meijer, R. van der Leeden, "Delete-m jackknife for unequal m" (1999)). With equal
+//! blocks this is Tukey's (B - 1)/B sum (f(without k) - mean)^2. As R is a difference of a function of
+//! A's blocks and one of B's, deleting block k of both arms changes it by the sum of the two changes:
+//! with e_k = (pseudo_k - J) / sqrt(B (h_k - 1)) in each arm, the joint variance is sum (e_k(A) -
+//! e_k(B))^2, which keeps the covariance of blocks that ran side by side. Arms with different numbers of
+//! blocks are independent: their variances add, and Satterthwaite's dof holds.
 //!
-//! *Variances as values.* Where a pass is an image, V is the variance of a pixel, averaged over the pixels. Of
-//! every two consecutive passes x and y, d = (x - y)^2 / 2, averaged over the pixels, is an unbiased estimate
-//! of it, and the pairs are independent: V is the mean of d (`Values::Variances`), whatever correlation
-//! there is between the pixels of one pass. By itself a pair of passes is a poor estimate, with
-//! var(d) / V^2 = (kurtosis + 1) / 2 for one pixel; the mean of n / 2 of them has (kurtosis + 1) / n, where the
-//! variance of all n values has (kurtosis - 1) / n: nothing is lost where tails are heavy, and where they are
-//! not, the pixels average it out.
+//! *Variances as values.* Where a pass is an image, V is the variance of a pixel, averaged over the
+//! pixels. Of every two consecutive passes x and y, d = (x - y)^2 / 2, averaged over the pixels, is an
+//! unbiased estimate of it, and the pairs are independent: V is the mean of d (`Values::Variances`),
+//! whatever correlation there is between the pixels of one pass. By itself a pair of passes is a poor
+//! estimate, with var(d) / V^2 = (kurtosis + 1) / 2 for one pixel; the mean of n / 2 of them has
+//! (kurtosis + 1) / n, where the variance of all n values has (kurtosis - 1) / n: nothing is lost where
+//! tails are heavy, and where they are not, the pixels average it out.
 //!
 //! The quoted R is the plain one, not bias-corrected: its bias is of order 1/n, its error of order
 //! 1/sqrt(n).
@@ -39,13 +40,13 @@ use super::tails::critical_value;
 use super::tree::Merge;
 use crate::math::{exp, ln};
 
-/// The fewest blocks of an arm: below, Student's interval is too wide to say anything.
+/// The fewest blocks of an arm: below, Student's interval is too wide to be of use.
 pub const FEWEST_BLOCKS: usize = 8;
 
 /// The largest share of an arm's sum of squares that one pass may hold.
 pub const LARGEST_SHARE: f64 = 0.05;
 
-/// What the values of a block are, and so what V is.
+/// Meaning of a block's values, and so of V.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Values {
     /// Scores of passes: V is their variance.
@@ -62,8 +63,8 @@ impl Values {
         }
     }
 
-    /// Of a block, the sum of the terms that V is the mean of, and of their squares; `mean` is that of all
-    /// scores.
+    /// Of a block, the sum of the terms that V is the mean of, and of their squares; `mean` is that of
+    /// all scores.
     fn terms(self, moments: &Moments, mean: f64) -> (f64, f64) {
         match self {
             Values::Scores => about(moments, mean),
@@ -80,7 +81,7 @@ impl Values {
 pub struct JackknifeBlock {
     /// Moments of the passes' values.
     pub moments: Moments,
-    /// What they cost together, in any unit that both arms share: CPU seconds, rays.
+    /// Their total cost, in any unit that both arms share: CPU seconds, rays.
     pub cost: f64,
 }
 
@@ -100,7 +101,7 @@ impl fmt::Display for NoRatio {
         f.write_str(match self {
             NoRatio::TooFewBlocks => "an arm has too few blocks, or an empty one",
             NoRatio::NotFinite => "a moment or a cost is not finite, or a cost is not positive",
-            NoRatio::ZeroVariance => "an arm has no variance, at least without one of its blocks",
+            NoRatio::ZeroVariance => "an arm has zero variance, at least without one of its blocks",
         })
     }
 }
@@ -113,7 +114,7 @@ pub struct LogRatio {
 }
 
 impl LogRatio {
-    /// The ratio itself.
+    /// Estimate of the ratio.
     pub fn ratio(&self) -> f64 {
         exp(self.log.value)
     }
@@ -135,20 +136,21 @@ impl LogRatio {
     }
 }
 
-/// What one arm is like.
+/// Summary of one arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmSummary {
     /// Moments of all its passes.
     pub moments: Moments,
     /// Cost of a pass.
     pub cost: f64,
-    /// Kurtosis of a pass (3 for a normal). The variance of log V is about (kurtosis - 1) / n. NaN for variances,
-    /// which have none.
+    /// Kurtosis of a pass (3 for a normal). The variance of log V is about (kurtosis - 1) / n. NaN for
+    /// variances, which have none.
     pub kurtosis: f64,
-    /// The largest share of M2 (about the mean of all passes) that one block holds; of variances, of their sum.
+    /// The largest share of M2 (about the mean of all passes) that one block holds; of variances, of
+    /// their sum.
     pub largest_block: f64,
-    /// A lower and an upper bound of the largest share of M2 that one pass holds, or of the sum of variances
-    /// that one of them is: see [`one_pass_share`].
+    /// A lower and an upper bound of the largest share of M2 that one pass holds, or of the sum of
+    /// variances that one of them is: see [`one_pass_share`].
     pub largest_pass: (f64, f64),
 }
 
@@ -157,26 +159,27 @@ pub struct ArmSummary {
 pub struct Efficiency {
     /// V_A c_A / (V_B c_B): below 1 where A is the more efficient.
     pub work: LogRatio,
-    /// V_A / V_B.
+    /// Ratio of the variances, V_A / V_B.
     pub variance: LogRatio,
-    /// c_A / c_B.
+    /// Ratio of the costs per pass, c_A / c_B.
     pub cost: LogRatio,
-    /// Arm A.
+    /// Variance and cost of arm A.
     pub a: ArmSummary,
-    /// Arm B.
+    /// Variance and cost of arm B.
     pub b: ArmSummary,
-    /// Were the blocks deleted in pairs?
+    /// Whether the blocks were deleted in pairs.
     pub is_joint: bool,
-    /// How far `work`'s log moved from the first half of the blocks to all of them: when the passes doubled.
+    /// How far `work`'s log moved from the first half of the blocks to all of them: when the passes
+    /// doubled.
     pub moved: f64,
 }
 
 impl Efficiency {
-    /// May the ratio be quoted at `confidence`: it moved by no more than half its interval, and in neither
-    /// arm may one pass hold more than [`LARGEST_SHARE`] of M2 (by the upper bound of `largest_pass`). The
-    /// first condition alone fails by chance in 1 - confidence of all honest comparisons: R of half the data
-    /// has twice the variance, its covariance with R of all is the latter's variance, and so their
-    /// difference has the standard error of R itself.
+    /// May the ratio be quoted at `confidence`: it moved by no more than half its interval, and in
+    /// neither arm may one pass hold more than [`LARGEST_SHARE`] of M2 (by the upper bound of
+    /// `largest_pass`). The first condition alone fails by chance in 1 - confidence of all honest
+    /// comparisons: R of half the data has twice the variance, its covariance with R of all is the
+    /// latter's variance, and so their difference has the standard error of R itself.
     pub fn is_resolved(&self, confidence: f64) -> bool {
         let is_shared = [self.a, self.b].iter().all(|arm| arm.largest_pass.1 <= LARGEST_SHARE);
         // A NaN (a first half of zero variance) resolves nothing.
@@ -186,12 +189,12 @@ impl Efficiency {
 
 /// Bounds of the largest share s of sum (x_i - m)^2 that one pass of any block holds, m the mean of all.
 ///
-/// In block k let Q2 = sum (x_i - m)^2 and Q4 = sum (x_i - m)^4 (its moments shifted by d = mean_k - m). One of
-/// the terms of Q4 is the square of the largest of Q2, so that is at most sqrt(Q4); and Q4 <= (largest term)
-/// Q2, so it is at least Q4 / Q2. With M2 = sum of all Q2:
+/// In block k let Q2 = sum (x_i - m)^2 and Q4 = sum (x_i - m)^4 (its moments shifted by d = mean_k - m).
+/// One of the terms of Q4 is the square of the largest of Q2, so that is at most sqrt(Q4); and Q4 <=
+/// (largest term) Q2, so it is at least Q4 / Q2. With M2 = sum of all Q2:
 ///   max_k Q4 / (Q2 M2) <= s <= max_k sqrt(Q4) / M2.
-/// Over one block the bounds are kurtosis / n and sqrt(kurtosis / n). With the sum of a block's variances for Q2
-/// and that of their squares for Q4, the same holds of the largest variance.
+/// Over one block the bounds are kurtosis / n and sqrt(kurtosis / n). With the sum of a block's
+/// variances for Q2 and that of their squares for Q4, the same holds of the largest variance.
 pub fn one_pass_share(blocks: &[JackknifeBlock], values: Values, mean: f64) -> (f64, f64) {
     let terms = |b: &JackknifeBlock| values.terms(&b.moments, mean);
     let m2: f64 = blocks.iter().map(|b| terms(b).0).sum();
@@ -357,8 +360,8 @@ impl Jackknife {
 }
 
 /// The delete-one jackknife's standard error of a positive estimate's logarithm: from the estimates
-/// that leave one block out each, se^2 = (n - 1) / n sum (log - mean log)^2. Infinite for fewer than two.
-/// For estimates that are no sums over [`JackknifeBlock`]s.
+/// that leave one block out each, se^2 = (n - 1) / n sum (log - mean log)^2. Infinite for fewer than
+/// two. For estimates that are no sums over [`JackknifeBlock`]s.
 pub fn jackknife_log_error(without_one: &[f64]) -> f64 {
     if without_one.len() < 2 {
         return f64::INFINITY;
@@ -369,8 +372,8 @@ pub fn jackknife_log_error(without_one: &[f64]) -> f64 {
     ((n - 1.0) / n * logs.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>()).sqrt()
 }
 
-/// All blocks but one, for each: merged prefixes with merged suffixes, because taking a block out again by
-/// subtraction would cancel.
+/// All blocks except one, for each: merged prefixes with merged suffixes, because taking a block out
+/// again by subtraction would cancel.
 fn without_each(blocks: &[JackknifeBlock]) -> Vec<Totals> {
     let mut after = vec![Totals::default()];
     for block in blocks.iter().rev() {
@@ -492,10 +495,10 @@ mod tests {
         close(found.a.kurtosis, found.b.kurtosis, 1e-12);
     }
 
-    // The influence of a block on a mean is its share of the passes times its distance from the mean, so for
-    // the cost (log c is nearly linear where costs are nearly equal) the error of blocks of n_k passes is
-    // sqrt(sum n_k (c_k - c)^2 / ((B - 1) n)) / c, whatever their sizes: the partial block counts by its
-    // passes, where equal weights would let its own noise dominate.
+    // The influence of a block on a mean is its share of the passes times its distance from the mean, so
+    // for the cost (log c is nearly linear where costs are nearly equal) the error of blocks of n_k
+    // passes is sqrt(sum n_k (c_k - c)^2 / ((B - 1) n)) / c, whatever their sizes: the partial block
+    // counts by its passes, where equal weights would let its own noise dominate.
     #[test]
     fn a_partial_block_has_its_weight() {
         let mut a = blocks(64, 64, 0.3);
@@ -534,8 +537,8 @@ mod tests {
         assert!(compare(&calm, &calm, Values::Scores).expect("a ratio").is_resolved(0.95));
     }
 
-    // Blocks of variances: the ratio of their means, with Tukey's error of its logarithm, and the largest of
-    // them as the one that must not decide.
+    // Blocks of variances: the ratio of their means, with Tukey's error of its logarithm, and the
+    // largest of them as the one that must not decide.
     #[test]
     fn variances_are_compared_by_their_means() {
         let (a, b) = (blocks(12, 16, 0.3), blocks(12, 16, 70.7));
@@ -566,8 +569,8 @@ mod tests {
         assert_eq!(compare(&none, &calm, Values::Variances).err(), Some(NoRatio::ZeroVariance));
     }
 
-    // The second half of A is three times as wide as the first: the log ratio moves by log 5 when the passes
-    // double, while no single pass is to blame.
+    // The second half of A is three times as wide as the first: the log ratio moves by log 5 when the
+    // passes double, while no single pass is to blame.
     #[test]
     fn a_ratio_that_moves_is_not_resolved() {
         let steady = blocks(64, 64, 0.3);

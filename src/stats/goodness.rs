@@ -5,11 +5,11 @@
 //! levels down to 1e-6, and a test that does not meet them is refused, never passed:
 //!
 //! - *The expectations are resolved.* With p_i off by d_i, X2 of a perfect sampler is a noncentral
-//!   chi-square with noncentrality lambda = N sum d_i^2 / p_i at most. That moves its mean by lambda; one
-//!   standard deviation of X2 is sqrt(2 dof). Required: lambda <= 0.02 sqrt(2 dof), a shift that takes a
-//!   level of 1e-6 to 1.1e-6 at most.
-//! - *No bin is thin*: N p_i >= 25. At 5, the usual rule, rejections at the level 1e-3 are twice too many
-//!   where one bin dominates. The likelihood-ratio statistic G would need 100.
+//!   chi-square with noncentrality lambda = N sum d_i^2 / p_i at most. That moves its mean by lambda;
+//!   one standard deviation of X2 is sqrt(2 dof). Required: lambda <= 0.02 sqrt(2 dof), a shift that
+//!   takes a level of 1e-6 to 1.1e-6 at most.
+//! - *No bin is thin*: N p_i >= 25. At 5, the usual rule, rejections at the level 1e-3 are twice too
+//!   many where one bin dominates. The likelihood-ratio statistic G would need 100.
 //! - *The bins are everything*: sum p_i = 1 within the sum of the errors. Failed samples have a bin of
 //!   their own, and so has each discrete direction.
 //!
@@ -29,11 +29,11 @@ pub const LEAST_EXPECTED: f64 = 25.0;
 /// The largest noncentrality from errors of the expectations, in standard deviations of the statistic.
 pub const LARGEST_SHIFT: f64 = 0.02;
 
-/// The largest |skewness| / sqrt(n) at which the mean of n values is tested as a normal: at 0.26, t tests of
-/// skewed values at the level 1e-3 rejected 2.5 times too often.
+/// The largest |skewness| / sqrt(n) at which the mean of n values is tested as a normal: at 0.26, t
+/// tests of skewed values at the level 1e-3 rejected 2.5 times too often.
 pub const LARGEST_SKEW: f64 = 0.1;
 
-/// Why a test says nothing: never a pass.
+/// Why a test is void: never a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
     /// No samples, or fewer than two bins that can hold any.
@@ -54,12 +54,12 @@ pub enum Refusal {
     Thin {
         /// The bin, counted from 0.
         bin: usize,
-        /// Its expected count.
+        /// Expected count of the bin.
         expected: f64,
     },
     /// The probabilities do not sum to 1.
     NotNormalised {
-        /// Their sum.
+        /// Sum over the bins.
         sum: f64,
         /// How far from 1 their errors allow it to be.
         bound: f64,
@@ -106,7 +106,7 @@ impl fmt::Display for Refusal {
 /// One bin of a goodness-of-fit test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bin {
-    /// Its probability.
+    /// Probability of the bin.
     pub mass: f64,
     /// A bound of the error of `mass`; 0 with `mass` 0 for a bin that nothing may enter.
     pub error: f64,
@@ -125,7 +125,7 @@ pub struct Goodness {
     pub p_value: f64,
     /// The largest noncentrality that errors of the expectations cause.
     pub lambda_err: f64,
-    /// Samples in all.
+    /// Number of samples in all bins.
     pub samples: u64,
 }
 
@@ -150,7 +150,7 @@ impl Goodness {
 ///
 /// # Errors
 ///
-/// Every [`Refusal`] but those of means. A sample in an impossible bin is an outcome and comes first.
+/// Every [`Refusal`] except those of means. A sample in an impossible bin is an outcome and comes first.
 pub fn pearson(bins: &[Bin]) -> Result<Goodness, Refusal> {
     let is_probability = |x: f64| (0.0..=1.0).contains(&x);
     if let Some(bin) = bins.iter().position(|c| !is_probability(c.mass) || !is_probability(c.error)) {
@@ -193,9 +193,9 @@ fn resolved(lambda: f64, dof: f64) -> Result<(), Refusal> {
 /// The outcome of a test of one probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proportion {
-    /// Successes.
+    /// Number of successes.
     pub count: u64,
-    /// Trials.
+    /// Number of trials.
     pub samples: u64,
     /// The probability under test.
     pub mass: f64,
@@ -203,9 +203,9 @@ pub struct Proportion {
     pub p_value: f64,
 }
 
-/// The exact two-sided binomial test of `count` of `samples` against the probability `mass`, known within
-/// `error`: the mass of a discrete direction, or of failed samples. A mass of 0 or 1 is refuted by a
-/// single sample on the wrong side.
+/// The exact two-sided binomial test of `count` of `samples` against the probability `mass`, known
+/// within `error`: the mass of a discrete direction, or of failed samples. A mass of 0 or 1 is refuted
+/// by a single sample on the wrong side.
 ///
 /// # Errors
 ///
@@ -226,8 +226,8 @@ pub fn proportion(count: u64, samples: u64, mass: f64, error: f64) -> Result<Pro
 }
 
 impl Proportion {
-    /// The nearest probabilities below and above that are rejected at `level` with probability `power`; 0
-    /// or 1 where there is none on that side.
+    /// The nearest probabilities below and above that are rejected at `level` with probability `power`;
+    /// 0 or 1 where there is none on that side.
     pub fn detectable(&self, level: f64, power: f64) -> (f64, f64) {
         let (n, p) = (self.samples, self.mass);
         // Rejected: counts up to `low` - 1, and from `high` on.
@@ -255,8 +255,8 @@ fn first(end: u64, holds: impl Fn(u64) -> bool) -> u64 {
     low
 }
 
-/// A test with one degree of freedom of a mean against its known value: the mean cosine, of cos(2 phi), of
-/// the forward half. The cheapest test, in samples, of a defect that moves the mean.
+/// A test with one degree of freedom of a mean against its known value: the mean cosine, of cos(2 phi),
+/// of the forward half. The cheapest test, in samples, of a defect that moves the mean.
 ///
 /// `values` are the moments of independent values of bounded spread, `expected` their mean by quadrature
 /// and a bound of its error. Student's t with n - 1 degrees of freedom.
@@ -264,8 +264,8 @@ fn first(end: u64, holds: impl Fn(u64) -> bool) -> u64 {
 /// # Errors
 ///
 /// [`Refusal::Empty`] below two values, [`Refusal::NoSpread`], [`Refusal::Skewed`] (above
-/// [`LARGEST_SKEW`]), [`Refusal::Unresolved`] where the error's noncentrality n error^2 / s^2 exceeds its
-/// bound.
+/// [`LARGEST_SKEW`]), [`Refusal::Unresolved`] where the error's noncentrality n error^2 / s^2 exceeds
+/// its bound.
 pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<ContrastTest, Refusal> {
     if values.n < 2 {
         return Err(Refusal::Empty);
@@ -291,7 +291,7 @@ pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<ContrastT
 pub struct ContrastTest {
     /// The difference from the expected mean; its `detectable` is the contrast's.
     pub estimate: Estimate,
-    /// Its test.
+    /// Statistic, degrees of freedom and p-value.
     pub test: Test,
     /// The largest noncentrality that the error of the expectation causes.
     pub lambda_err: f64,
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn what_says_nothing_is_refused() {
+    fn void_tests_are_refused() {
         let good = bins(&[0.25, 0.75], &[120, 280]);
         assert!(pearson(&good).is_ok());
         let refusal = |change: fn(&mut Vec<Bin>)| {
@@ -355,7 +355,7 @@ mod tests {
 
     #[test]
     fn one_sample_where_none_can_be_is_a_failure() {
-        // Whatever else could be said against the test.
+        // Before any other refusal of the test.
         for masses in [[0.5, 0.5, 0.0], [0.01, 0.99, 0.0]] {
             let found = pearson(&bins(&masses, &[100, 100, 1])).expect("a verdict");
             assert_eq!((found.p_value, found.statistic), (0.0, f64::INFINITY));
@@ -427,8 +427,9 @@ mod tests {
         assert_eq!(contrast(&Moments::of(1.0), 1.0, 0.0), Err(Refusal::Empty));
     }
 
-    // Doses: the detectable defect, a density wrong by +-r in alternate bins, has the stated noncentrality,
-    // so that counts at their expectations under it exceed the critical value by about lambda.
+    // Doses: the detectable defect, a density wrong by +-r in alternate bins, has the stated
+    // noncentrality, so that counts at their expectations under it exceed the critical value by about
+    // lambda.
     #[test]
     fn the_detectable_defect_is_rejected() {
         let (n, k) = (1_000_000.0, 64);

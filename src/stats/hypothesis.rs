@@ -1,4 +1,4 @@
-//! Significance tests of means, and what they can detect. Two-sided throughout.
+//! Significance tests of means, and the smallest difference that they detect. Two-sided throughout.
 
 use super::moments::Moments;
 use super::tails::student_two_sided;
@@ -8,9 +8,9 @@ pub use super::tails::{chi_square_sf, critical_value};
 /// error is known).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// The estimate.
+    /// Estimate of the mean.
     pub value: f64,
-    /// Its standard error.
+    /// Standard error of the estimate.
     pub std_error: f64,
     /// Degrees of freedom of the error.
     pub dof: f64,
@@ -46,7 +46,8 @@ impl Estimate {
         Estimate { value: self.value - other.value, std_error: (va + vb).sqrt(), dof }
     }
 
-    /// Tests that the estimate's expectation is 0: by Student's t, or the normal where the error is known.
+    /// Tests that the estimate's expectation is 0: by Student's t, or the normal where the error is
+    /// known.
     pub fn test_zero(&self) -> Test {
         let statistic = self.value / self.std_error;
         Test { statistic, dof: self.dof, p_value: student_two_sided(statistic, self.dof) }

@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 use super::tails::binomial_pmf;
 use crate::math::exp;
 
-/// The largest distance between the empirical distribution of values and the uniform one on [0, 1], and its
-/// p-value; 20 values or more.
+/// The largest distance between the empirical distribution of values and the uniform one on [0, 1], and
+/// its p-value; 20 values or more.
 pub fn uniformity(values: &[f64]) -> (f64, f64) {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -36,9 +36,9 @@ pub fn kolmogorov_limit(x: f64) -> f64 {
 
 /// P(D+ >= d) for Smirnov's one-sided statistic of n independent values, exactly.
 ///
-/// Z. Birnbaum, F. Tingey, "One-sided confidence contours for probability distribution functions" (1951):
-/// d sum_j C(n, j) (d + j/n)^(j-1) (1 - d - j/n)^(n-j) over j <= n (1 - d): binomial probabilities of j
-/// with p = d + j/n, each times d / p. All terms are positive.
+/// Z. Birnbaum, F. Tingey, "One-sided confidence contours for probability distribution functions"
+/// (1951): d sum_j C(n, j) (d + j/n)^(j-1) (1 - d - j/n)^(n-j) over j <= n (1 - d): binomial
+/// probabilities of j with p = d + j/n, each times d / p. All terms are positive.
 pub fn smirnov(d: f64, n: u64) -> f64 {
     if d <= 0.0 {
         return 1.0;
@@ -62,8 +62,8 @@ pub fn smirnov(d: f64, n: u64) -> f64 {
 /// From n d^2 = 4 on, twice the one-sided probability: both sides reach d with a probability of about
 /// exp(-8 n d^2), so the relative error is about exp(-6 n d^2) <= 4e-11. Below (p > 6e-4), the limit at
 /// x + 1/(6 sqrt(n)) + (x - 1)/(4 n), x = sqrt(n) d (J. Vrbik, "Small-sample corrections to
-/// Kolmogorov-Smirnov test statistic" (2018)): within 5e-4 of the exact value at n = 20, 1.5e-4 at 100 and
-/// 2e-5 at 1000.
+/// Kolmogorov-Smirnov test statistic" (2018)): within 5e-4 of the exact value at n = 20, 1.5e-4 at 100
+/// and 2e-5 at 1000.
 pub fn kolmogorov_smirnov(d: f64, n: u64) -> f64 {
     let root = (n as f64).sqrt();
     let x = root * d;

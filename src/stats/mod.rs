@@ -6,7 +6,7 @@ pub mod efficiency;
 pub mod evidence;
 /// Tests of samples against known probabilities.
 pub mod goodness;
-/// Significance tests of means, and what they can detect.
+/// Significance tests of means, and the smallest difference that they detect.
 pub mod hypothesis;
 /// Mergeable moments of scalars and images.
 pub mod moments;

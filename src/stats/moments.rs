@@ -17,7 +17,7 @@ use super::tree::Merge;
 pub struct Moments {
     /// Number of values.
     pub n: u64,
-    /// Their mean.
+    /// Mean of the values.
     pub mean: f64,
     /// Sum of squared deviations.
     pub m2: f64,
@@ -104,7 +104,7 @@ fn merge_two((na, mean_a, m2_a): (f64, f64, f64), (nb, mean_b, m2_b): (f64, f64,
 pub struct ImageMoments {
     /// Number of values of each pixel.
     pub n: u64,
-    /// Means.
+    /// Mean of each component.
     pub mean: Vec<f64>,
     /// Sums of squared deviations.
     pub m2: Vec<f64>,

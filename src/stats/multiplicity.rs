@@ -4,8 +4,8 @@
 /// rejection below `level`, whatever the dependence between the tests.
 ///
 /// With p sorted upwards, adjusted(i) = max over j <= i of min(1, (m - j) p(j)), j counted from 0.
-/// S. Holm, "A simple sequentially rejective multiple test procedure" (1979). A p-value that is no number
-/// counts as a test and stays no number.
+/// S. Holm, "A simple sequentially rejective multiple test procedure" (1979). A p-value that is no
+/// number counts as a test and stays no number.
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));

@@ -1,11 +1,11 @@
 //! Survival functions, in one place, and their inverses by bisection.
 //!
 //! A probability is always computed as the tail that is asked for: 1 - cdf has no digits left where
-//! levels decide. Chi-square comes from `statrs` (relative error about 1e-15 times the degrees of freedom);
-//! everything else is here, because the incomplete beta function of statrs 0.19.1 loses digits for large
-//! parameters (binomial tails beyond n = 1e7, Student's t at 1e6 degrees of freedom) and its centre is
-//! wrong from 1e5 on. The table `tests/data/tails.csv` (20 digits, `scripts/tails.py`) holds each tail to
-//! 1e-8 relative.
+//! levels decide. Chi-square comes from `statrs` (relative error about 1e-15 times the degrees of
+//! freedom); everything else is here, because the incomplete beta function of statrs 0.19.1 loses digits
+//! for large parameters (binomial tails beyond n = 1e7, Student's t at 1e6 degrees of freedom) and its
+//! centre is wrong from 1e5 on. The table `tests/data/tails.csv` (20 digits, `scripts/tails.py`) holds
+//! each tail to 1e-8 relative.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
@@ -32,8 +32,8 @@ pub fn student_upper(t: f64, dof: f64) -> f64 {
 /// P(|T| > |t|) for Student's T; the normal at infinitely many degrees of freedom.
 ///
 /// With r = t / sqrt(dof), h = 1 / (1 + r^2) and a = dof/2 this is the incomplete beta function
-/// I_h(a, 1/2) = 1 - I_(1-h)(1/2, a), each by its continued fraction where that converges fast. h and 1 - h
-/// are both formed from r: next to the centre 1 - h has no digits left in h.
+/// I_h(a, 1/2) = 1 - I_(1-h)(1/2, a), each by its continued fraction where that converges fast. h and
+/// 1 - h are both formed from r: next to the centre 1 - h has no digits left in h.
 pub fn student_two_sided(t: f64, dof: f64) -> f64 {
     if dof == f64::INFINITY {
         return normal_two_sided(t);
@@ -103,12 +103,12 @@ pub fn chi_square_sf(x: f64, dof: f64) -> f64 {
 // Binomial and Poisson probabilities: C. Loader, "Fast and accurate computation of binomial
 // probabilities" (2000). Stirling's formula with its remainder s,
 //   n! = sqrt(2 pi n) (n/e)^n e^s(n),
-// turns C(n, k) p^k q^(n-k) into sqrt(n / (2 pi k (n-k))) exp(s(n) - s(k) - s(n-k) - D(k, np) - D(n-k, nq)),
-// where D(x, m) = x ln(x/m) + m - x >= 0 is the deviance. No large numbers cancel: the exponent's
+// turns C(n, k) p^k q^(n-k) into sqrt(n / (2 pi k (n-k))) exp(s(n) - s(k) - s(n-k) - D(k, np) - D(n-k,
+// nq)), where D(x, m) = x ln(x/m) + m - x >= 0 is the deviance. No large numbers cancel: the exponent's
 // error is a rounding of the exponent itself.
 
-/// s(n) = ln n! - ln(sqrt(2 pi n) (n/e)^n), for real n > 0. Six terms of its asymptotic series are good to
-/// 2e-16 at 15.
+/// s(n) = ln n! - ln(sqrt(2 pi n) (n/e)^n), for real n > 0. Six terms of its asymptotic series are good
+/// to 2e-16 at 15.
 fn stirling_remainder(n: f64) -> f64 {
     if n < 15.0 {
         return math::ln_gamma(n + 1.0) - (n + 0.5) * ln(n) + n - 0.5 * ln(TAU);
@@ -161,10 +161,10 @@ pub(super) fn binomial_pmf(k: u64, n: u64, p: f64, q: f64) -> f64 {
     exp(exponent - deviance(x, m * p) - deviance(y, m * q)) * (m / (TAU * x * y)).sqrt()
 }
 
-/// P(X >= k) for k > n p, 0 < p < 1: the pmf at the tail's edge times 1 + r1 + r1 r2 + ... with the ratios
-/// (n - j) p / ((j + 1) q) of neighbouring probabilities. They fall with j and are below 1, so what is left
-/// after a term is at most term r / (1 - r): the sum stops where that is below its rounding. About
-/// 8 sqrt(n p q) terms next to the mean (4e6 at n = 1e12), a handful in the tail.
+/// P(X >= k) for k > n p, 0 < p < 1: the pmf at the tail's edge times 1 + r1 + r1 r2 + ... with the
+/// ratios (n - j) p / ((j + 1) q) of neighbouring probabilities. They fall with j and are below 1, so
+/// what is left after a term is at most term r / (1 - r): the sum stops where that is below its
+/// rounding. About 8 sqrt(n p q) terms next to the mean (4e6 at n = 1e12), a handful in the tail.
 fn binomial_far_tail(k: u64, n: u64, p: f64, q: f64) -> f64 {
     let (odds, m) = (p / q, n as f64);
     let (mut term, mut sum, mut j) = (1.0, 1.0, k as f64);
@@ -216,8 +216,8 @@ pub fn binomial_two_sided(k: u64, n: u64, p: f64) -> f64 {
 /// P(X > x) for a noncentral chi-square X: the expectation of the central tail at `dof` + 2 J degrees of
 /// freedom over a Poisson J of mean `lambda` / 2.
 ///
-/// With a = dof/2, y = x/2 and Q the central tail, Q(a + 1, y) = Q(a, y) + y^a e^-y / Gamma(a + 1): upwards
-/// in J every operation adds positive numbers. Q grows with J, so the terms more than 9 standard
+/// With a = dof/2, y = x/2 and Q the central tail, Q(a + 1, y) = Q(a, y) + y^a e^-y / Gamma(a + 1):
+/// upwards in J every operation adds positive numbers. Q grows with J, so the terms more than 9 standard
 /// deviations below the mean of J are less than 1e-17 of the sum; Q <= 1 bounds those after the last.
 pub fn noncentral_chi_square_sf(x: f64, dof: f64, lambda: f64) -> f64 {
     let (y, mean) = (0.5 * x, 0.5 * lambda);
@@ -347,7 +347,7 @@ mod tests {
         assert!(worst.values().all(|(_, all, _)| *all <= 1e-8), "{worst:?}");
     }
 
-    // The table sees what it is for: a lost digit in the tail, a cdf taken from 1, a wrong edge.
+    // The table detects its targets: a lost digit in the tail, a cdf taken from 1, a wrong edge.
     #[test]
     fn the_table_catches_planted_tails() {
         type Tail = fn(f64, f64, f64) -> f64;

@@ -16,7 +16,7 @@ pub trait Merge: Sized {
     fn merge(self, later: Self) -> Self;
 }
 
-/// Element by element.
+/// Merges element by element.
 impl<T: Merge> Merge for Vec<T> {
     fn merge(self, later: Vec<T>) -> Vec<T> {
         assert_eq!(self.len(), later.len(), "vectors of one length");
@@ -36,7 +36,7 @@ impl<A: Merge, B: Merge> Merge for (A, B) {
 pub struct Node<T> {
     /// Logarithm of the number of passes.
     pub level: u32,
-    /// Their value.
+    /// Merged value of the node's passes.
     pub value: T,
 }
 
@@ -126,7 +126,7 @@ impl<T: Merge> Counter<T> {
         fold_back(self.nodes.into_iter().map(|node| node.value))
     }
 
-    /// What [`Counter::finish`] would give now, from a copy.
+    /// The result of [`Counter::finish`] at this point, from a copy.
     pub fn so_far(&self) -> Option<T>
     where
         T: Clone,

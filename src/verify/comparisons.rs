@@ -1,11 +1,12 @@
 //! The table of efficiencies: every estimator of a cell against the first of the experiment file, by
 //! counters and by CPU time.
 //!
-//! Every ratio is the baseline's over the candidate's: above 1 the candidate is the better. An efficiency is
-//! quoted where the means agree, by the test that an `agree` claim would make, at a level of 1e-3 over the
-//! whole table (Bonferroni); its interval is for the reader, at 95 %. Whether it is resolved is judged as
-//! for claims (`verify::efficiency`). The metric is the sensor's first observable, by class; where it has pixels,
-//! `pixels` beside it: the variance of a pixel, averaged over the image. Controls stand in the table as candidates, by CPU time alone.
+//! Every ratio is the baseline's over the candidate's: above 1 the candidate is the better. An
+//! efficiency is quoted where the means agree, by the test that an `agree` claim would make, at a level
+//! of 1e-3 over the whole table (Bonferroni); its interval is for the reader, at 95 %. Whether it is
+//! resolved is judged as for claims (`verify::efficiency`). The metric is the sensor's first observable,
+//! by class; where it has pixels, `pixels` beside it: the variance of a pixel, averaged over the image.
+//! Controls are in the table as candidates, by CPU time alone.
 
 use serde::Serialize;
 
@@ -38,15 +39,15 @@ pub struct EfficiencyRow {
     pub class: String,
     /// Observable name; its variance is that of one pass. `pixels` for the variance of a pixel.
     pub metric: String,
-    /// The estimator that the other is held against.
+    /// The estimator that the other is compared with.
     pub baseline: String,
-    /// The other.
+    /// Estimator that is compared with the baseline.
     pub candidate: String,
     /// Variance times cost of the baseline over that of the candidate.
     pub efficiency_ratio: Option<f64>,
     /// Lower end of its interval.
     pub ci_low: Option<f64>,
-    /// Upper end.
+    /// Upper end of the confidence interval.
     pub ci_high: Option<f64>,
     /// Confidence of the interval.
     pub confidence: f64,
@@ -56,11 +57,12 @@ pub struct EfficiencyRow {
     pub cpu_cost_ratio: Option<f64>,
     /// Rays of a pass, baseline over candidate.
     pub ray_cost_ratio: Option<f64>,
-    /// Is the ratio one that more passes would not move out of its interval, and that no single pass makes?
+    /// Whether the ratio is resolved: more passes would not move it out of its interval, and no single
+    /// pass dominates it.
     pub resolved: bool,
     /// What counts as cost.
     pub cost: CostMeasure,
-    /// Were the two timed side by side? By counters it does not matter.
+    /// Whether the two were timed side by side; by counters it does not matter.
     pub side_by_side: bool,
     /// Kurtosis of a pass of the baseline.
     pub kurtosis_baseline: Option<f64>,
@@ -82,7 +84,7 @@ pub fn to_csv(rows: &[EfficiencyRow]) -> String {
     csv_text::table(rows)
 }
 
-/// What a row compares.
+/// The two arms of a row.
 struct RowSubject<'a> {
     cell: &'a Cell,
     baseline: (&'a EstimatorRun, Quantity),
@@ -202,7 +204,7 @@ fn bias_objection(runs: &[&EstimatorRun]) -> Option<String> {
     })
 }
 
-/// Why the two cannot be said to estimate one number.
+/// Why the two cannot be taken to estimate one number.
 fn means_objection(
     stored: &Stored,
     candidate: &Quantity,
@@ -216,7 +218,7 @@ fn means_objection(
             (p < level || p.is_nan()).then(|| format!("the means differ, p = {p:.1e}"))
         }
         Evidence::Nothing(reason) => Some(format!("no mean test: {reason}")),
-        _ => Some("no variance".into()),
+        _ => Some("zero variance".into()),
     }
 }
 
@@ -232,7 +234,7 @@ fn rays(stored: &Stored, run: &EstimatorRun) -> Option<f64> {
     Some((count("rays")? + count("shadow_rays").unwrap_or(0.0)) / run.passes as f64)
 }
 
-/// What a measure is called in tables.
+/// Name of a measure in tables.
 pub fn measure_name(measure: CostMeasure) -> &'static str {
     match measure {
         CostMeasure::Counters => "counters",

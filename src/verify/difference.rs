@@ -1,17 +1,20 @@
-//! Two records of one experiment: what was asked of them, and whether their means differ.
+//! Two records of one experiment: their descriptions, and whether their means differ.
 //!
 //! A quantity that both records hold is compared in one of four ways:
 //! - `identical`: the moments of every batch are the same bits. Nothing is left to test.
-//! - `paired t`: pass k of both was played on the same random numbers, so that the differences pass by pass
-//!   are what is left of a change in the program. They are independent from pass to pass, whatever a change
-//!   does to the numbers' use within one, so the t test of their batch means is valid, and sharper the more
-//!   alike the two programs are. Welch's test would take the shared noise for two noises.
-//! - `welch t`: other seeds, names or physics, hence other random numbers: independent batches. The fewer of
-//!   both sides' degrees of freedom are used, which bounds the tails for every ratio of variances (M. Mickey,
-//!   M. Brown, "Bounds on the distribution functions of the Behrens-Fisher statistic", 1966).
+//! - `paired t`: pass k of both was run on the same random numbers, so that the differences pass by pass
+//!   are what is left of a change in the program. They are independent from pass to pass, whatever a
+//!   change does to the numbers' use within one, so the t test of their batch means is valid, and
+//!   sharper the more alike the two programs are. Welch's test would take the shared noise for two
+//!   noises.
+//! - `welch t`: other seeds, names or physics, hence other random numbers: independent batches. The
+//!   fewer of both sides' degrees of freedom are used, which bounds the tails for every ratio of
+//!   variances (M. Mickey, M. Brown, "Bounds on the distribution functions of the Behrens-Fisher
+//!   statistic", 1966).
 //! - `sum of errors`: the same random numbers and another number of passes, or an experiment that pairs
-//!   cells and whose physics changed: nothing is paired, nor surely independent. |a - b| > c (e_a + e_b) needs |a - mu| > c e_a or |b - mu| > c e_b, so twice the t tail is a
-//!   p-value whatever the correlation.
+//!   cells and whose physics changed: nothing is paired, nor surely independent. |a - b| > c (e_a + e_b)
+//!   needs |a - mu| > c e_a or |b - mu| > c e_b, so twice the t tail is a p-value whatever the
+//!   correlation.
 
 use std::collections::BTreeMap;
 
@@ -27,7 +30,7 @@ use crate::results::store::Stored;
 use crate::stats::hypothesis::Estimate;
 use crate::stats::moments::Moments;
 
-/// What to hold two records to.
+/// Criteria for the comparison of two records.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Terms {
     /// Probability of any false alarm.
@@ -38,18 +41,18 @@ pub struct Terms {
     pub max_slowdown: Option<f64>,
 }
 
-/// What comes of it.
+/// Result of the comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compared {
-    /// What is not the same, in words; nothing where only numbers can differ.
+    /// Differences of the descriptions, as text; empty where only numbers can differ.
     pub changes: Vec<String>,
-    /// One verdict a quantity that both hold.
+    /// One verdict for each quantity that both hold.
     pub verdicts: Vec<Verdict>,
-    /// WorkChange of every run that both hold.
+    /// Change of work of every run that both hold.
     pub work: Vec<WorkChange>,
 }
 
-/// WorkChange and its worth, second record over first.
+/// Change of work and variance, second record over first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkChange {
     /// Cell label.
@@ -58,7 +61,7 @@ pub struct WorkChange {
     pub estimator: String,
     /// Counter -> counts per pass, second over first; infinite where the first counted none.
     pub counts: BTreeMap<String, f64>,
-    /// Variance of a pass of the first observable, second over first, a band each.
+    /// Variance of a pass of the first observable, second over first, by band.
     pub variance: Vec<f64>,
     /// The counter that grew by more than was allowed.
     pub too_slow: Option<String>,
@@ -78,7 +81,7 @@ impl Compared {
         }
     }
 
-    /// Is it of the first observable that its run has in common with the other record?
+    /// Whether it is of the first observable that its run shares with the other record.
     pub fn is_first(&self, verdict: &Verdict) -> bool {
         let same = |v: &&Verdict| v.cell == verdict.cell && v.estimators == verdict.estimators;
         let first = self.verdicts.iter().find(same);
@@ -114,7 +117,7 @@ pub fn compare(a: &Stored, b: &Stored, terms: &Terms) -> Option<Compared> {
     Some(Compared { changes, verdicts, work })
 }
 
-/// Two runs of one name.
+/// Two runs with the same name.
 struct RunPair<'a> {
     a: &'a Stored,
     b: &'a Stored,
@@ -123,18 +126,18 @@ struct RunPair<'a> {
     streams: Streams,
 }
 
-/// The random numbers of two runs of one name.
+/// How the random numbers of two runs with the same name are related.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Streams {
-    /// Pass k of both was played on the same ones.
+    /// Pass k of both was run on the same numbers.
     Same,
-    /// Each has its own.
+    /// Independent numbers.
     Others,
-    /// The experiment pairs cells, and this one's physics changed: one or the other.
+    /// Unknown: the experiment pairs cells, and the physics of this one changed.
     Unknown,
 }
 
-/// What names the random numbers of a pass: experiment, seed, bands, and the cell's physics but for what
+/// What names the random numbers of a pass: experiment, seed, bands, and the cell's physics except what
 /// the experiment pairs over. Neither claims nor budget.
 fn streams(a: &Stored, b: &Stored, cell_a: usize, cell_b: usize) -> Streams {
     let (a, b) = (&a.record, &b.record);
@@ -248,7 +251,7 @@ impl RunPair<'_> {
             return self.unpaired(a, b);
         }
         let d = Estimate::of_differences(&b.batches, &a.batches);
-        // Differences of rounding alone have an error of rounding alone: neither is news.
+        // Differences of rounding alone have an error of rounding alone: neither counts.
         let rounding = ROUNDING * scale;
         let std_error = (d.std_error * d.std_error + rounding * rounding).sqrt();
         Evidence::of_difference(Estimate { std_error, ..d })
@@ -303,13 +306,13 @@ impl RunPair<'_> {
     }
 }
 
-/// The same bits.
+/// Whether two runs have the same bits.
 fn identical(a: &[Moments], b: &[Moments]) -> bool {
     let bits = |m: &Moments| m.to_array().map(f64::to_bits);
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| bits(a) == bits(b))
 }
 
-/// What the two records say differently of themselves, cells and runs that only one of them has included.
+/// Differences between the two records' descriptions, cells and runs that only one of them has included.
 fn changed_words(a: &Record, b: &Record) -> Vec<String> {
     let mut changes = Vec::new();
     let mut words = |what: &str, a: &str, b: &str| {

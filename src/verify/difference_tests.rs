@@ -40,7 +40,7 @@ fn the_same_record_is_identical() {
     assert!(same.work.iter().all(|w| w.counts["rays"] == 1.0 && w.variance == [1.0, 1.0]));
 }
 
-// A shift of 1 % under noise of 50 %: pass by pass it stands out of noise of 1 %, and independent means
+// A shift of 1 % under noise of 50 %: pass by pass it exceeds noise of 1 %, and independent means
 // of 256 passes would hide it.
 #[test]
 fn the_same_streams_are_paired() {

@@ -1,32 +1,34 @@
 //! Claims of efficiency: `faster` and `not_slower`.
 //!
-//! With V the variance of a pass and c its cost (all bands together: what a pass costs, whatever it scores),
-//! the efficiency ratio of a candidate A against a baseline B is E = V_B c_B / (V_A c_A). Both claims say
-//! that E exceeds a bound e: `faster` e = ratio, `not_slower` e = 1 / margin, because the ratio of inverse
-//! efficiencies is 1 / E. ln E has a Student interval from a jackknife over blocks (`stats::efficiency`).
+//! With V the variance of a pass and c its cost (all bands together: what a pass costs, whatever it
+//! scores), the efficiency ratio of a candidate A against a baseline B is E = V_B c_B / (V_A c_A). Both
+//! claims state that E exceeds a bound e: `faster` e = ratio, `not_slower` e = 1 / margin, because the
+//! ratio of inverse efficiencies is 1 / E. ln E has a Student interval from a jackknife over blocks
+//! (`stats::efficiency`).
 //!
-//! Of the observable `pixels`, V is the variance of a pixel in one pass, averaged over the pixels, as the pairs
-//! of passes show it (`results::record::Image::spread`); the means that must agree are those of the sensor's
-//! first observable. Where the pixels of a pass are independent, the variance of the image's mean is V over
-//! their number, and the ratio is that of `mean`, which knows it less well: it is the variance of n numbers, not
-//! of n times the pixels. Where an estimator's pixels share paths, the two differ.
+//! Of the observable `pixels`, V is the variance of a pixel in one pass, averaged over the pixels, as
+//! the pairs of passes show it (`results::record::Image::spread`); the means that must agree are those
+//! of the sensor's first observable. Where the pixels of a pass are independent, the variance of the
+//! image's mean is V over their number, and the ratio is that of `mean`, which knows it less well: it is
+//! the variance of n numbers, not of n times the pixels. Where an estimator's pixels share paths, the
+//! two differ.
 //!
 //! Before any number is quoted
 //!   the two means agree: the test that an `agree` claim would make. An objection to it voids the claim;
-//!   E is resolved: it moved by no more than its 99.9 % interval when the passes doubled, and no pass may
-//!   hold more than 5 % of an arm's sum of squares;
-//!   by CPU time, the blocks are quadruples played side by side, A B .. B A, and the baseline against its own
-//!   control arm has 1 in the 99.9 % intervals of both E and the cost ratio. Quadruples that warmed a worker
-//!   up or were played in parts are left out whole: which ones they are has nothing to do with the scores.
+//!   E is resolved: it moved by no more than its 99.9 % interval when the passes doubled, and no pass
+//!   may hold more than 5 % of an arm's sum of squares; by CPU time, the blocks are quadruples run side
+//!   by side, A B .. B A, and the baseline against its own control arm has 1 in the 99.9 % intervals of
+//!   both E and the cost ratio. Quadruples that warmed a worker up or were run in parts are left out
+//!   whole: which ones these are does not depend on the scores.
 //!
 //! Then the claim
 //!   fails, where the p-value 2 min(p_mean, p_slow) is rejected in the family of all tests (Holm), with
 //!   p_mean two-sided for equal means and p_slow one-sided for E >= e (Bonferroni over the two: both are
 //!   true where the claim is). One look: streams anew would be timed under other conditions;
-//!   passes, where it does not fail and the two-sided 99.9 % interval of E lies above e: a claim that E > e
-//!   is false and passes with probability at most 1 in 2000, claim by claim;
-//!   is underpowered otherwise. `detectable` is the smallest shortfall of E below e, relative to e, that
-//!   would have failed with 99 % probability.
+//!   passes, where it does not fail and the two-sided 99.9 % interval of E lies above e: a claim that
+//!   E > e is false and passes with probability at most 1 in 2000, claim by claim; is underpowered
+//!   otherwise. `detectable` is the smallest shortfall of E below e, relative to e, that would have
+//!   failed with 99 % probability.
 
 use super::evidence::{CONFIDENCE, EfficiencyTest, Evidence, kurtosis_words};
 use super::family::Finding;
@@ -47,7 +49,7 @@ const LEAST_QUADRUPLES: usize = 16;
 pub struct Contest {
     /// Baseline over candidate: above 1 where the candidate is the better.
     pub efficiency: Efficiency,
-    /// Were they timed side by side? Always so by counters.
+    /// Whether they were timed side by side; always true by counters.
     pub side_by_side: bool,
 }
 
@@ -82,7 +84,8 @@ pub fn contest(
     Ok(Contest { efficiency, side_by_side })
 }
 
-/// The quantity whose mean stands for that of `quantity`: itself, or the sensor's first observable for `pixels`.
+/// The quantity whose mean is reported for that of `quantity`: itself, or the sensor's first observable
+/// for `pixels`.
 pub(super) fn mean_of(stored: &Stored, quantity: &Quantity) -> Quantity {
     let first = stored.run(quantity).and_then(|run| run.observables.first());
     match first.filter(|_| quantity.observable.is_pixels()) {
@@ -130,8 +133,9 @@ impl CostedBatches {
         Ok(CostedBatches { batches, costs, settled })
     }
 
-    /// Batches of pairs with what their passes cost. A batch of pairs is one of passes, or two where those are of
-    /// one pass each. The cost of a pair is put down as that of one pass, and of a batch's odd pass not at all.
+    /// Batches of pairs with what their passes cost. A batch of pairs is one of passes, or two where
+    /// those are of one pass each. The cost of a pair is recorded as that of one pass, and of a batch's
+    /// odd pass not at all.
     fn of_pairs(
         batches: &[Moments],
         pairs: &[Moments],
@@ -183,7 +187,7 @@ fn quadruples(a: &CostedBatches, b: &CostedBatches) -> (Vec<JackknifeBlock>, Vec
 pub(super) struct EfficiencyClaim<'a> {
     pub candidate: &'a Quantity,
     pub baseline: &'a Quantity,
-    /// What E must exceed.
+    /// Bound that E must exceed.
     pub bound: f64,
     pub cost: CostMeasure,
 }
@@ -217,7 +221,7 @@ fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<Effici
         Evidence::Difference { difference, .. } => difference,
         Evidence::Nothing(reason) => return Err(format!("no mean test: {reason}")),
         Evidence::Exact { holds: true, .. } => {
-            return Err("no variance: there is nothing to compare".into());
+            return Err("zero variance: there is nothing to compare".into());
         }
         _ => return Err("the means differ, without sampling error".into()),
     };
@@ -264,12 +268,12 @@ fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<Effici
     })
 }
 
-/// What the baseline against itself says of the machine.
+/// What the baseline against itself shows of the machine.
 fn control_objection(stored: &Stored, baseline: &Quantity) -> Option<String> {
     let runs = &stored.record.cells.get(baseline.cell)?.runs;
     let is_control = |run: &&EstimatorRun| run.control_of.as_deref() == Some(&*baseline.estimator);
     let Some(control) = runs.iter().find(is_control) else {
-        return Some(format!("no control: {} was not played twice", baseline.estimator));
+        return Some(format!("no control: {} was not run twice", baseline.estimator));
     };
     let control = Quantity { estimator: control.estimator.clone(), ..baseline.clone() };
     let contest = match contest(stored, &control, baseline, CostMeasure::Cpu) {

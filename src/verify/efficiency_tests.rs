@@ -94,7 +94,7 @@ fn what_an_efficiency_cannot_rest_on_is_invalid() {
 
     let mut exact = scored(0.1, 0.05);
     set_observables(&mut exact, "snee", |_, _, _| 1.0);
-    assert_invalid(&by_counters(exact, 1.5), "no variance");
+    assert_invalid(&by_counters(exact, 1.5), "zero variance");
 
     let mut anomalous = scored(0.1, 0.05);
     anomalous.record.cells[0].runs[1].anomalies.insert("nonfinite".into(), 1);
@@ -171,7 +171,7 @@ fn by_cpu(s: Stored, bound: f64) -> Verdict {
 fn cpu_time_counts_where_the_machine_is_quiet() {
     let quiet = timed(scored(0.1, 0.05), noisy);
     assert_eq!(by_cpu(quiet, 1.5).outcome, Outcome::Pass);
-    // What warms up has no say, whatever it took.
+    // Warm-up does not count, whatever it took.
     let cold = timed(scored(0.1, 0.05), |name, batch| if batch < 2 { 50.0 } else { noisy(name, batch) });
     assert_eq!(by_cpu(cold, 1.5).outcome, Outcome::Pass);
     // Twice the time is half of the efficiency.
@@ -187,7 +187,7 @@ fn cpu_time_counts_where_the_machine_is_quiet() {
 fn a_timer_that_counts_another_arms_time_is_found() {
     let cost = |name: &str| if name == "snee" { 0.3 } else { 1.0 };
     let leaking = timed(scored(0.1, 0.05), |name, batch| {
-        // A B C, C B A: before the control stands `snee`, before `mis` another `mis`.
+        // A B C, C B A: before the control comes `snee`, before `mis` another `mis`.
         let before = if name == "mis (control)" { cost("snee") } else { cost("mis") };
         cost(name) * noisy(name, batch) + before
     });
@@ -198,7 +198,7 @@ fn a_timer_that_counts_another_arms_time_is_found() {
 fn cpu_time_needs_its_conditions() {
     let mut without = timed(scored(0.1, 0.05), noisy);
     without.record.cells[0].runs.pop();
-    assert_invalid(&by_cpu(without, 1.5), "no control: mis was not played twice");
+    assert_invalid(&by_cpu(without, 1.5), "no control: mis was not run twice");
 
     let mut apart = timed(scored(0.1, 0.05), noisy);
     let timing = apart.timing.as_mut().expect("a timing");

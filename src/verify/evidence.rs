@@ -1,4 +1,4 @@
-//! What the numbers of one test show by themselves, before they are held against those of other tests.
+//! What the numbers of one test show by themselves, before they are adjusted for those of other tests.
 
 use super::levels::POWER;
 use super::verdict::{Outcome, Verdict};
@@ -13,9 +13,9 @@ pub const CONFIDENCE: f64 = 0.999;
 /// What the numbers of one test show.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Evidence {
-    /// Nothing, for this reason.
+    /// No evidence, for this reason.
     Nothing(String),
-    /// A statement without chance: it holds, or it does not.
+    /// An exact statement: it holds, or it does not.
     Exact { holds: bool, said: String },
     /// A difference with its error; its p-value is this many times that of Student's t.
     Difference { difference: Estimate, times: f64 },
@@ -45,7 +45,7 @@ impl Evidence {
         Evidence::Exact { holds, said }
     }
 
-    /// The test; none where there is nothing to test, or no chance.
+    /// The test; none where there is nothing to test, or the statement is exact.
     pub fn test(&self) -> Option<Test> {
         match self {
             Evidence::Nothing(_) | Evidence::Exact { .. } => None,
@@ -64,8 +64,8 @@ impl Evidence {
         self.test().map(|test| test.p_value).filter(|p| !p.is_nan())
     }
 
-    /// The smallest defect that is rejected at `level` with probability [`POWER`]: of a difference relative to
-    /// `relative_to`, or absolute where that is 0.
+    /// The smallest defect that is rejected at `level` with probability [`POWER`]: of a difference
+    /// relative to `relative_to`, or absolute where that is 0.
     pub fn detectable(&self, level: f64, relative_to: f64) -> Option<f64> {
         let scale = if relative_to == 0.0 { 1.0 } else { relative_to.abs() };
         match self {
@@ -99,12 +99,12 @@ fn test_of(difference: &Estimate, times: f64) -> Test {
     Test { statistic, dof, p_value }
 }
 
-/// Counts against probabilities: what knows the smallest defect that it would have found.
+/// Counts against probabilities, with the smallest defect that they would have found.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum CountsFit {
-    /// Of many bins.
+    /// Chi-square over many bins.
     Bins(Goodness),
-    /// Of one outcome.
+    /// Exact binomial test of one outcome.
     Share(Proportion),
 }
 
@@ -121,7 +121,7 @@ impl CountsFit {
     }
 }
 
-/// What a claim of efficiency shows: see `verify::efficiency`.
+/// Evidence on a claim of efficiency: see `verify::efficiency`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct EfficiencyTest {
     /// E, variance times cost of the baseline over that of the candidate.
@@ -132,17 +132,18 @@ pub(super) struct EfficiencyTest {
     pub kurtosis: (f64, f64),
     /// The difference of the means, relative to the larger.
     pub difference: Estimate,
-    /// Is it the means that speak against the claim, more than E?
+    /// Whether the means contradict the claim more than E does.
     pub blames_means: bool,
-    /// A control wants E to fall short.
+    /// Whether a control expects E to fall short.
     pub fails: bool,
     /// Student's t of ln E - ln e, with the p-value of the claim as a whole.
     pub test: Test,
 }
 
 impl EfficiencyTest {
-    /// What it says, where the p-value adjusted over the family is `adjusted_p` and a test fails below
-    /// `level`; `own_level` is the level of this test alone. A control that expects failure wants it of E.
+    /// The outcome, where the p-value adjusted over the family is `adjusted_p` and a test fails below
+    /// `level`; `own_level` is the level of this test alone. A control expects E to
+    /// fail.
     pub fn outcome(
         &self,
         adjusted_p: Option<f64>,
@@ -171,8 +172,9 @@ impl EfficiencyTest {
         self.difference.detectable(own_level, POWER)
     }
 
-    /// The smallest shortfall of E below e, relative to e, that would have failed: 1 - exp(-d) with d that of
-    /// ln E. The p-value is twice the one-sided one, so that its level is that of a two-sided test.
+    /// The smallest shortfall of E below e, relative to e, that would have failed: 1 - exp(-d) with d
+    /// that of ln E. The p-value is twice the one-sided one, so that its level is that of a two-sided
+    /// test.
     fn detectable(&self, own_level: f64) -> f64 {
         let log = Estimate::known(-self.ratio.log.detectable(own_level, POWER), 0.0);
         1.0 - LogRatio { log }.ratio()

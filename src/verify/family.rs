@@ -1,5 +1,5 @@
-//! Tests of one call, judged as one family: Holm's adjustment over all of them, second looks where there are
-//! two, the smallest detectable defect, and the outcome. `verify`, `judge` and `compare` share it.
+//! Tests of one call, judged as one family: Holm's adjustment over all of them, second looks where there
+//! are two, the smallest detectable defect, and the outcome. `verify`, `judge` and `compare` share it.
 
 use std::collections::BTreeMap;
 
@@ -11,13 +11,13 @@ use crate::stats::multiplicity::holm;
 /// One test of a family.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Finding {
-    /// What it shows by itself.
+    /// Evidence of the test by itself.
     pub evidence: Evidence,
     /// What `detectable` of a difference is relative to; 0 for absolute.
     pub relative_to: f64,
     /// The largest defect that may go unseen, in the units of the verdict's `detectable`.
     pub detect: Option<f64>,
-    /// It has no second look: that would share this one's errors, or come too late.
+    /// Whether it has one look: a second one would share its errors, or come too late.
     pub one_look: bool,
     /// Filled in except for the test's numbers, outcome and note.
     pub verdict: Verdict,
@@ -29,7 +29,7 @@ impl Finding {
         Finding { evidence, relative_to: 0.0, detect: None, one_look: false, verdict }
     }
 
-    /// Did the first look fail, and is it one that a second look decides?
+    /// Whether the first look failed and a second look decides.
     fn wants_second_look(&self, adjusted_p: Option<f64>, looks: Looks) -> bool {
         matches!(self.evidence, Evidence::Difference { .. } | Evidence::Counts { .. })
             && !self.one_look
@@ -38,21 +38,22 @@ impl Finding {
     }
 }
 
-/// What a family says.
+/// The verdicts of a family.
 pub(super) struct Concluded {
-    /// One verdict a finding.
+    /// One verdict for each finding.
     pub verdicts: Vec<Verdict>,
-    /// The findings that want a second look which was not taken yet; their verdicts are `fail` until then.
+    /// The findings that need a second look which was not taken yet; their verdicts are `fail` until
+    /// then.
     pub wanted: Vec<usize>,
 }
 
-/// What a second look came to.
+/// State of a second look.
 enum SecondLook {
-    /// It was not taken yet.
+    /// Not taken yet.
     Missing,
-    /// It means nothing, for this reason.
+    /// Void, for this reason.
     Invalid(String),
-    /// Its adjusted p-value.
+    /// Taken, with this adjusted p-value.
     Taken(f64),
 }
 
@@ -81,8 +82,8 @@ pub(super) fn conclude(
     Concluded { verdicts, wanted }
 }
 
-/// Second looks with p-values adjusted over all of them. One that is still missing counts: the level of the
-/// others must not depend on it.
+/// Second looks with p-values adjusted over all of them. One that is still missing counts: the level of
+/// the others must not depend on it.
 fn second_looks(seconds: BTreeMap<usize, Option<Evidence>>) -> BTreeMap<usize, SecondLook> {
     let p_value = |second: &Option<Evidence>| second.as_ref()?.p_value();
     let p_values: Vec<f64> = seconds.values().map(|second| p_value(second).unwrap_or(1.0)).collect();
@@ -109,7 +110,7 @@ fn state(
     tests: f64,
 ) -> Verdict {
     let Finding { evidence, relative_to, detect, one_look, mut verdict } = finding;
-    // The hardest of Holm's steps, so that `detectable` holds whatever the other tests say.
+    // The hardest of Holm's steps, so that `detectable` holds whatever the outcomes of the other tests.
     let own_level = looks.first(one_look) / tests;
     if let Some(test) = evidence.test() {
         verdict.statistic = known(test.statistic);
@@ -133,7 +134,7 @@ fn state(
         _ => match adjusted_p {
             None => Outcome::Invalid("the test has no p-value".into()),
             Some(p) if p < looks.at_once() => Outcome::Fail,
-            // Where nothing is known to be detectable, nothing is.
+            // Without a known detectable size nothing counts as detectable.
             _ if detect.is_some_and(|d| verdict.detectable.is_none_or(|found| found > d)) => {
                 Outcome::Underpowered
             }
@@ -145,7 +146,7 @@ fn state(
         _ => reason(&found, &evidence, detect, &verdict),
     };
     match second {
-        Some(SecondLook::Missing) => reason += "; wants a second look on fresh streams",
+        Some(SecondLook::Missing) => reason += "; needs a second look on fresh streams",
         Some(SecondLook::Taken(_)) if found == Outcome::Pass => {
             reason = "failed at the first look and cleared by a second on fresh streams".into();
         }
@@ -170,7 +171,7 @@ fn reason(found: &Outcome, evidence: &Evidence, detect: Option<f64>, verdict: &V
         (Outcome::Fail, Evidence::Sum(_)) => "the table as a whole deviates".into(),
         (Outcome::Fail, _) => verdict.deviation(),
         (Outcome::Underpowered, _) => format!(
-            "could have missed {:.2e}, {:.2e} is to be seen",
+            "could have missed {:.2e}, {:.2e} must be found",
             verdict.detectable.unwrap_or(f64::INFINITY),
             detect.unwrap_or_default()
         ),

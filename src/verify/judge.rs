@@ -18,33 +18,33 @@ const TABLE: usize = 10;
 /// A record to judge.
 #[derive(Clone, Copy, Debug)]
 pub struct Case<'a> {
-    /// What was measured.
+    /// Record of the main run.
     pub main: &'a Stored,
-    /// What was measured again for a second look, where there was one.
+    /// Record of the second look, where there was one.
     pub retest: Option<&'a Stored>,
 }
 
-/// What a verification says.
+/// The result of a verification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
-    /// One verdict a comparison, case by case.
+    /// One verdict for each comparison, case by case.
     pub verdicts: Vec<Verdict>,
     /// Number of the case that each verdict is of.
     pub case_of: Vec<usize>,
-    /// What wants a second look that no record holds yet; its verdicts are `fail` until then.
+    /// Cases that need a second look that no record holds yet; their verdicts are `fail` until then.
     pub wanted: Vec<LookAgain>,
 }
 
-/// What wants a second look.
+/// A case that needs a second look.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookAgain {
-    /// The case.
+    /// Index of the case.
     pub case: usize,
-    /// What is to be measured again.
+    /// Subjects to measure again.
     pub subject: Measured,
 }
 
-/// Something that can be measured again.
+/// A subject that can be measured again.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Measured {
     /// A quantity of a scene.
@@ -58,7 +58,7 @@ pub fn judge_alone(stored: &Stored) -> Vec<Verdict> {
     judge(&[Case { main: stored, retest: None }], Looks::ALONE).verdicts
 }
 
-/// What a trial is of.
+/// Subject of a trial.
 #[derive(Clone, Copy)]
 struct TrialOf {
     case: usize,
@@ -199,7 +199,7 @@ fn expect(verdict: &mut Verdict, main: &Stored, claim: usize) {
     let expects = main.record.statements[claim].expects;
     verdict.outcome = expected_outcome(expects, found, &mut verdict.note);
     if main.record.post_hoc.contains(&claim) {
-        let reason = "post hoc: claimed when passes had been played; another seed makes it evidence";
+        let reason = "post hoc: claimed when passes had been run; another seed makes it evidence";
         verdict.note = reason.into();
         verdict.outcome = Outcome::Invalid(reason.into());
     }

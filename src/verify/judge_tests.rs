@@ -70,7 +70,7 @@ fn a_claim_made_after_the_run_is_not_green() {
 }
 
 #[test]
-fn two_silences_agree_on_nothing() {
+fn two_zero_means_are_no_agreement() {
     let mut s = with_claim(stored(0.1), ClaimKind::Agree, ExpectedOutcome::Pass, other(false), None);
     set_observables(&mut s, "mis", |_, _, _| 0.0);
     set_observables(&mut s, "snee", |_, _, _| 0.0);
@@ -135,7 +135,7 @@ fn estimators_agree_and_differ() {
     let good = agree(stored(0.1), false);
     assert_eq!((good.outcome, good.test), (Outcome::Pass, Some(TestKind::WelchT)));
     assert_eq!(good.estimators, "mis vs snee");
-    // A defect of 2 % that only pairing can see: both play the same noise.
+    // A defect of 2 % that only pairing can see: both have the same noise.
     let mut s = stored(0.1);
     set_observables(&mut s, "mis", |i, _, _| 1.0 + 0.1 * uniform(i));
     set_observables(&mut s, "snee", |i, _, _| 1.02 + 0.1 * uniform(i) + 0.01 * uniform(i + 9999));
@@ -322,7 +322,7 @@ fn a_first_look_between_the_levels_wants_a_second() {
     // t with 63 degrees of freedom: 4.0 has p 1.7e-4, 3.0 has 3.9e-3, 6.5 has 1.4e-8.
     let waiting = judged_twice(4.0, None);
     assert_eq!(waiting.verdicts[0].outcome, Outcome::Fail);
-    assert!(waiting.verdicts[0].note.ends_with("wants a second look on fresh streams"));
+    assert!(waiting.verdicts[0].note.ends_with("needs a second look on fresh streams"));
     assert_eq!(waiting.wanted, [LookAgain { case: 0, subject: Measured::Quantity(quantity("mis", 0)) }]);
     for off in [3.0, 6.5] {
         let at_once = judged_twice(off, None);

@@ -1,4 +1,4 @@
-//! Verdicts for continuous integration, in the XML that JUnit began and CI systems read.
+//! Verdicts for continuous integration, in JUnit's XML format.
 
 use super::verdict::{Outcome, Verdict};
 
@@ -24,7 +24,7 @@ pub fn to_junit(verdicts: &[Verdict]) -> String {
 }
 
 fn case(v: &Verdict) -> String {
-    // Of a sampler, the test says what is tested.
+    // Of a sampler, the test's name states what is tested.
     let what = if v.observable.is_empty() { v.test_name() } else { v.observable.clone() };
     let parts = [&v.cell, &v.band, &what, &v.class, &v.estimators];
     let name: Vec<&str> =

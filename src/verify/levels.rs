@@ -7,10 +7,10 @@
 //!   on streams of its own with `RETEST_FACTOR` times the passes has, adjusted over all second looks,
 //!   a p-value below `SECOND_LOOK`.
 //! A correct family fails at once with probability at most 5e-7. It needs any second look with
-//! probability at most 1e-3, and fails it, the streams being independent, with conditional probability at
-//! most 5e-4: together at most 5e-7 + 1e-3 * 5e-4 = 1e-6 = `FAMILY_LEVEL`.
+//! probability at most 1e-3, and fails it, the streams being independent, with conditional probability
+//! at most 5e-4: together at most 5e-7 + 1e-3 * 5e-4 = 1e-6 = `FAMILY_LEVEL`.
 //!
-//! What this buys: a defect is found with 99 % probability at the first look's critical value plus 2.33
+//! The gain: a defect is found with 99 % probability at the first look's critical value plus 2.33
 //! standard errors, and the second look sees it at twice that distance, so nothing is lost there. For
 //! m = 300 the first look cuts at 4.65 standard errors where one look at 1e-6 would cut at 5.91: 6.98
 //! against 8.24 standard errors to be found, 1.4 times fewer passes.
@@ -50,12 +50,12 @@ pub enum Looks {
         /// The probability of any false failure.
         level: f64,
     },
-    /// Second looks are, or can be, at hand.
+    /// Second looks exist or can be run.
     Two,
 }
 
 impl Looks {
-    /// A record by itself, without second looks.
+    /// A single record, without second looks.
     pub const ALONE: Looks = Looks::One { level: FAMILY_LEVEL };
 
     /// The family-wise level at which a test fails at once.

@@ -1,4 +1,4 @@
-//! A mean held against a value or against another mean, and why that may mean nothing.
+//! A mean compared with a value or with another mean, and why the comparison may be void.
 
 use super::evidence::Evidence;
 use super::levels::SHARED_ERROR;
@@ -46,7 +46,7 @@ impl<'a> QuantityMean<'a> {
         Some(QuantityMean { run, batches, all, mean })
     }
 
-    /// Why no statement about it is worth anything.
+    /// Why every statement about it is void.
     pub fn objection(&self) -> Option<String> {
         let name = &self.run.estimator;
         let anomaly =
@@ -79,7 +79,7 @@ impl<'a> QuantityMean<'a> {
         if self.batches.len() < MIN_BATCHES {
             let n = self.batches.len();
             return Some(format!(
-                "too few passes: {name} has {n} batches, a t test wants {MIN_BATCHES}"
+                "too few passes: {name} has {n} batches, a t test needs {MIN_BATCHES}"
             ));
         }
         let skewness = self.all.skewness().abs() / (self.all.n as f64).sqrt();
@@ -98,16 +98,16 @@ impl<'a> QuantityMean<'a> {
 /// What a claim asks of the means that it is about.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asked {
-    /// They are to be equal: an estimator with a bias cannot say so.
+    /// Whether they must be equal: an estimator with a bias cannot claim that.
     agreement: bool,
-    /// A difference is to be found, so that a reason for one is no objection.
+    /// Whether a difference must be found, so that a reason for one is no objection.
     difference: bool,
-    /// It is about each class or observable that there is: some may be dark.
+    /// Whether it is on each class or observable that exists: some may be 0.
     each: bool,
 }
 
 impl Asked {
-    /// Two means are to be equal.
+    /// A claim that two means are equal.
     pub const EQUAL: Asked = Asked { agreement: true, difference: false, each: false };
 
     /// What a claim asks.
@@ -120,27 +120,27 @@ impl Asked {
     }
 }
 
-/// What a mean is held against.
+/// What a mean is compared with.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Reference<'a> {
     /// A value with its stated error.
     Value(Estimate),
-    /// Another mean; `paired` where both were played on the same random streams.
+    /// Another mean; `paired` where both were run on the same random streams.
     Mean { quantity: &'a Quantity, paired: bool },
 }
 
-/// What holding a mean against its reference shows.
+/// Result of comparing a mean with its reference.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Held {
-    /// The evidence.
+    /// Evidence of the comparison.
     pub evidence: Evidence,
-    /// The test, where it came to one.
+    /// The test, where one was possible.
     pub test: Option<TestKind>,
     /// The relative deviation, where there is no sampling error.
     pub deviation: Option<f64>,
     /// The mean, where the record holds it.
     pub value: Option<Estimate>,
-    /// What it was held against, where that is known.
+    /// What it was compared with, where that is known.
     pub expected: Option<Estimate>,
     /// A second look would share this one's errors.
     pub one_look: bool,
@@ -151,7 +151,7 @@ pub(super) fn evidence_of_means(stored: &Stored, a: &Quantity, b: &Quantity) -> 
     hold(stored, a, Reference::Mean { quantity: b, paired: false }, Asked::EQUAL)
 }
 
-/// Holds a mean against its reference.
+/// Compares a mean with its reference.
 pub(super) fn hold(stored: &Stored, quantity: &Quantity, reference: Reference, asked: Asked) -> Held {
     let a = QuantityMean::of(stored, quantity);
     let (b, is_paired, stated) = match reference {
@@ -223,7 +223,7 @@ fn hold_exact(held: &mut Held, difference: f64, scale: f64, stated_error: f64, v
     held.evidence = Evidence::Exact { holds, said };
 }
 
-/// Why the test would mean nothing.
+/// Why the test would be void.
 fn objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Option<String> {
     means
         .iter()
@@ -234,7 +234,7 @@ fn objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Opti
         .or_else(|| silence_objection(quantity, means, asked))
 }
 
-/// A biased estimator agrees with nothing by right; a control may say that it differs.
+/// A biased estimator may not claim to agree; a control may state that it differs.
 fn bias_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
     if !asked.agreement || asked.difference {
         return None;
@@ -245,7 +245,7 @@ fn bias_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
     })
 }
 
-/// Estimators of different integrals owe each other nothing; a control may say that they differ.
+/// Estimators of different integrals need not agree; a control may state that they differ.
 fn model_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
     let [a, b] = means else { return None };
     if asked.difference || a.run.model == b.run.model {
@@ -261,8 +261,8 @@ fn model_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
     ))
 }
 
-/// Two estimators that both scored nothing agree on nothing: they may share what keeps them dark. A
-/// claim on each class is not void by one that does not occur, as long as their sum is not dark.
+/// Two estimators that both scored nothing agree on nothing: they may share the defect that makes them
+/// zero. A claim on each class is not void by one that does not occur, as long as their sum is not 0.
 fn silence_objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Option<String> {
     if asked.each && quantity.observable.class != "all" {
         return None;

@@ -1,5 +1,5 @@
-//! Claims and records in, verdicts out, and a list of what wants a second look. Pure: a verdict is a
-//! function of records and levels.
+//! Claims and records in, verdicts out, and a list of the cases that need a second look. Pure: a verdict
+//! is a function of records and levels.
 
 /// Two records of one experiment: what changed.
 pub mod difference;
@@ -12,32 +12,32 @@ pub mod levels;
 
 /// Verdicts for continuous integration.
 pub mod junit;
-/// What verification says.
+/// Verdicts: the outcome of every test, as it is shown.
 pub mod verdict;
 
 /// Efficiencies of all pairs of estimators.
 pub mod comparisons;
 /// Claims of efficiency.
 pub mod efficiency;
-/// What models are off by.
+/// Errors of models against transport.
 pub mod model_errors;
-/// Efficiencies by CPU time, measured twice.
+/// Efficiencies by CPU time in two records.
 pub mod timing_ratios;
-/// What counts of work cost.
+/// Cost of counted work.
 pub mod weights;
 
 /// Evidence that adds up over nights.
 pub mod nights;
 
-/// What one test shows by itself.
+/// Evidence of one test by itself.
 mod evidence;
 /// Tests under one family-wise level.
 mod family;
 /// Means against values and against each other.
 mod means;
-/// Claims that a record comes out again.
+/// Claims that a record is reproduced.
 mod reproduction;
-/// What a sampler's record shows.
+/// Tests of samplers.
 mod sampler;
-/// What the comparisons of a record show.
+/// Evidence of the comparisons of a record.
 mod trial;

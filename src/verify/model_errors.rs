@@ -1,4 +1,5 @@
-//! What models are off by: their means against light transport itself, in the same cell. Measured, never judged.
+//! Errors of models: their means against light transport itself, in the same cell. Measured, never
+//! judged.
 
 use crate::results::csv_text;
 use crate::results::record::{Cell, EstimatorRun, Observable};
@@ -16,17 +17,17 @@ pub struct ModelError {
     pub cell: String,
     /// Band name.
     pub band: String,
-    /// What was measured.
+    /// Observable that is compared.
     pub observable: Observable,
     /// The estimator of the model.
     pub estimator: String,
-    /// The model.
+    /// Name of the model.
     pub model: String,
-    /// Its mean.
+    /// Mean of the model's estimator.
     pub value: Estimate,
     /// The estimator of the truth.
     pub truth: String,
-    /// Its mean.
+    /// Mean of the transport estimator.
     pub expected: Estimate,
     /// (value - expected) / expected, with its error by the delta method.
     pub relative: Estimate,
@@ -42,8 +43,9 @@ impl ModelError {
     }
 }
 
-/// All rows of a record: each run that estimates a model, against the cell's first that does not; observables of images
-/// as a whole, of probes and of fluxes, in the total and in the classes that both scored.
+/// All rows of a record: each run that estimates a model, against the cell's first that does not;
+/// observables of images as a whole, of probes and of fluxes, in the total and in the classes that both
+/// scored.
 pub fn model_errors(stored: &Stored) -> Vec<ModelError> {
     let mut rows = Vec::new();
     for cell in &stored.record.cells {
@@ -95,7 +97,8 @@ fn of_run(
     rows
 }
 
-/// a/b - 1: the variance is (a/b)^2 (v_a / a^2 + v_b / b^2), the degrees of freedom as Welch and Satterthwaite have them.
+/// a/b - 1: the variance is (a/b)^2 (v_a / a^2 + v_b / b^2), the degrees of freedom as Welch and
+/// Satterthwaite have them.
 fn relative(a: &Estimate, b: &Estimate) -> Estimate {
     let ratio = a.value / b.value;
     let scaled = |estimate: &Estimate, scale: f64| Estimate {

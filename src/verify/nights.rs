@@ -4,10 +4,10 @@
 //! under the hypothesis, e = 1 / (2 sqrt(p)) is a valid e-value: its expectation is at most
 //! integral of dp / (2 sqrt(p)) over (0, 1) = 1 (V. Vovk, R. Wang, "E-values: Calibration, combination,
 //! and applications", Annals of Statistics 49(3), 2021, the calibrator kappa = 1/2). Nights are
-//! independent, so the product over nights is a non-negative supermartingale of expectation at most 1, and
-//! by Ville's inequality it ever reaches 1/level with probability at most `level`, however often one looks.
-//! With m tests, each at level `LIFE_LEVEL` / m, any false alarm in the whole life of a program has
-//! probability at most `LIFE_LEVEL`. The product starts again where what fixes the numbers changes.
+//! independent, so the product over nights is a non-negative supermartingale of expectation at most 1,
+//! and by Ville's inequality it ever reaches 1/level with probability at most `level`, however often one
+//! looks. With m tests, each at level `LIFE_LEVEL` / m, any false alarm in the whole life of a program
+//! has probability at most `LIFE_LEVEL`. The product starts again where what fixes the numbers changes.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ use crate::stats::evidence::calibrated;
 /// The probability of any false alarm of the accumulated evidence, over all tests and nights.
 pub const LIFE_LEVEL: f64 = 1e-3;
 
-/// The state that nights hand on: a small JSON file.
+/// The state passed from night to night: a small JSON file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Nights {
@@ -30,23 +30,23 @@ pub struct Nights {
     pub tests: BTreeMap<String, Accumulated>,
 }
 
-/// What the nights say against one statement.
+/// The evidence of the nights against one statement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Accumulated {
-    /// What fixes the numbers: another one begins again.
+    /// Fingerprint of what fixes the numbers: another one begins again.
     pub code: String,
     /// Nights counted.
     pub nights: u64,
     /// Natural logarithm of the product of e-values.
     pub log_e: f64,
-    /// The largest that it has been: what alarms look at.
+    /// Largest value so far, which alarms compare with.
     pub peak: f64,
 }
 
 impl Nights {
-    /// Adds a night of verdicts played on the streams `token`; `code` says of an experiment what fixes its
-    /// numbers. False where that night had been counted before: nothing is added then.
+    /// Adds a night of verdicts obtained on the streams `token`; `code` gives of an experiment what
+    /// fixes its numbers. False where that night had been counted before: nothing is added then.
     pub fn add(&mut self, token: &str, verdicts: &[Verdict], code: impl Fn(&str) -> String) -> bool {
         if self.tokens.iter().any(|t| t == token) {
             return false;

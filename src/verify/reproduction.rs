@@ -1,4 +1,4 @@
-//! Claims that a record comes out again, bit for bit.
+//! Claims that a record is reproduced bit for bit.
 
 use super::evidence::Evidence;
 use super::family::Finding;
@@ -7,7 +7,7 @@ use super::verdict::{TestKind, Verdict};
 use crate::results::record::{ClaimKind, Replay};
 use crate::results::store::Stored;
 
-/// One trial for every measurement that was played again, and one for the checksum that a claim states.
+/// One trial for every measurement that was run again, and one for the checksum that a claim states.
 pub(super) fn trials(stored: &Stored) -> Vec<Trial> {
     let record = &stored.record;
     let mut trials = Vec::new();
@@ -43,7 +43,7 @@ pub(super) fn trials(stored: &Stored) -> Vec<Trial> {
 }
 
 fn missing() -> Evidence {
-    Evidence::Nothing("nothing was played again: the claim came after the run".into())
+    Evidence::Nothing("nothing was run again: the claim was added after the run".into())
 }
 
 /// The same bits, or why not.

@@ -1,12 +1,12 @@
-//! What a sampler's record shows: its draws held against the density that it claims.
+//! Tests of a sampler: its draws compared with the density that it claims.
 //!
 //! | test | statement | judged by |
 //! |---|---|---|
-//! | `chi2 coarse`, `chi2 fine` | draws fall into bins as the density's masses say | Pearson |
-//! | `serial` | so do pairs of consecutive draws, as the products of masses say | Pearson |
+//! | `chi2 coarse`, `chi2 fine` | draws fall into bins with the density's masses | Pearson |
+//! | `serial` | so do pairs of consecutive draws, with the products of masses | Pearson |
 //! | `contrast NAME` | the mean of a function of the draw | Student's t |
 //! | `delta NAME` | a discrete outcome has its probability, and its value | exact binomial |
-//! | `null` | the sampler returns nothing as often as is stated; never, where that is stated | exact binomial, or none |
+//! | `null` | the sampler returns nothing as often as is stated, or never | exact binomial, or none |
 //! | `identity D5` | each draw's own density is the density function's, to 1e-9 | none differs |
 //! | `identity D7` | density, discrete masses and stated null sum to 1 | certified quadrature |
 //! | `outside` | no draw where the density is 0, or outside the chart | there is none |
@@ -25,8 +25,8 @@ use crate::stats::goodness::{Bin, contrast, pearson, proportion};
 use crate::stats::hypothesis::Test;
 use crate::stats::moments::Moments;
 
-/// Largest bound of the error of the total mass with which its being 1 says more than counts do: those of
-/// 1e6 draws see relative errors of 1e-2. The bound itself is the row's `detectable`.
+/// Largest bound of the error of the total mass with which its being 1 is a stricter test than counts:
+/// those of 1e6 draws see relative errors of 1e-2. The bound itself is the row's `detectable`.
 const TOTAL_BOUND: f64 = 1e-4;
 
 /// Sampling errors and deviations of contrasts below this, relative to the value, are rounding.
@@ -52,7 +52,7 @@ pub(super) fn trials(stored: &Stored, index: usize, comparison: &SamplerComparis
 struct Tests<'a> {
     stored: &'a Stored,
     run: &'a SamplerRun,
-    /// With the names filled in.
+    /// A verdict with the names filled in.
     verdict: Verdict,
     findings: Vec<Finding>,
 }
@@ -69,7 +69,7 @@ impl Tests<'_> {
         &mut self.findings[last]
     }
 
-    /// Why nothing that is said of this sampler is worth anything.
+    /// Why every test of this sampler is void.
     fn objection(&self) -> Option<String> {
         let (n, values) = (self.run.senseless, self.run.senseless_contrasts);
         if n > 0 {
@@ -101,7 +101,7 @@ impl Tests<'_> {
             return;
         };
         if bins.mass.iter().filter(|mass| **mass > 0.0).count() < 2 {
-            return; // one outcome has all the mass: its own row says what there is to say
+            return; // one outcome has all the mass: its own row is the test
         }
         let counted: f64 = bins.observed.iter().sum();
         // Pairs with a draw that is in no bin are not counted.

@@ -1,9 +1,10 @@
 //! Efficiencies by CPU time in two records: whether the second's ratios are those of the first.
 //!
-//! Times are never the same twice, their ratios should be: the log ratios of one pair of estimators in both records differ by
-//! chance within sqrt(s_a^2 + s_b^2), s the half width of the 95 % interval over 1.96. Where both records hold the same
-//! numbers the variances in the two ratios are the same as well, and only the costs differ by chance: the test is then
-//! wider than it need be. Another machine may truly have another ratio.
+//! Times are never the same twice, their ratios should be: the log ratios of one pair of estimators in
+//! both records differ by chance within sqrt(s_a^2 + s_b^2), s the half width of the 95 % interval over
+//! 1.96. Where both records hold the same numbers the variances in the two ratios are the same as well,
+//! and only the costs differ by chance: the test is then wider than it need be. Another machine may
+//! truly have another ratio.
 
 use super::comparisons::{EfficiencyRow, comparisons};
 use crate::math;
@@ -12,7 +13,7 @@ use crate::results::store::Stored;
 use crate::stats::multiplicity::holm;
 use crate::stats::tails::normal_two_sided;
 
-/// The probability that any ratio of a comparison is called another although none is.
+/// The probability that any ratio of a comparison is reported as different although none is.
 pub const LEVEL: f64 = 1e-3;
 
 /// Standard errors in half a 95 % interval.
@@ -21,9 +22,9 @@ const HALF_WIDTH: f64 = 1.96;
 /// One pair of estimators in both records.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimingRatio {
-    /// The first record's.
+    /// Row of the first record.
     pub before: EfficiencyRow,
-    /// The second record's.
+    /// Row of the second record.
     pub after: EfficiencyRow,
     /// The second's ratio over the first's.
     pub change: f64,
@@ -34,7 +35,7 @@ pub struct TimingRatio {
 }
 
 impl TimingRatio {
-    /// Are the two one ratio, for all that is known?
+    /// Whether the two ratios are compatible.
     pub fn is_compatible(&self) -> bool {
         self.adjusted_p >= LEVEL
     }

@@ -1,4 +1,4 @@
-//! What the comparisons of a record show, each by itself.
+//! Evidence of the comparisons of a record, each by itself.
 
 use super::efficiency::{self, EfficiencyClaim};
 use super::family::Finding;
@@ -18,7 +18,7 @@ pub(super) enum Subject {
     Comparison(usize),
     /// This one of its comparisons of samplers; its tests are told apart by their kind.
     Sampler(usize),
-    /// What is not measured again.
+    /// A subject that is not measured again.
     Whole,
 }
 
@@ -40,7 +40,7 @@ impl Trial {
     }
 }
 
-/// A verdict on a claim of which nothing is said yet.
+/// A verdict on a claim that is not judged yet.
 pub(super) fn blank(record: &Record, claim: &Claim) -> Verdict {
     Verdict {
         experiment: record.experiment.clone(),

@@ -1,4 +1,4 @@
-//! What verification says.
+//! Verdicts of verification.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 use crate::results::csv_text;
 use crate::results::record::CostMeasure;
 
-/// What verification says of one comparison. Only a pass is green.
+/// The verdict on one comparison. Only a pass is green.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The claim holds, as far as the test can see.
@@ -16,7 +16,7 @@ pub enum Outcome {
     Fail,
     /// No defect was found, and one as large as the claim wants to see could have been missed.
     Underpowered,
-    /// The test would mean nothing, for this reason.
+    /// The test would be void, for this reason.
     Invalid(String),
 }
 
@@ -60,7 +60,7 @@ pub enum TestKind {
     SumOfSquares,
     /// Variance times cost.
     Efficiency(CostMeasure),
-    /// Passes that were played again.
+    /// Passes that were run again.
     Replay,
     /// The checksum of a record's numbers.
     Checksum,
@@ -72,7 +72,7 @@ pub enum TestKind {
     Serial,
     /// The mean of this function of a draw.
     Contrast(String),
-    /// This discrete outcome.
+    /// Probability of this discrete outcome.
     Delta(String),
     /// Draws that return nothing.
     Null,
@@ -95,7 +95,7 @@ pub enum TestKind {
 }
 
 impl TestKind {
-    /// Is it one that a claim on a sampler makes?
+    /// Whether a claim on a sampler makes it.
     pub fn is_of_sampler(&self) -> bool {
         use TestKind::{
             Chi2Coarse, Chi2Fine, Contrast, Delta, Null, Outside, OwnDensity, Serial, TotalMass,
@@ -152,7 +152,7 @@ impl Serialize for TestKind {
     }
 }
 
-/// One comparison's verdict; as it stands here, a row of `verdicts.csv`.
+/// One comparison's verdict; a row of `verdicts.csv`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Verdict {
     /// Experiment name.
@@ -182,11 +182,11 @@ pub struct Verdict {
     pub outcome: Outcome,
     /// Observable name.
     pub observable: String,
-    /// What was measured.
+    /// Measured value.
     pub value: Option<f64>,
     /// Its standard error, from the spread of the batches.
     pub std_error: Option<f64>,
-    /// What it was held against.
+    /// What it was compared with.
     pub expected: Option<f64>,
     /// The stated or measured standard error of that.
     pub expected_error: Option<f64>,
@@ -196,7 +196,7 @@ pub struct Verdict {
     pub second_p: Option<f64>,
     /// The reason for the outcome, as a sentence.
     pub note: String,
-    /// It expects something else than agreement.
+    /// Whether it is a control, which expects something other than agreement.
     #[serde(skip)]
     pub control: bool,
 }
@@ -224,13 +224,13 @@ pub fn exit_code(verdicts: &[Verdict]) -> u8 {
     }
 }
 
-/// A number that may be none.
+/// A number, or nothing.
 pub(super) fn known(x: f64) -> Option<f64> {
     (!x.is_nan()).then_some(x)
 }
 
 impl Verdict {
-    /// Does it count as evidence for its claim?
+    /// Whether it counts as evidence for its claim.
     pub fn is_green(&self) -> bool {
         self.outcome == Outcome::Pass
     }

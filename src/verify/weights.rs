@@ -1,26 +1,27 @@
-//! What counts of work cost: fixed weights, so that efficiencies by counters are the same numbers on every
-//! machine; and how well CPU time follows them.
+//! Cost of counted work: fixed weights, so that efficiencies by counters are the same numbers on
+//! every machine; and how well CPU time follows them.
 
 use crate::results::record::EstimatorRun;
 use crate::results::store::Stored;
 
 /// Weights of the counters, in nanoseconds on the machine that they were measured on; only their ratios
-/// matter. From a regression of CPU time on counters over the nine cells at three albedos (rounded), which
-/// this prints:
+/// matter. From a regression of CPU time on counters over the nine cells at three albedos (rounded),
+/// which this prints:
 ///
 /// ```text
 /// cargo test --release --test integration -- --ignored --nocapture cpu_time_follows_the_counters
 /// ```
 ///
-/// What they are worth: they predicted the CPU time of each of those 27 runs to 15 %; a rough boundary under
-/// a sky costs more than they say, because light samples below the horizon are not counted. They predict
-/// together; one by one they mean little, because in a path tracer rays are paths, medium events and
-/// boundary events together: of the fits that are equally good this one charges the rays. They are those of
-/// the unit sphere: a ray costs more in a mesh of many triangles. The last five are what a point of a cloud costs, what a
-/// query of 1e4 to 1e6 points costs for each that it looks at, and what a classical dipole costs a band, as
+/// Accuracy: they predicted the CPU time of each of those 27 runs to 15 %; a rough boundary
+/// under a sky costs more than they predict, because light samples below the horizon are not counted.
+/// They predict together; one by one they mean little, because in a path tracer rays are paths, medium
+/// events and boundary events together: of the fits that are equally good this one charges the rays.
+/// They are those of the unit sphere: a ray costs more in a mesh of many triangles. The last five are
+/// what a point of a cloud costs, what a query of 1e4 to 1e6 points costs for each that it looks at, and
+/// what a classical dipole costs a band, as
 ///
 /// ```text
-/// cargo bench --bench point_cloud
+/// cargo bench -p benches --bench point_cloud
 /// ```
 ///
 /// prints them.
@@ -37,7 +38,7 @@ pub const WEIGHTS: [(&str, f64); 10] = [
     ("bssrdf_evaluations", 40.0),
 ];
 
-/// CPU time may drift by this much from the weights before they want measuring again.
+/// CPU time may drift by this much from the weights before they must be measured again.
 pub const DRIFT_LIMIT: f64 = 0.1;
 
 /// The weighted cost of every batch of a run.
@@ -77,9 +78,9 @@ fn weight(name: &str) -> Option<f64> {
 /// Counts of one run in the order of [`WEIGHTS`], and what it took, CPU nanoseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedRun {
-    /// The counts.
+    /// Counts of the run, in the order of [`WEIGHTS`].
     pub counts: [f64; WEIGHTS.len()],
-    /// The time.
+    /// CPU time of the run, ns.
     pub nanoseconds: f64,
 }
 
@@ -114,8 +115,8 @@ pub fn fit(runs: &[TimedRun]) -> [f64; WEIGHTS.len()] {
     }
 }
 
-/// Solves the normal equations of sum (sum_k w_k n_k / t - 1)^2 over the counters `free`; the diagonal is
-/// raised by 1e-9 of itself, because counters may depend on each other.
+/// Solves the normal equations of sum (sum_k w_k n_k / t - 1)^2 over the counters `free`; the diagonal
+/// is raised by 1e-9 of itself, because counters may depend on each other.
 fn least_squares(runs: &[TimedRun], free: &[usize]) -> Vec<f64> {
     let x = |run: &TimedRun, k: usize| run.counts[free[k]] / run.nanoseconds;
     let size = free.len();
@@ -139,8 +140,8 @@ fn least_squares(runs: &[TimedRun], free: &[usize]) -> Vec<f64> {
 }
 
 /// How far the predictions of [`WEIGHTS`] are from those of weights fitted to these runs: the largest
-/// relative deviation over the runs from the common factor between them (another machine's speed). Nothing
-/// for fewer runs than counters.
+/// relative deviation over the runs from the common factor between them (another machine's speed).
+/// Nothing for fewer runs than counters.
 pub fn drift(runs: &[TimedRun]) -> Option<f64> {
     let counted = (0..WEIGHTS.len()).filter(|&k| runs.iter().any(|run| run.counts[k] > 0.0)).count();
     if runs.is_empty() || runs.len() < counted {
@@ -164,7 +165,8 @@ mod tests {
 
     const N: usize = WEIGHTS.len();
 
-    /// Runs of all mixtures of two amounts of work, at `speed` and with weights that are off by `factors`.
+    /// Runs of all mixtures of two amounts of work, at `speed` and with weights that are off by
+    /// `factors`.
     fn runs(speed: f64, factors: [f64; N]) -> Vec<TimedRun> {
         let counts = |i: usize| std::array::from_fn(|k| if (i >> k) & 1 == 1 { 9e6 } else { 1e6 });
         let time = |counts: [f64; N]| -> f64 {

@@ -1,5 +1,5 @@
 //! Acceptance by distance a second time, with places for defects: a point at distance d is accepted with
-//! p = e^(-m d) and weighs 1/p, alone or in a cloud of two nodes.
+//! p = e^(-m d) and has weight 1/p, alone or in a cloud of two nodes.
 //!
 //! | view | one draw | the law |
 //! |---|---|---|
@@ -8,13 +8,14 @@
 //! | `pair` | the cloud is thinned: a random pair of neighbours | products of p and 1 - p |
 //! | `number` | the cloud is thinned: how many are accepted | Poisson-binomial |
 //!
-//! What a draw says of its own density is 1 over the weight that it gave. An event of probability 2^-24 is not
-//! met by any affordable number of draws: `tail` begins in it, by a word of random bits whose first 24 are 0.
-//! It looks where p is below 2^-24, so that a number of 24 bits (0, then) accepts everything there, each with
-//! a weight above 2^24.
+//! The density that a draw reports is 1 over the weight that it gave. An event of probability 2^-24
+//! is not met by any affordable number of draws: `tail` begins in it, by a word of random bits whose
+//! first 24 are 0. It looks where p is below 2^-24, so that a number of 24 bits (0, then) accepts
+//! everything there, each with a weight above 2^24.
 //!
-//! The cloud is thinned as a hierarchy does it. A node of points whose nearest is at distance d_m has candidates at
-//! rate p_m = p(d_m), found by gaps floor(ln(1 - u) / ln(1 - p_m)), of which each is accepted with p_i / p_m.
+//! The cloud is thinned as a hierarchy does it. A node of points whose nearest is at distance d_m has
+//! candidates at rate p_m = p(d_m), found by gaps floor(ln(1 - u) / ln(1 - p_m)), of which each is
+//! accepted with p_i / p_m.
 
 use scatterproof::math::{exp, ln_1p};
 use scatterproof::samplers::{Coordinate, Discrete, Draw, Null, Piece, Sampler};
@@ -42,7 +43,8 @@ pub struct AcceptanceOptions {
     view: View,
 }
 
-/// Effective transport coefficients of skin1 (Jensen et al. 2001), 1/mm: the mean over three bands, and red.
+/// Effective transport coefficients of skin1 (Jensen et al. 2001), 1/mm: the mean over three bands, and
+/// red.
 const MEAN: f64 = 0.823;
 const RED: f64 = 0.272;
 
@@ -53,7 +55,7 @@ const NODE: usize = POINTS / 2;
 /// The first 24 bits of a number that has them all 0: it is below 2^-24.
 const BITS: i32 = 24;
 
-/// The sampler.
+/// Sampler of accepted points, with planted defects.
 pub struct Acceptance {
     view: View,
     defect: Defect,
@@ -250,12 +252,12 @@ const fn acceptance(
     of(Family::Acceptance, row(name, defect, what, expected))
 }
 
-/// Every defect here.
+/// Defects that this sampler plants.
 pub const ROWS: &[Planted] = &[
     acceptance(
         "accept-exponent",
         Defect::ExponentOff,
-        "points are accepted with e^(-1.01 m d) and weigh e^(m d)",
+        "points are accepted with e^(-1.01 m d) and have weight e^(m d)",
         &["acceptance.null", "acceptance.chi2 coarse"],
     ),
     acceptance(
@@ -267,13 +269,13 @@ pub const ROWS: &[Planted] = &[
     acceptance(
         "accept-weight-of-mean",
         Defect::WeightOfMean,
-        "points are accepted with red's coefficient and weigh by the mean's",
+        "points are accepted with red's coefficient and have the weight of the mean's",
         &["acceptance.null", "acceptance.chi2 coarse"],
     ),
     acceptance(
         "accept-coarse-uniform",
         Defect::CoarseUniform,
-        "the number that decides has 24 bits: it cannot be below p < 2^-24, but for 0",
+        "the number that decides has 24 bits: it cannot be below p < 2^-24, except for 0",
         &["thinning.null"],
     ),
     acceptance(

@@ -1,5 +1,5 @@
-//! Two bounces from one medium vertex, by each technique of `connection` alone: the mean of f / p must be
-//! the same whichever draws, so a technique whose draws and density differ stands alone.
+//! Two bounces from one medium vertex, by each technique of `connection` alone: the mean of f / p must
+//! be the same whichever draws, so a technique whose draws and density differ is found.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::connection::{BOTTOM_TO_TOP, BSDF, CALL, Ends, LIGHT, Model, TOP_TO_BOTTOM, Vertex};
 use super::defects::Defect;
 
-/// Which techniques draw.
+/// Techniques that draw the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Technique {
@@ -25,17 +25,17 @@ pub enum Technique {
     Light,
     TopToBottom,
     BottomToTop,
-    /// One sample of each, weighed by the balance heuristic.
+    /// One sample of each, weighted by the balance heuristic.
     All,
 }
 
 impl Technique {
-    /// Does it draw by this one of [`super::connection`]'s techniques?
-    pub fn plays(self, technique: usize, model: &Model) -> bool {
+    /// Whether it draws by this one of [`super::connection`]'s techniques.
+    pub fn uses(self, technique: usize, model: &Model) -> bool {
         (self == Technique::All || self as usize == technique) && model.can_draw(technique)
     }
 
-    /// What a sample of f is divided by: its own density, or the sum of all (Veach & Guibas 1995).
+    /// Divisor of a sample of f: its own density, or the sum of all (Veach & Guibas 1995).
     pub fn density(self, densities: [f64; 4], defect: Defect) -> f64 {
         match self {
             Technique::All if defect == Defect::MisOmitsBottom => densities[..3].iter().sum(),
@@ -49,13 +49,14 @@ impl Technique {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TwoBounceOptions {
-    /// Which techniques draw.
+    /// Techniques that draw the samples.
     pub technique: Technique,
     /// How far beyond the first surface that the probe meets x_i lies along the probe's ray, mm.
     pub depth_mm: f64,
-    /// Only connections whose first flight is longer than this are scored, mm: a part of the integral, the same
-    /// for all. Where a ray from x_k passes x_i at the distance D, the weight of `top_to_bottom` grows as
-    /// 1 / D next to x_i: its variance diverges as a logarithm, and of such a mean no t test says anything.
+    /// Only connections whose first flight is longer than this are scored, mm: a part of the integral,
+    /// the same for all. Where a ray from x_k passes x_i at the distance D, the weight of
+    /// `top_to_bottom` grows as 1 / D next to x_i: its variance diverges as a logarithm, and no t test
+    /// is valid for such a mean.
     pub beyond_mm: f64,
 }
 
@@ -122,14 +123,14 @@ pub struct TwoEnds<'a> {
 impl TwoEnds<'_> {
     /// Walks on to the boundary, then out of it by chance and to a light.
     fn unidirectional(&mut self) {
-        if !self.technique.plays(BSDF, &self.model) && !self.technique.plays(LIGHT, &self.model) {
+        if !self.technique.uses(BSDF, &self.model) && !self.technique.uses(LIGHT, &self.model) {
             return;
         }
         let Some((x_j, exit)) = self.flight() else { return };
-        if self.technique.plays(LIGHT, &self.model) {
+        if self.technique.uses(LIGHT, &self.model) {
             self.join_a_light(x_j, &exit);
         }
-        if self.technique.plays(BSDF, &self.model) {
+        if self.technique.uses(BSDF, &self.model) {
             let w_kj = (x_j - exit.point).normalize();
             if let Some(to_light) = self.model.draw_exit(&exit, w_kj, self.walk.draw3())
                 && self.model.is_lit(&exit, to_light, self.scores)
@@ -206,8 +207,8 @@ impl TwoEnds<'_> {
 
     /// The call: x_k is the first hit along a uniform direction, and both techniques start from it.
     pub fn call(&mut self) {
-        if !self.technique.plays(TOP_TO_BOTTOM, &self.model)
-            && !self.technique.plays(BOTTOM_TO_TOP, &self.model)
+        if !self.technique.uses(TOP_TO_BOTTOM, &self.model)
+            && !self.technique.uses(BOTTOM_TO_TOP, &self.model)
         {
             return;
         }
@@ -221,10 +222,10 @@ impl TwoEnds<'_> {
             self.scores.note(Anomaly::LostRay);
             return;
         };
-        if self.technique.plays(TOP_TO_BOTTOM, &self.model) {
+        if self.technique.uses(TOP_TO_BOTTOM, &self.model) {
             self.top_to_bottom(&exit);
         }
-        if self.technique.plays(BOTTOM_TO_TOP, &self.model) {
+        if self.technique.uses(BOTTOM_TO_TOP, &self.model) {
             let tries = if self.model.defect == Defect::FailedEndsRedrawn { 100 } else { 1 };
             let drawn = (0..tries).find_map(|_| self.bottom_to_top(&exit));
             if let Some((x_j, to_light)) = drawn

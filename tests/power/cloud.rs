@@ -1,10 +1,11 @@
-//! The point-cloud method a second time, with places for defects: M points of a convex body with the flux
+//! The point-cloud method a second time, with places for defects: M points of a convex body with the
+//! flux
 //!   Phi = T12 pi L / f,   f = 1/A by area, 1/(K A_i) where one of K faces is chosen by index,
-//! that one direction with the density cos / pi brings, and camera paths that are refracted into the body with
-//! probability T21 and find there
+//! that one direction with the density cos / pi brings, and camera paths that are refracted into the
+//! body with probability T21 and find there
 //!   L = 1/M sum_p K(d_p) Phi_p B_p / p(d_p),   B_p = 1 with probability p(d_p),
-//! K = R_d / pi of the classical dipole (Jensen, Marschner, Levoy & Hanrahan 2001). Nothing but multiple scattering is scored; a
-//! convex body shades nothing of itself.
+//! K = R_d / pi of the classical dipole (Jensen, Marschner, Levoy & Hanrahan 2001). Only multiple
+//! scattering is scored; a convex body shades nothing of itself.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -23,11 +24,11 @@ use serde::{Deserialize, Serialize};
 
 use super::defects::{Defect, Family, Planted, of, row};
 
-/// p(d).
+/// Forms of the acceptance probability p(d).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Rule {
-    /// 1.
+    /// All points: p = 1.
     All,
     /// e^(-sigma_tr d) with each band's own, bands apart.
     Band,
@@ -185,7 +186,7 @@ impl Cloud {
         Lit { point, flux: std::array::from_fn(|band| scale * self.scene.lights[0].eval(band, wi).0) }
     }
 
-    /// What an accepted point weighs that was accepted with e^(-sigma d).
+    /// Weight of a point that was accepted with e^(-sigma d).
     fn weight(&self, sigma: f64, d: f64) -> f64 {
         match self.defect {
             Defect::NoReweighting => 1.0,
@@ -239,7 +240,7 @@ impl Estimator for Cloud {
             let mut stream = key.stream(index as u64, Purpose::Connection);
             let reflectance = fresnel(-seen.ray.dir.dot(hit.normal), self.eta).reflectance;
             if stream.draw() < reflectance {
-                continue; // goes off to the sky: surface reflection, which is not scored
+                continue; // leaves towards the sky: surface reflection, which is not scored
             }
             let exit = if self.defect == Defect::ExitTwice { 1.0 - reflectance } else { 1.0 };
             let radiance = self.gather(&points, hit.point, &mut stream);
@@ -269,7 +270,7 @@ const fn cloud(
     of(Family::Cloud, row(name, defect, what, expected))
 }
 
-/// Every defect here.
+/// Defects that this estimator plants.
 pub const ROWS: &[Planted] = &[
     cloud(
         "cloud-face-count-missing",
@@ -292,13 +293,13 @@ pub const ROWS: &[Planted] = &[
     cloud(
         "cloud-mean-weighs-band",
         Defect::MeanWeighsBand,
-        "bands accept by their own coefficients and weigh by the mean's",
+        "bands accept by their own coefficients and have the weight of the mean's",
         &["cloud.red", "cloud.blue", "cloud.rules agree"],
     ),
     cloud(
         "cloud-no-reweighting",
         Defect::NoReweighting,
-        "accepted points weigh 1",
+        "accepted points have weight 1",
         &["cloud.red", "cloud.green", "cloud.blue", "cloud.rules agree"],
     ),
     cloud(

@@ -2,9 +2,9 @@
 //! subdivision next-event estimation (Koerner, Novak, Kutz, Habel & Jarosz 2016, Subdivision next-event
 //! estimation for path-traced subsurface scattering) draws it, a second time, with places for defects.
 //!
-//! x_i and x_j lie in the medium, x_k on the boundary with outward normal n, w_ab points from a to b, w_in is
-//! the direction of travel on arrival at x_i, w_L points from x_k to the light. d is a distance, T(d) =
-//! exp(-sigma_t d), ph a phase function, n1 = 1 and n2 = eta the indices outside and inside.
+//! x_i and x_j lie in the medium, x_k on the boundary with outward normal n, w_ab points from a to b,
+//! w_in is the direction of travel on arrival at x_i, w_L points from x_k to the light. d is a distance,
+//! T(d) = exp(-sigma_t d), ph a phase function, n1 = 1 and n2 = eta the indices outside and inside.
 //!
 //!   f  = ph(w_in.w_ij) T(d_ij) / d_ij^2  sigma_s ph(w_ij.w_jk) T(d_jk) c_k / d_jk^2  f_t |n.w_L|  L
 //!   bsdf           rr ph(w_in.w_ij) sigma_t T(d_ij) / d_ij^2  rr ph(w_ij.w_jk) T(d_jk) c_k / d_jk^2
@@ -13,15 +13,15 @@
 //!   top to bottom  q p(x_k | x_i) p_L(w_L) p(w_kj | w_L) p_t(d_jk) / d_jk^2
 //!   bottom to top  q p(x_k | x_i) p(w_ij) p_s(d_ij) / d_ij^2  p(w_L | w_kj)
 //!
-//! c_k = w_jk.n. The flight to the boundary has the probability T, not the density sigma_t T. rr = albedo is
-//! the survival at a medium vertex, q the probability of a call. x_k is where a uniform direction first
-//! meets the boundary, p(x_k | x_i) = (w_ik.n) / (4 pi d_ik^2) where nothing is between. Refraction is
-//! forced where the last two draw it, so there 1 - F is in no density.
+//! c_k = w_jk.n. The flight to the boundary has the probability T, not the density sigma_t T. rr =
+//! albedo is the survival at a medium vertex, q the probability of a call. x_k is where a uniform
+//! direction first meets the boundary, p(x_k | x_i) = (w_ik.n) / (4 pi d_ik^2) where nothing is between.
+//! Refraction is forced where the last two draw it, so there 1 - F is in no density.
 //!
-//! f and the densities are per dV(x_j) dA(x_k) dw_L with their Dirac factors, written in w_L, left out. A
-//! technique whose factors are not those of the class cannot draw it: `bsdf` and `bottom to top` no
-//! parallel light, `light` no smooth boundary. A smooth boundary's p(w_kj | w_L) is a Dirac in w_kj, in w_L
-//! therefore J = dw_L / dw_kj = eta^2 |n.w_kj| / |n.w_L| (Snell's law, differentiated).
+//! f and the densities are per dV(x_j) dA(x_k) dw_L with their Dirac factors, written in w_L, left out.
+//! A technique whose factors are not those of the class cannot draw it: `bsdf` and `bottom to top` no
+//! parallel light, `light` no smooth boundary. A smooth boundary's p(w_kj | w_L) is a Dirac in w_kj, in
+//! w_L therefore J = dw_L / dw_kj = eta^2 |n.w_kj| / |n.w_L| (Snell's law, differentiated).
 
 use std::f64::consts::PI;
 
@@ -62,16 +62,16 @@ pub struct Ends {
     pub start: Vertex,
     pub x_j: DVec3,
     pub exit: Hit,
-    /// w_L.
+    /// Unit direction w_L towards the light.
     pub to_light: DVec3,
     pub light: usize,
 }
 
-/// What an interface does between w_kj and w_L.
+/// Transmission of an interface between w_kj and w_L.
 struct Through {
-    /// f_t |n.w_L|.
+    /// Value of the integrand, f_t |n.w_L|.
     value: f64,
-    /// 1 - F.
+    /// Probability 1 - F of refraction.
     select: f64,
     /// p(w_L | w_kj) and p(w_kj | w_L), refraction being certain.
     fwd: f64,
@@ -111,7 +111,7 @@ impl Model<'_> {
         1.0 / self.scene.lights.len() as f64
     }
 
-    /// Does nothing lie on the way that leaves `origin` inwards?
+    /// Whether the segment that leaves `origin` inwards is unoccluded.
     pub fn is_clear(&self, origin: DVec3, to: DVec3, from: Option<&Hit>, scores: &mut Scores) -> bool {
         let between = to - origin;
         let ray = Ray { origin, dir: between.normalize() };
@@ -120,17 +120,17 @@ impl Model<'_> {
         self.scene.shape.intersect(&ray, Side::Inside, from, between.length()).is_none()
     }
 
-    /// Does light reach a point of the surface?
+    /// Whether light reaches a point of the surface.
     pub fn is_lit(&self, exit: &Hit, to_light: DVec3, scores: &mut Scores) -> bool {
         scores.count(Cost::ShadowRays);
         let ray = Ray { origin: exit.point, dir: to_light };
         !self.scene.shape.occluded(&ray, Some(exit.face))
     }
 
-    /// The integrand without the light's radiance, and the densities; those of calls are left out where they do
-    /// not play. `is_first_hit` says that x_k was found from x_i; else it is looked for. `p_light` is the
-    /// light's density, chance of the light included, and that chance alone for parallel light. What stands
-    /// between x_i and x_j, x_j and x_k, x_k and the light is for the caller to ask.
+    /// The integrand without the light's radiance, and the densities; those of calls are left out where
+    /// they do not take part. `is_first_hit` states that x_k was found from x_i; else it is searched.
+    /// `p_light` is the light's density, chance of the light included, and that chance alone for
+    /// parallel light. The caller tests occlusion between x_i and x_j, x_j and x_k, x_k and the light.
     pub fn evaluate(
         &self,
         ends: &Ends,
@@ -173,10 +173,10 @@ impl Model<'_> {
         let bsdf = if is_parallel { 0.0 } else { prefix * select * through.fwd };
         let lit = if self.is_smooth() { 0.0 } else { prefix * p_light };
 
-        let [plays_top, plays_bottom] =
-            [TOP_TO_BOTTOM, BOTTOM_TO_TOP].map(|index| technique.plays(index, self));
+        let [uses_top, uses_bottom] =
+            [TOP_TO_BOTTOM, BOTTOM_TO_TOP].map(|index| technique.uses(index, self));
         let cos_ik = w_ik.dot(exit.normal);
-        let is_called = plays_top || plays_bottom;
+        let is_called = uses_top || uses_bottom;
         let is_seen = |scores: &mut Scores| {
             let ignored = self.defect == Defect::FirstHitIgnored;
             cos_ik > 0.0 && (ignored || self.is_clear(x_k, start.point, Some(&exit), scores))
@@ -196,11 +196,11 @@ impl Model<'_> {
             _ => 1.0 / (d_jk * d_jk),
         };
         let mut densities = [bsdf, lit, 0.0, 0.0];
-        if plays_top {
+        if uses_top {
             let down = self.pdf_down(-ik, -w_jk, d_jk) * at_j_from_k;
             densities[TOP_TO_BOTTOM] = probe * p_light * through.rev * down;
         }
-        if plays_bottom && !is_parallel {
+        if uses_bottom && !is_parallel {
             let towards = TowardsPoint::new(ik).map_or(0.0, |towards| towards.pdf(w_ij));
             let along = equiangular(ik, w_ij, f64::INFINITY, d_ij);
             let bottom = probe * (0.5 * h_i + 0.5 * towards) * along * at_j * through.fwd;
@@ -212,8 +212,8 @@ impl Model<'_> {
         Some((value, densities))
     }
 
-    /// Density of a distance t from x_k along w_kj: exponential and equiangular towards x_i, half each, on
-    /// the endless ray.
+    /// Density of a distance t from x_k along w_kj: exponential and equiangular towards x_i, half each,
+    /// on the endless ray.
     fn pdf_down(&self, to_start: DVec3, w_kj: DVec3, t: f64) -> f64 {
         0.5 * pdf_distance_exponential(self.medium.sigma_t, t)
             + 0.5 * equiangular(to_start, w_kj, f64::INFINITY, t)

@@ -1,10 +1,10 @@
-//! The catalogue of planted defects: where each stands, and which tests are expected to see it.
+//! The catalogue of planted defects: where each is planted, and which tests are expected to see it.
 
 use std::sync::OnceLock;
 
 use super::{acceptance, cloud};
 
-/// What may be wrong. Every place that can hold a defect asks for its own by name.
+/// Defects that can be planted. Every place that can hold a defect tests for its own by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Defect {
     /// Nothing: the sham, which must be green.
@@ -105,14 +105,14 @@ pub enum Defect {
     PixelsForPasses,
 }
 
-/// Where a defect stands, and so what is played to find it.
+/// Where a defect is planted, and so what is run to find it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// In the path tracer.
     Tracer,
     /// In subdivision next-event estimation.
     Subdivision,
-    /// In a sampler.
+    /// In a sampler of the catalogue.
     Sampler,
     /// In the acceptance of points by distance.
     Acceptance,
@@ -120,7 +120,7 @@ pub enum Family {
     Cloud,
     /// In the verifier's arithmetic.
     Verifier,
-    /// Nowhere.
+    /// In no part: a control.
     Sham,
 }
 
@@ -129,13 +129,14 @@ pub enum Family {
 pub struct Planted {
     /// Its name on the command line and in tables.
     pub name: &'static str,
-    /// The defect.
+    /// Defect that is planted.
     pub defect: Defect,
-    /// Where it stands.
+    /// Part of the program that it is planted in.
     pub family: Family,
-    /// What is wrong, in one line.
+    /// Description of the defect, in one line.
     pub what: &'static str,
-    /// The tests, `experiment.claim`, `samplers.TEST` or `identity NAME`, of which each is expected to see it.
+    /// The tests, `experiment.claim`, `samplers.TEST` or `identity NAME`, of which each is expected to
+    /// see it.
     pub expected: &'static [&'static str],
 }
 
@@ -225,7 +226,7 @@ pub const TRACER: &[Planted] = &[
     row(
         "mis-sample-count",
         Defect::MisSampleCountWrong,
-        "MIS weighs interface samples as if one light sample were drawn, not two",
+        "MIS weights interface samples as if one light sample were drawn, not two",
         &["rough.lamp", "matched.sky", "furnace.matched"],
     ),
     row(
@@ -305,7 +306,7 @@ pub const TRACER: &[Planted] = &[
         &["matched.single"],
     ),
     row("other-band", Defect::OtherBand, "every band has the albedo of the first", &["rough.multiple"]),
-    row("band-missing", Defect::BandMissing, "the last of several bands is not played", &["rough.sun"]),
+    row("band-missing", Defect::BandMissing, "the last of several bands is not traced", &["rough.sun"]),
     row(
         "sine-missing",
         Defect::SineMissing,
@@ -458,7 +459,7 @@ pub const SAMPLERS: &[Planted] = &[
     sampler(
         "density-tilted",
         Defect::DensityTilted,
-        "a density is off by what the claim says it detects",
+        "a density is off by the claim's `detect`",
         &["samplers.chi2 coarse"],
     ),
     sampler(
@@ -613,8 +614,8 @@ const fn verifier(
     of(Family::Verifier, row(name, defect, what, expected))
 }
 
-/// Defects that stand where this program cannot plant them, and the test of the library that holds the code
-/// to the opposite.
+/// Defects in places where this program cannot plant them, and the test of the library that holds the
+/// code to the opposite.
 pub const UNIT_TESTED: &[(&str, &str)] = &[
     (
         "a block is dropped or counted twice in the merge",
@@ -652,7 +653,7 @@ pub fn all() -> Vec<Planted> {
     std::iter::once(SHAM).chain(planted.copied()).collect()
 }
 
-/// All names.
+/// Names of all defects.
 pub fn names() -> Vec<&'static str> {
     all().iter().map(|row| row.name).collect()
 }

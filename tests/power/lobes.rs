@@ -1,5 +1,5 @@
-//! Samplers for connections through a boundary, with places for defects: refraction alone, directions to a
-//! plane, and a table of a single bounce.
+//! Samplers for connections through a boundary, with places for defects: refraction alone, directions to
+//! a plane, and a table of a single bounce.
 
 use std::f64::consts::{PI, TAU};
 
@@ -36,7 +36,8 @@ impl Sampler for Refraction {
         vec![Piece::plane("directions", [Coordinate::over(0.0, 1.0), Coordinate::turns()])]
     }
 
-    /// G1 D |wo.h| / |wo.z|, and dh / dwi = n_i^2 |wi.h| / (n_o wo.h + n_i wi.h)^2 (Walter et al. 2007, eq. 17).
+    /// G1 D |wo.h| / |wo.z|, and dh / dwi = n_i^2 |wi.h| / (n_o wo.h + n_i wi.h)^2 (Walter et al. 2007,
+    /// eq. 17).
     fn density(&self, _: usize, [down, turns]: [f64; 2]) -> f64 {
         let (s, c) = sin_cos_turns(turns);
         let r = (1.0 - down * down).sqrt();
@@ -59,8 +60,8 @@ impl Sampler for Refraction {
     }
 }
 
-/// Directions to a plane at height [`HEIGHT`] whose points are spread about the foot by [`SPREAD`]; chart
-/// (cosine to the normal, turns).
+/// Directions to a plane at height [`HEIGHT`] whose points are spread about the foot by [`SPREAD`];
+/// chart (cosine to the normal, turns).
 pub struct Plane {
     pub defect: Defect,
 }
@@ -94,8 +95,9 @@ impl Sampler for Plane {
 const ROWS: usize = 8;
 const COLUMNS: usize = 8;
 
-/// A single bounce towards a point: Henyey-Greenstein about an arrival at one radian to it, tabulated over
-/// the isotropic joint density 2 (pi - theta) / pi^2; chart (theta / pi, turns from the plane of arrival).
+/// A single bounce towards a point: Henyey-Greenstein about an arrival at one radian to it, tabulated
+/// over the isotropic joint density 2 (pi - theta) / pi^2; chart (theta / pi, turns from the plane of
+/// arrival).
 pub struct Bounce {
     defect: Defect,
     rows: Cumulative,

@@ -11,8 +11,8 @@
 //! The last is what the others start: this program is scatterproof's own command line over a registry
 //! whose estimators of the test (or whose samplers) hold the defect; where the claims are green and an
 //! identity of the surface is broken, it exits with 1 all the same. What judges is the same code, with
-//! the same levels, as for any user. All defects get the same experiments (`*.toml` here), the same budgets,
-//! and streams that their names name.
+//! the same levels, as for any user. All defects get the same experiments (`*.toml` here), the same
+//! budgets, and streams that their names name.
 
 // The planted programs are no part of what ships: their arithmetic may be std's.
 #![allow(clippy::disallowed_methods)]
@@ -25,7 +25,7 @@ mod defects;
 mod identities;
 mod lobes;
 mod matrix;
-mod plays;
+mod runs;
 mod samplers;
 mod subdivision;
 mod surface;
@@ -139,7 +139,7 @@ fn scatterproof_with(name: &str, arguments: &[OsString]) -> ExitCode {
     if code == ExitCode::SUCCESS && !broken.is_empty() { ExitCode::from(1) } else { code }
 }
 
-/// What is asked of a row's code without random streams, and whether it is broken.
+/// Identities of a row's code, without random streams, and whether each is broken.
 fn identities(row: &Planted) -> Vec<(String, bool)> {
     let mut asked = Vec::new();
     if matches!(row.family, Family::Tracer | Family::Sham) {
@@ -169,9 +169,9 @@ fn tests(words: &[String]) -> ExitCode {
     if rows.is_empty() || has("--ignored") {
         return ExitCode::SUCCESS;
     }
-    let plays: Vec<_> = rows.iter().map(|row| (*row, 0)).collect();
+    let runs: Vec<_> = rows.iter().map(|row| (*row, 0)).collect();
     let mut survived = 0;
-    plays::all(&plays, |row, _, outcome| {
+    runs::all(&runs, |row, _, outcome| {
         let found = matrix::judge(row, outcome);
         survived += usize::from(found.is_err());
         let (verdict, text) = match found {

@@ -8,10 +8,10 @@ use std::process::ExitCode;
 
 use super::defects::{self, Planted, UNIT_TESTED};
 use super::is_sham;
-use super::plays::{self, Outcome};
+use super::runs::{self, Outcome};
 
-/// Is an outcome as it must be? A defect is caught where the program does not exit with 0, and one of the
-/// tests that are expected to see it has seen it; the sham has to be green.
+/// Whether an outcome is the expected one. A defect is caught where the program does not exit with 0,
+/// and one of the tests that are expected to see it has seen it; the sham has to be green.
 pub fn judge(row: &Planted, outcome: &Outcome) -> Result<String, String> {
     let caught = outcome.caught();
     let list = caught.iter().copied().collect::<Vec<_>>().join(", ");
@@ -33,7 +33,7 @@ pub fn judge(row: &Planted, outcome: &Outcome) -> Result<String, String> {
 /// One defect over all seeds.
 #[derive(Default)]
 struct Tally {
-    plays: u64,
+    runs: u64,
     /// Plays that were as they must be.
     good: u64,
     /// Times that each test saw it; 0 where it looked and saw nothing.
@@ -42,7 +42,7 @@ struct Tally {
 
 impl Tally {
     fn add(&mut self, row: &Planted, outcome: &Outcome) {
-        self.plays += 1;
+        self.runs += 1;
         self.good += u64::from(judge(row, outcome).is_ok());
         let caught = outcome.caught();
         for test in outcome.tests.keys() {
@@ -52,13 +52,13 @@ impl Tally {
 
     /// The tests that saw it every time.
     fn killers(&self) -> Vec<&str> {
-        let always = self.seen.iter().filter(|(_, times)| **times == self.plays);
+        let always = self.seen.iter().filter(|(_, times)| **times == self.runs);
         always.map(|(test, _)| test.as_str()).collect()
     }
 }
 
-/// `matrix [--seeds N] [--only TEXT] [--out DIR]`, of the rows whose names contain TEXT: exit code 1 where a
-/// defect survived a seed or the sham was not green.
+/// `matrix [--seeds N] [--only TEXT] [--out DIR]`, of the rows whose names contain TEXT: exit code 1
+/// where a defect survived a seed or the sham was not green.
 pub fn main(words: &[String]) -> ExitCode {
     let value = |flag: &str| words.iter().position(|w| w == flag).and_then(|i| words.get(i + 1));
     let seeds: u64 = value("--seeds").map_or(20, |text| text.parse().expect("--seeds takes a number"));
@@ -69,11 +69,11 @@ pub fn main(words: &[String]) -> ExitCode {
     let rows: Vec<_> = defects::all().into_iter().filter(|row| row.name.contains(only)).collect();
     let is_published = only.is_empty() || value("--out").is_some();
     assert!(is_published, "a part of the matrix is not published: --out");
-    let plays: Vec<(Planted, u64)> =
+    let runs: Vec<(Planted, u64)> =
         (0..seeds).flat_map(|seed| rows.iter().map(move |row| (*row, seed))).collect();
     let mut tallies: BTreeMap<&str, Tally> = BTreeMap::new();
     let mut busy = 0.0;
-    plays::all(&plays, |row, seed, outcome| {
+    runs::all(&runs, |row, seed, outcome| {
         tallies.entry(row.name).or_default().add(row, outcome);
         busy += outcome.seconds;
         if let Err(why) = judge(row, outcome) {
@@ -84,7 +84,7 @@ pub fn main(words: &[String]) -> ExitCode {
     fs::write(out.join("blindness.csv"), csv(&rows, &tallies)).expect("blindness.csv");
     fs::write(out.join("blindness.md"), markdown(&rows, &tallies, seeds)).expect("blindness.md");
     let bad: Vec<_> = rows.iter().filter(|row| tallies[row.name].good < seeds).collect();
-    println!("{} plays in {busy:.0} s of processes, into {}", plays.len(), out.display());
+    println!("{} runs in {busy:.0} s of processes, into {}", runs.len(), out.display());
     bad.iter().for_each(|row| println!("red: {}", row.name));
     if bad.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) }
 }
@@ -101,7 +101,7 @@ fn csv(rows: &[Planted], tallies: &BTreeMap<&str, Tally>) -> String {
     columns.iter().for_each(|test| write!(text, ",{test}").expect("a string"));
     for row in rows {
         let tally = &tallies[row.name];
-        write!(text, "\n{},{},{}", row.name, tally.plays, caught(row, tally)).expect("a string");
+        write!(text, "\n{},{},{}", row.name, tally.runs, caught(row, tally)).expect("a string");
         for test in &columns {
             let times = tally.seen.get(test).map(u64::to_string).unwrap_or_default();
             write!(text, ",{times}").expect("a string");
@@ -112,20 +112,20 @@ fn csv(rows: &[Planted], tallies: &BTreeMap<&str, Tally>) -> String {
 
 /// Seeds in which a defect was caught; of the sham those in which anything was not green.
 fn caught(row: &Planted, tally: &Tally) -> u64 {
-    if is_sham(row.defect) { tally.plays - tally.good } else { tally.good }
+    if is_sham(row.defect) { tally.runs - tally.good } else { tally.good }
 }
 
 /// The same for people.
 fn markdown(rows: &[Planted], tallies: &BTreeMap<&str, Tally>, seeds: u64) -> String {
-    let played = if seeds == 1 { "one seed".to_string() } else { format!("{seeds} seeds") };
+    let number = if seeds == 1 { "one seed".to_string() } else { format!("{seeds} seeds") };
     let mut text = format!(
         "# The blindness matrix\n\n\
          Made by `cargo test --release --test power -- matrix --seeds {seeds}`; do not edit.\n\n\
-         Each defect was planted in a test-only program and played with {played} (named by its \
+         Each defect was planted in a test-only program and run with {number} (named by its \
          name) at the budget of continuous integration, the same for all. A test is a claim of an \
          experiment in `tests/power/`, or an identity that holds to rounding. *Always* lists the tests \
          that saw the defect with every seed, *sometimes* the others that saw it, each with its number \
-         of seeds. A defect that one test alone always sees is marked `!`: nothing stands behind that \
+         of seeds. A defect that one test alone always sees is marked `!`: no other test confirms that \
          test. Tests that were expected to see a defect and missed a seed are listed as blind. The whole \
          matrix is `blindness.csv`. Of techniques that the program does not have nothing is planted; each \
          brings its own rows.\n\n\
@@ -137,7 +137,7 @@ fn markdown(rows: &[Planted], tallies: &BTreeMap<&str, Tally>, seeds: u64) -> St
         let sometimes: Vec<String> = tally
             .seen
             .iter()
-            .filter(|(_, times)| **times > 0 && **times < tally.plays)
+            .filter(|(_, times)| **times > 0 && **times < tally.runs)
             .map(|(test, times)| format!("{test} {times}"))
             .collect();
         let blind: Vec<&str> =
@@ -152,12 +152,12 @@ fn markdown(rows: &[Planted], tallies: &BTreeMap<&str, Tally>, seeds: u64) -> St
         writeln!(
             text,
             "| {name}{mark} | {what} | {count}/{} | {always} | {sometimes} | {blind} |",
-            tally.plays
+            tally.runs
         )
         .expect("a string");
     }
     text += "\n## Defects that unit tests hold\n\n\
-             These stand where no claim looks (the verifier itself, merging, streams); the unit test \
+             These are where no claim looks (the verifier itself, merging, streams); the unit test \
              named holds the code to the opposite.\n\n| defect | unit test |\n|---|---|\n";
     for (what, test) in UNIT_TESTED {
         writeln!(text, "| {what} | `{test}` |").expect("a string");

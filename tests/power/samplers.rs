@@ -1,5 +1,5 @@
-//! Small samplers with places for defects, one for every way in which a draw and its density come apart.
-//! Densities are per unit of the chart, as the catalogue has them.
+//! Small samplers with places for defects, one for every way in which a draw and its density may
+//! disagree. Densities are per unit of the chart, as the catalogue has them.
 
 use std::f64::consts::{PI, SQRT_2, TAU};
 use std::sync::Mutex;
@@ -58,7 +58,8 @@ const G: f64 = 0.7;
 /// claims to detect (`detect` in samplers.toml).
 const TILT: f64 = 0.06;
 
-/// Henyey-Greenstein about a direction of travel that is aligned with nothing; chart ((1 + mu)/2, turns).
+/// Henyey-Greenstein about a direction of travel that is aligned with nothing; chart ((1 + mu)/2,
+/// turns).
 struct Phase {
     defect: Defect,
     drawn: HenyeyGreenstein,
@@ -101,7 +102,7 @@ impl Sampler for Phase {
         2.0 * TAU * factor * self.claimed.pdf(2.0 * x - 1.0)
     }
 
-    /// The mean cosine that the sampler was asked for, whatever it draws.
+    /// The stated mean cosine, which a defect may change.
     fn contrasts(&self) -> Vec<Contrast> {
         let of = Box::new(|_, [x, _]: [f64; 2]| 2.0 * x - 1.0);
         vec![Contrast { name: "mean cosine", of, expected: Some(G) }]
@@ -140,8 +141,8 @@ impl Sampler for Flight {
     }
 }
 
-/// Distance along a ray over [0, 3] about a point at 1 along it and 0.5 beside it (Kulla & Fajardo 2012):
-/// t - 1 = D tan of an angle that is uniform between those of both ends. Chart t / 3.
+/// Distance along a ray over [0, 3] about a point at 1 along it and 0.5 beside it (Kulla & Fajardo
+/// 2012): t - 1 = D tan of an angle that is uniform between those of both ends. Chart t / 3.
 struct Equiangular {
     defect: Defect,
 }

@@ -1,7 +1,7 @@
-//! Whole paths with subdivision next-event estimation, and an analog light tracer to hold them against:
+//! Whole paths with subdivision next-event estimation, and an analog light tracer to compare them with:
 //! both the test's own. Where a path ends in two scatterings and an exit, `connection`'s four techniques
-//! share it; the rest has interface and light samples alone. Survival at every medium vertex is albedo, so
-//! that the throughput on arrival at a vertex is albedo times what came in through the surface.
+//! share it; the rest has interface and light samples alone. Survival at every medium vertex is albedo,
+//! so that the throughput on arrival at a vertex is albedo times what came in through the surface.
 
 use std::sync::Arc;
 
@@ -25,8 +25,8 @@ use super::surface::{Meeting, meet, meet_value};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FluxOptions {
-    /// Of the paths that leave by two scatterings, seen from the sensor, only those are scored whose flight
-    /// between them is longer than this, mm: see `last_two`.
+    /// Of the paths that leave by two scatterings, seen from the sensor, only those are scored whose
+    /// flight between them is longer than this, mm: see `last_two`.
     pub beyond_mm: f64,
 }
 
@@ -41,13 +41,13 @@ impl Estimator for Subdivision {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         for &band in bands {
             for index in 0..self.scene.sensor.rays_per_pass() {
-                self.play(band, index, key, scores);
+                self.trace(band, index, key, scores);
             }
         }
     }
 }
 
-/// What a path carries.
+/// State of a path.
 struct Path<'a> {
     ends: TwoEnds<'a>,
     ray: Ray,
@@ -61,7 +61,7 @@ struct Path<'a> {
 }
 
 impl Subdivision {
-    fn play(&self, band: usize, index: usize, key: &PassKey, scores: &mut Scores) {
+    fn trace(&self, band: usize, index: usize, key: &PassKey, scores: &mut Scores) {
         let mut sensor = key.stream(index as u64, Purpose::Sensor);
         let ([a, b], [c, d]) = (sensor.draw2(), sensor.draw2());
         let seen = self.scene.sensor.ray(index, [a, b, c, d]);
@@ -118,7 +118,7 @@ impl Path<'_> {
         }
     }
 
-    /// Meets the surface: samples a light, then goes on.
+    /// Meets the surface: samples a light, then continues.
     fn cross(&mut self, hit: &Hit, side: Side, is_end: bool) -> Option<Meeting> {
         let model = self.ends.model;
         let wo = -self.ray.dir;
@@ -160,7 +160,7 @@ impl Path<'_> {
         }
     }
 
-    /// Flies and scatters in the medium until the surface comes.
+    /// Flies and scatters in the medium until it meets the surface.
     fn wander(&mut self) -> Option<Hit> {
         let medium = self.ends.model.medium;
         loop {
@@ -214,7 +214,7 @@ impl Path<'_> {
     }
 }
 
-/// Photons from the lights: everything is drawn as nature draws it, but for the facets' shadowing, which
+/// Photons from the lights: everything is drawn as nature draws it, except the facets' shadowing, which
 /// weighs (light has no eta^2: that is radiance's).
 pub struct Photons {
     pub scene: Arc<Scene>,
@@ -227,7 +227,7 @@ impl Estimator for Photons {
             for index in 0..self.scene.sensor.rays_per_pass() {
                 let mut stream = key.stream(index as u64, Purpose::Walk);
                 scores.count(Cost::Paths);
-                self.play(band, &mut stream, scores);
+                self.trace(band, &mut stream, scores);
             }
         }
     }
@@ -235,7 +235,7 @@ impl Estimator for Photons {
 
 impl Photons {
     /// One photon: power = radiance / density times the disc of the body's sphere across the direction.
-    fn play(&self, band: usize, stream: &mut Stream, scores: &mut Scores) -> Option<()> {
+    fn trace(&self, band: usize, stream: &mut Stream, scores: &mut Scores) -> Option<()> {
         let scene = &*self.scene;
         let Sensor::BodyFlux(BodyFlux { bounds, frame, bins, paths }) = &scene.sensor else {
             return None;
@@ -252,8 +252,8 @@ impl Photons {
         let origin = bounds.center + bounds.radius * (2.0 * sample.wi + x * across.s + y * across.t);
         let mut ray = Ray { origin, dir: -sample.wi };
         let mut history = History::default();
-        // Events since the entry, and whether the first was a scattering: with the second it makes the two
-        // by which a path leaves that comes from the sensor.
+        // Events since the entry, and whether the first was a scattering: with the second it makes the
+        // two by which a path from the sensor leaves.
         let (mut events, mut begins_in_medium) = (0, false);
         let mut side = Side::Outside;
         let mut hit = scene.shape.intersect(&ray, side, None, f64::INFINITY)?;

@@ -41,7 +41,7 @@ impl Surface {
         }
     }
 
-    /// What refraction does to radiance on its way from `wi` to `wo`.
+    /// Factor of refraction on radiance from `wi` to `wo`.
     pub fn radiance(&self, wo: DVec3, wi: DVec3) -> f64 {
         let (n_o, n_i) = (self.index(wo), self.index(wi));
         match self.defect {
@@ -131,7 +131,7 @@ pub fn refract(w: DVec3, h: DVec3, ratio: f64) -> Option<DVec3> {
     (cos > 0.0 && sin2 < 1.0).then(|| (ratio * cos - (1.0 - sin2).sqrt()) * h - ratio * w)
 }
 
-/// How a path goes on from a surface.
+/// How a path continues from a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Meeting {
     pub dir: DVec3,

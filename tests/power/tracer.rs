@@ -1,6 +1,7 @@
 //! A second unidirectional path tracer, written plainly and apart from `estimators::path`: lights are
 //! chosen evenly, two light samples are drawn a vertex, the interface is `surface`, and after three
-//! scattering events a path goes on with probability albedo. Without a defect it must agree with `path`.
+//! scattering events a path continues with probability albedo. Without a defect it must agree with
+//! `path`.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -45,10 +46,10 @@ impl Estimator for Tracer {
             Defect::PassesShareStream => self.first_pass.get_or_init(|| *key),
             _ => key,
         };
-        let played = self.scene.bands();
+        let count = self.scene.bands();
         let mut sums = BTreeMap::new();
         for &band in bands {
-            if self.defect == Defect::BandMissing && played > 1 && band == played - 1 {
+            if self.defect == Defect::BandMissing && count > 1 && band == count - 1 {
                 continue;
             }
             for index in 0..self.scene.sensor.rays_per_pass() {
@@ -58,7 +59,7 @@ impl Estimator for Tracer {
                     Defect::PathTwice if index == 0 => 2.0,
                     _ => 1.0,
                 };
-                Path::play(self, band, index, key, times, &mut sums, scores);
+                Path::trace(self, band, index, key, times, &mut sums, scores);
             }
         }
     }
@@ -67,7 +68,7 @@ impl Estimator for Tracer {
 /// f32 sums by slot, band, class and light, of [`Defect::SinglePrecision`].
 type Sums = BTreeMap<(usize, usize, TransportClass, usize), f32>;
 
-/// One path.
+/// State of one path.
 struct Path<'a> {
     scene: &'a Scene,
     defect: Defect,
@@ -89,7 +90,7 @@ struct Path<'a> {
 }
 
 impl<'a> Path<'a> {
-    fn play(
+    fn trace(
         tracer: &'a Tracer,
         band: usize,
         index: usize,
@@ -197,7 +198,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// A scattering event.
+    /// Samples a scattering event.
     fn scatter(&mut self) -> Option<()> {
         self.scores.count(Cost::MediumEvents);
         self.events += 1;
@@ -249,7 +250,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// Meets the boundary from `side`; the side on which the path goes on.
+    /// Meets the boundary from `side`; the side on which the path continues.
     fn meet(&mut self, hit: &Hit, side: Side) -> Option<Side> {
         self.scores.count(Cost::BoundaryEvents);
         self.ray.origin = hit.point;
@@ -379,7 +380,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// The density of a light sample, as the light says it.
+    /// The density of a light sample, as the light reports it.
     fn light_pdf(&self, light: usize, wi: DVec3, pdf: f64) -> f64 {
         match (&self.scene.lights[light].emission, self.defect) {
             (Emission::Map(_), Defect::SineMissing) => pdf * (1.0 - wi.z * wi.z).max(0.0).sqrt(),

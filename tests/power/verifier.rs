@@ -1,5 +1,5 @@
-//! The verifier's own arithmetic with places for defects, and what holds it to account: fixed data with a
-//! known answer, and the false alarms of many correct null hypotheses, drawn by another family of
+//! The verifier's own arithmetic with places for defects, and tests of it: fixed data with
+//! a known answer, and the false alarms of many correct null hypotheses, drawn by another family of
 //! generators than the streams under test (SplitMix64; Steele, Lea & Flood 2014).
 
 use std::f64::consts::TAU;
@@ -10,7 +10,7 @@ use scatterproof::stats::moments::Moments;
 
 use super::defects::Defect;
 
-/// Pixels of a pass, which share most of what chance gave the pass.
+/// Pixels of a pass, which share most of their noise.
 const PIXELS: usize = 16;
 
 /// Passes of one data set; each is a batch.

@@ -1,7 +1,7 @@
 //! Phase one: points of the surface with the flux that enters there, in the order of their hierarchy.
 //!
 //! A point's random numbers are those of its index, so the flux is computed after the hierarchy has put
-//! the points in order, from the same numbers again: nothing but positions is ever moved.
+//! the points in order, from the same numbers again: only positions are ever moved.
 
 use crate::estimators::emergence::BssrdfScene;
 use crate::geometry::{BodyPoint, BodySampler, Ray};
@@ -17,16 +17,16 @@ pub(super) struct Cloud {
     bands: usize,
     /// T12 E / (f M), W, `[point][band]`.
     flux: Vec<f64>,
-    /// Which light; empty where there is one.
+    /// Index of the light of each point; empty where there is one light.
     light: Vec<u16>,
-    /// Shading normal and direction to the light, where the model asks for them. Half as many digits as
-    /// elsewhere, for memory's sake: 6e-8, far below what any number of passes can see.
+    /// Shading normal and direction to the light, where the model needs them. Single precision
+    /// saves memory: 6e-8, far below what any number of passes can see.
     directions: Vec<[[f32; 3]; 2]>,
     pub shadow_rays: u64,
     pub wrong_side: u64,
 }
 
-/// What enters at a point.
+/// A light sample that arrives at a point.
 struct Incidence {
     light: usize,
     wi: DVec3,
@@ -36,7 +36,7 @@ struct Incidence {
 }
 
 impl Cloud {
-    /// Draws `count` points.
+    /// Draws `count` points on the surface of the body.
     pub fn new(bssrdf: &BssrdfScene, sampler: &BodySampler, count: usize, key: &PassKey) -> Cloud {
         let scene = &*bssrdf.scene;
         let point = |index: u32| {
@@ -111,7 +111,7 @@ impl Cloud {
         Some(Incidence { light, wi: sample.wi, cos, scale: 1.0 / density })
     }
 
-    /// Number of points.
+    /// Number of surface points M.
     pub fn len(&self) -> usize {
         self.tree.len()
     }
@@ -122,13 +122,13 @@ impl Cloud {
         self.flux[place * self.bands + band]
     }
 
-    /// The light that it comes from.
+    /// Index of the light that it comes from.
     #[inline]
     pub fn light(&self, place: usize) -> usize {
         self.light.get(place).map_or(0, |&light| usize::from(light))
     }
 
-    /// The point, and where light goes on from there under this index.
+    /// The point, and the refracted direction of its light under this index.
     #[inline]
     pub fn entry(&self, place: usize, eta: f64) -> Entry {
         let point = self.tree.point(place);

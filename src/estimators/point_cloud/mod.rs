@@ -4,7 +4,8 @@
 //! Phase one, once a pass: M points of the surface with density f per area, at each one direction to a
 //! light, and the flux Phi = E / f that enters there. Phase two, for each camera path that is refracted
 //! into the body at x_o:
-//!   L_r = 1/M sum_p S(x_p, x_o) Phi_p B_p / p(d_p),   B_p = 1 with probability p(d_p), d_p = |x_o - x_p|,
+//!   L_r = 1/M sum_p S(x_p, x_o) Phi_p B_p / p(d_p),
+//!   B_p = 1 with probability p(d_p), d_p = |x_o - x_p|,
 //! the source's V(xi, e^(-sigma_tr d)) e^(+sigma_tr d) with p(d) = e^(-sigma_tr d). Given the points
 //! E[B_p / p] = 1, and over the points each term has mean int S E dA, whatever p > 0 is: unbiased with
 //! respect to the model, which knows no visibility inside the body. What p decides is variance: the
@@ -40,7 +41,7 @@ use crate::scene::Scene;
 
 pub use crate::sampling::thinning::Search;
 
-/// The probability p(d) with which a point at distance d is evaluated, and weighs 1/p.
+/// The probability p(d) with which a point at distance d is evaluated; its weight is 1/p.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum AcceptanceRule {
@@ -54,14 +55,15 @@ pub enum AcceptanceRule {
     Mean {},
     /// e^(-m d), m the smallest sigma_tr: bounded in every band, and accepts the most.
     Minimum {},
-    /// The mean over the bands of e^(-sigma_tr d): bounded in every band, accepts fewer than the smallest does.
+    /// The mean over the bands of e^(-sigma_tr d): bounded in every band, accepts fewer than the
+    /// smallest does.
     MeanOfExponentials {},
     /// max(e^(-m d), this), m the mean of sigma_tr.
     Floor(#[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))] f64),
     /// In proportion to the kernel.
     ///
-    /// That is to the mean over the bands of the kernel over its integral; as many as the mean of exponentials
-    /// accepts over a disc as wide as the body.
+    /// That is to the mean over the bands of the kernel over its integral; as many as the mean of
+    /// exponentials accepts over a disc as wide as the body.
     Kernel {},
 }
 
@@ -78,7 +80,7 @@ const HEAVY: f64 = 3.0;
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointCloudOptions {
-    /// The BSSRDF.
+    /// BSSRDF model.
     pub model: Model,
     /// Points of the surface that a pass draws.
     #[serde(default = "ten_thousand")]
@@ -87,13 +89,13 @@ pub struct PointCloudOptions {
     /// How points are drawn: faces (triangles) by area, or by index as published.
     #[serde(default)]
     pub faces: FaceChoice,
-    /// The probability p(d) with which a point at distance d is evaluated, and weighs 1/p.
+    /// The probability p(d) with which a point at distance d is evaluated; its weight is 1/p.
     #[serde(default)]
     pub acceptance: AcceptanceRule,
     /// How accepted points are found; both have the same law.
     #[serde(default)]
     pub search: Search,
-    /// Whether single scattering is added by sampling; without it where the model leaves it out.
+    /// Whether single scattering is added by sampling; by default where the model leaves it out.
     pub single: Option<bool>,
     /// Whether light that goes straight through the body is followed.
     #[serde(default = "crate::estimators::kind::on")]
@@ -207,7 +209,7 @@ impl Estimator for PointCloud {
             for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
                 let streams = PathStreams::new(&self.bssrdf, key, index, &group);
                 let mut sum = CloudSum { estimator: self, cloud: &cloud, streams };
-                self.bssrdf.play(&group, index, key, scores, &mut sum);
+                self.bssrdf.trace(&group, index, key, scores, &mut sum);
             }
         }
     }
@@ -220,8 +222,9 @@ impl Estimator for PointCloud {
         Some(self.options.model.to_string())
     }
 
-    /// Under p = e^(-m d) an accepted term of a band with effective transport s has weights like e^((m - s)
-    /// d), with a Pareto tail of index m / (m - s) on an unbounded surface: of infinite variance where m
+    /// Under p = e^(-m d) an accepted term of a band with effective transport s has weights like e^((m -
+    /// s) d), with a Pareto tail of index m / (m - s) on an unbounded surface: of infinite variance
+    /// where m
     /// > 2 s. A finite body cuts the tail off at its diameter D; the variance has then grown by about
     /// e^((m - 2 s) D).
     fn heavy_tails(&self) -> Vec<HeavyTail> {
@@ -238,8 +241,8 @@ impl Estimator for PointCloud {
                 band,
                 class: TransportClass::Multiple,
                 reason: format!(
-                    "accepted by the mean of sigma_tr, {mean:.3}/mm, a band of {s:.3}/mm has tail index {:.2} on a body \
-                     {diameter:.3} mm wide",
+                    "accepted by the mean of sigma_tr, {mean:.3}/mm, a band of {s:.3}/mm has tail index {:.2} on \
+                     a body {diameter:.3} mm wide",
                     mean / (mean - s)
                 ),
             })

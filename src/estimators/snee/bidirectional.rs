@@ -78,7 +78,7 @@ impl Estimator for Bidirectional {
                 let guides = &self.guides[band];
                 let path = Path { field: &self.field, band, index, key };
                 if guides.is_empty() {
-                    CameraWalk::play(path, scores, Unrivalled, OneBand);
+                    CameraWalk::trace(path, scores, Unrivalled, OneBand);
                     continue;
                 }
                 let mut stream = key.stream(index as u64, Purpose::Connection);
@@ -86,7 +86,7 @@ impl Estimator for Bidirectional {
                 let light = self.light_path(guides, band, &mut stream, scores);
                 let nowhere = Ray { origin: DVec3::NAN, dir: DVec3::Z };
                 let rivals = OneLightVertex { guides, light, covered, vertices: [nowhere; 2], count: 0 };
-                CameraWalk::play(path, scores, rivals, OneBand);
+                CameraWalk::trace(path, scores, rivals, OneBand);
             }
         }
     }
@@ -147,7 +147,7 @@ impl Bidirectional {
     }
 }
 
-/// What a walk carries.
+/// State that a walk carries for connections.
 struct OneLightVertex<'a> {
     guides: &'a [Guide],
     light: Option<LightPath<'a>>,

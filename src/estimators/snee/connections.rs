@@ -1,5 +1,5 @@
-//! What a walk carries for connections through the boundary, and the density of a path's end under all
-//! of them.
+//! State that a walk carries for connections through the boundary, and the density of a path's end under
+//! all of them.
 //!
 //! The end of a path: x_i -> x_j -> x_k in the order of the walk, x_i and x_j in the medium, x_k on the
 //! boundary, then w_L towards a light. Every density is taken per volume of x_j, area of x_k and solid
@@ -200,7 +200,7 @@ fn score_subdivided<B: WalkBands>(
 }
 
 impl<B: WalkBands> CameraWalk<'_, Connections<'_>, B> {
-    /// Whether something stands between an exit and the light.
+    /// Whether something is between an exit and the light.
     fn is_shadowed(&mut self, exit: &WalkExit, w_l: DVec3) -> bool {
         self.scores.count(Cost::ShadowRays);
         let shadow = Ray { origin: exit.hit.point, dir: w_l };

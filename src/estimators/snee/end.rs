@@ -54,7 +54,7 @@ impl Call {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End<'a> {
     pub guide: &'a Guide,
-    /// Towards the light.
+    /// Unit direction towards the light.
     pub w_l: DVec3,
     /// f |cos| times radiance (irradiance for parallel light).
     pub value: f64,
@@ -70,7 +70,7 @@ pub(super) struct End<'a> {
 
 impl<'a> End<'a> {
     /// At an exit, towards `w_l`, which lies outside; for a smooth boundary `w_l` is the refracted
-    /// direction. `keep` says which of BSDF and light sampling take part.
+    /// direction. `keep` states which of BSDF and light sampling take part.
     pub fn new<R: Rivals, B: WalkBands>(
         walk: &CameraWalk<'_, R, B>,
         guide: &'a Guide,

@@ -1,4 +1,4 @@
-//! What a light lends to techniques that start from it: its concentrated part, drawn by itself.
+//! The concentrated part of a light, from which techniques that start at the light sample.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ pub(super) struct Guide {
     pub light: usize,
     /// Probability of choosing it among the guides.
     pub choice: f64,
-    /// Towards its middle.
+    /// Unit direction towards the middle of the guide's cap.
     pub axis: DVec3,
     /// Half the angle that it covers, rad; 0 for parallel light.
     pub half_angle: f64,

@@ -45,7 +45,8 @@ pub struct LastVertex {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub wide_share: f64,
-    /// Least roughness of the wider lobe (at least twice the boundary's own); its width at a smooth boundary.
+    /// Least roughness of the wider lobe (at least twice the boundary's own); its width at a smooth
+    /// boundary.
     #[serde(default = "wide")]
     #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub wide: f64,
@@ -162,7 +163,7 @@ pub(super) struct GuidedEnd<'a> {
     pub exit: WalkExit,
     /// From x_j to x_k.
     pub leg: Leg,
-    /// Towards the light.
+    /// Unit direction towards the light.
     pub w_l: DVec3,
     /// Of the light, where it is known from the draw.
     pub radiance: Option<f64>,

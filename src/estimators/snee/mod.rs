@@ -46,7 +46,7 @@ pub use options::{EdgeTechnique, JointKind, SneeChoices, SneeOptions, SneePreset
 pub use probe::ProbeShares;
 pub use two_bounce::TwoBounce;
 
-/// What connections need to know, for one band.
+/// Data of connections, for one band.
 #[derive(Debug)]
 struct BandSetup {
     options: Arc<SneeOptions>,
@@ -81,7 +81,8 @@ impl Snee {
     /// For a scene.
     ///
     /// # Errors
-    /// A scene that it does not serve; bands that are to share walks and differ in more than their media.
+    /// A scene that it does not serve; bands that are to share walks and differ in more than their
+    /// media.
     pub fn new(scene: Arc<Scene>, options: SneeOptions) -> Result<Snee> {
         Snee::KIND.check(&scene)?;
         Snee::set_up(scene, options)
@@ -118,7 +119,7 @@ impl Snee {
     }
 }
 
-/// What bands may not differ in if they share walks.
+/// Properties that must be equal in all bands if they share walks.
 fn check_shared(scene: &Scene) -> Result<()> {
     let same_boundary = scene.boundary.windows(2).all(|pair| pair[0] == pair[1]);
     let grey = |light: &crate::scene::Light| (1..scene.bands()).all(|band| light.is_same_in(0, band));
@@ -145,13 +146,13 @@ impl Estimator for Snee {
                 let u = key.stream(index as u64, Purpose::Hero).draw();
                 let hero = ((u * media.len() as f64) as usize).min(media.len() - 1);
                 let path = Path { field: &self.field, band: hero, index, key };
-                self.play(0, path, scores, SharedBands::new(media, hero));
+                self.trace(0, path, scores, SharedBands::new(media, hero));
             }
         } else {
             for &band in bands {
                 for index in 0..rays {
                     let path = Path { field: &self.field, band, index, key };
-                    self.play(band, path, scores, OneBand);
+                    self.trace(band, path, scores, OneBand);
                 }
             }
         }
@@ -167,7 +168,7 @@ impl Estimator for Snee {
         if !(bsdf && light) {
             notes.push(
                 "`strategies` leaves out a part of unidirectional sampling: of paths whose last two medium vertices \
-                 follow each other, what only that part finds is missing (not dark)"
+                 follow each other, what only that part finds is excluded from this estimator's result"
                     .into(),
             );
         }
@@ -183,8 +184,8 @@ fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
     let missing = parallel.map(|light| {
         format!(
             "through a smooth boundary, directional light `{}` is found by {technique} alone: surface, single, \
-             single_internal and what has one medium vertex after its last internal reflection are missing (not \
-             dark)",
+             single_internal and what has one medium vertex after its last internal reflection are excluded from \
+             this estimator's result",
             light.name
         )
     });
@@ -192,13 +193,19 @@ fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
 }
 
 impl Snee {
-    fn play<B: super::bands::WalkBands>(&self, setup: usize, path: Path, scores: &mut Scores, bands: B) {
+    fn trace<B: super::bands::WalkBands>(
+        &self,
+        setup: usize,
+        path: Path,
+        scores: &mut Scores,
+        bands: B,
+    ) {
         let setup = &self.setups[setup];
         if setup.guides.is_empty() {
-            CameraWalk::play(path, scores, Unrivalled, bands);
+            CameraWalk::trace(path, scores, Unrivalled, bands);
         } else {
             let stream = path.key.stream(path.index as u64, Purpose::Connection);
-            CameraWalk::play(path, scores, Connections::new(setup, stream), bands);
+            CameraWalk::trace(path, scores, Connections::new(setup, stream), bands);
         }
     }
 }

@@ -14,7 +14,7 @@ use crate::estimators::Roulette;
 pub struct SneeOptions {
     /// Russian roulette of the walk.
     pub roulette: Roulette,
-    /// What takes part.
+    /// Sampling techniques that take part.
     pub strategies: Strategies,
     /// How often an edge is subdivided.
     pub call: Call,
@@ -22,7 +22,7 @@ pub struct SneeOptions {
     pub call_alone: Call,
     /// Whether distances end at the boundary (one more ray for every density) or run on and may fail.
     pub truncated: bool,
-    /// Directions of probes.
+    /// Shares of the densities that directions of probes are drawn from.
     pub probe: ProbeShares,
     /// Directions from x_i, bottom to top.
     pub joint: JointKind,
@@ -42,9 +42,9 @@ pub struct SneeOptions {
 /// Which techniques make the paths whose last two medium vertices follow each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Strategies {
-    /// The walk goes on, its exit by BSDF sampling.
+    /// The walk continues, its exit by BSDF sampling.
     pub bsdf: bool,
-    /// The walk goes on, its exit by light sampling.
+    /// The walk continues, its exit by light sampling.
     pub light: bool,
     /// Subdivision from the light's end.
     pub top_to_bottom: bool,
@@ -73,13 +73,13 @@ pub enum JointKind {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SneeChoices {
-    /// What the other options start from.
+    /// Preset that the other options change.
     #[serde(default)]
     pub preset: SneePreset,
     /// When a path is ended by chance.
     #[serde(default)]
     pub roulette: Roulette,
-    /// What makes the paths whose last two medium vertices follow each other.
+    /// Techniques for paths whose last two medium vertices are consecutive.
     ///
     /// All other paths are always the walk's own (and the light-guided last vertex's).
     pub strategies: Option<Vec<EdgeTechnique>>,
@@ -119,7 +119,7 @@ pub enum SneePreset {
     Guided,
 }
 
-/// A technique.
+/// One technique that samples the last two segments of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EdgeTechnique {
@@ -172,7 +172,7 @@ pub enum BandWalks {
 }
 
 impl SneePreset {
-    /// Its options.
+    /// Options that the preset denotes.
     pub fn options(self) -> SneeOptions {
         let all = Strategies { bsdf: true, light: true, top_to_bottom: true, bottom_to_top: true };
         match self {
@@ -207,7 +207,7 @@ impl SneePreset {
 }
 
 impl SneeChoices {
-    /// The preset with what differs from it.
+    /// The preset with the options that differ from it.
     ///
     /// # Errors
     /// No technique, one that loses lights, or shares of probes that leave nothing to uniform

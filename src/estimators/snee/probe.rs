@@ -17,7 +17,7 @@ const WHOLE: f64 = 2.0;
 /// Shares of the lobes; they sum to 1, and the uniform one is positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbeShares {
-    /// Uniform directions.
+    /// Share of uniform directions.
     pub uniform: f64,
     /// The tangent plane of the specular guess.
     pub plane: f64,

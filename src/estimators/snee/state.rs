@@ -1,4 +1,4 @@
-//! What a walk carries for connections.
+//! State that a walk carries for connections.
 
 use super::BandSetup;
 use super::guess::Guess;
@@ -22,33 +22,33 @@ pub(super) struct WalkVertex {
 /// Which of the vertices that are held.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Slot {
-    /// The walk's last but one.
+    /// The walk's vertex before the last.
     Previous,
-    /// The walk's last.
+    /// The walk's last vertex.
     Latest,
-    /// The one by which subdivision goes on from the walk's last.
+    /// The vertex by which subdivision continues from the walk's last.
     Drawn,
 }
 
-/// A vertex and what was found out about it.
+/// A vertex with its cached values.
 #[derive(Clone, Copy, Debug)]
 struct Held {
     vertex: WalkVertex,
-    /// The specular guess for the last guide that was asked for.
+    /// Cached specular guess for the last guide.
     guess: Option<(usize, Option<Guess>)>,
 }
 
-/// What a walk carries.
+/// State that a walk carries for connections.
 pub(super) struct Connections<'a> {
     pub setup: &'a BandSetup,
     pub stream: Stream,
-    /// By [`Slot`].
+    /// Vertices held, indexed by [`Slot`].
     held: [Held; 3],
     /// Medium vertices since the boundary was last met.
     pub count: u32,
     /// Only the first edge is subdivided, and only the second vertex is a last one.
     pub is_edge_alone: bool,
-    /// Whether the vertex before the last saw the exit that was last asked for.
+    /// Cached visibility between the vertex before the last and the last exit.
     seen: Option<(DVec3, bool)>,
 }
 
@@ -66,7 +66,7 @@ impl<'a> Connections<'a> {
         self.count += 1;
     }
 
-    /// Puts a vertex, of which nothing is known yet, into a slot.
+    /// Puts a new vertex into a slot.
     pub fn hold(&mut self, slot: Slot, vertex: WalkVertex) {
         self.held[slot as usize] = Held { vertex, guess: None };
     }

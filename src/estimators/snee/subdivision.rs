@@ -5,8 +5,10 @@
 //!   top to bottom   w_L from the light, w_kj by refraction, a distance along it by exponential and
 //!                   equiangular sampling towards x_i:
 //!                   q p(x_k | x_i) p_G(w_L) p(w_kj | w_L) p_t(d_jk) / d_jk^2
-//!                   over U:  q p(x_k | x_i) p_G p_rev p_t d_ij^2 / (phase_i sigma_t T_ij phase_j T_jk cos_k)
-//!   bottom to top   w_ij and distance by joint importance sampling towards x_k, w_L by refraction at x_k:
+//!                   over U:  q p(x_k | x_i) p_G p_rev p_t d_ij^2
+//!                            / (phase_i sigma_t T_ij phase_j T_jk cos_k)
+//!   bottom to top   w_ij and distance by joint importance sampling towards x_k, w_L by refraction at
+//!                   x_k:
 //!                   q p(x_k | x_i) p_dir(w_ij) p_s(d_ij) / d_ij^2 p(w_L | w_kj)
 //!                   over U:  q p(x_k | x_i) p_dir p_s p_fwd d_jk^2 / (the same)
 //! Both force refraction; a sample that fails (total reflection, x_j outside the body, light below the
@@ -145,7 +147,7 @@ pub(super) struct Subdivided<'a> {
     pub x_j: DVec3,
     pub middle: Middle,
     pub exit: WalkExit,
-    /// Towards the light.
+    /// Unit direction towards the light.
     pub w_l: DVec3,
     /// Of the light, where it is known from the draw.
     pub radiance: Option<f64>,

@@ -54,7 +54,7 @@ fn scene(boundary: Boundary, media: &[(f64, f64, f64)], light: Light) -> Arc<Sce
     })
 }
 
-fn played(scene: &Arc<Scene>, estimator: &dyn Estimator, test: &str) -> Scores {
+fn run(scene: &Arc<Scene>, estimator: &dyn Estimator, test: &str) -> Scores {
     let mut scores = Scores::new(Layout::new(scene));
     let key = StreamKey::named(test);
     let bands: Vec<usize> = (0..scene.bands()).collect();
@@ -68,7 +68,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// A light that is not concentrated leaves nothing but the walk: the image and the work of `path`, to
+/// A light that is not concentrated leaves only the walk: the image and the work of `path`, to
 /// the last bit. A concentrated one does not.
 #[test]
 fn behind_the_gate_it_is_path() {
@@ -79,9 +79,9 @@ fn behind_the_gate_it_is_path() {
             let scene = scene(boundary, &[(10.0, 0.95, 0.3)], light);
             let path =
                 PathTracer::new(scene.clone(), Roulette::Below(0.25)).expect("a scene that it serves");
-            let path = played(&scene, &path, "behind_the_gate_it_is_path");
+            let path = run(&scene, &path, "behind_the_gate_it_is_path");
             let snee = Snee::new(scene.clone(), guided()).expect("a scene for it");
-            let snee = played(&scene, &snee, "behind_the_gate_it_is_path");
+            let snee = run(&scene, &snee, "behind_the_gate_it_is_path");
             let is_same = bits(&path.observables) == bits(&snee.observables) && path.cost == snee.cost;
             assert_eq!(
                 is_same,
@@ -115,7 +115,7 @@ fn equal_bands_are_equal_to_the_last_bit() {
             let scene = scene(boundary, &media, cap(0.1, 3));
             let options = SneeOptions { share_bands: true, least_concentration, ..guided() };
             let snee = Snee::new(scene.clone(), options).expect("a scene for it");
-            let scores = played(&scene, &snee, "equal_bands_are_equal_to_the_last_bit");
+            let scores = run(&scene, &snee, "equal_bands_are_equal_to_the_last_bit");
             let band = |b: usize| -> Vec<u64> {
                 scores.observables.iter().skip(b).step_by(3).map(|value| value.to_bits()).collect()
             };
@@ -154,7 +154,7 @@ fn bodies_without_scattering_are_the_walks() {
         let path =
             PathTracer::new(scene.clone(), Roulette::Below(0.25)).expect("a scene that it serves");
         let test = "bodies_without_scattering_are_the_walks";
-        let [snee, path] = [played(&scene, &snee, test), played(&scene, &path, test)];
+        let [snee, path] = [run(&scene, &snee, test), run(&scene, &path, test)];
         assert_eq!(bits(&snee.observables), bits(&path.observables));
     }
 }

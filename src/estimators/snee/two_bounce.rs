@@ -3,7 +3,7 @@
 //! The sensor is a medium vertex: it gives x_i and the direction of arrival. What is estimated is
 //!   I(x_i) = int phase T / d_ij^2 sigma_s phase T cos_k / d_jk^2 f_k |cos| L
 //! over x_j, x_k and the direction of light, by whatever strategies take part. With one at a time, each
-//! of them is held against all others without the walk that usually surrounds them: errors of a few per
+//! of them is compared with all others without the walk that usually surrounds them: errors of a few per
 //! cent in one density, which weights would hide, show at once.
 
 use std::sync::Arc;
@@ -57,12 +57,12 @@ impl Estimator for TwoBounce {
             for index in 0..snee.field.scene.sensor.rays_per_pass() {
                 let path = Path { field: &snee.field, band, index, key };
                 if setup.guides.is_empty() {
-                    CameraWalk::play_two_bounces(path, scores, Unrivalled, OneBand);
+                    CameraWalk::trace_two_bounces(path, scores, Unrivalled, OneBand);
                 } else {
                     let stream = key.stream(index as u64, Purpose::Connection);
                     let mut connections = Connections::new(setup, stream);
                     connections.is_edge_alone = true;
-                    CameraWalk::play_two_bounces(path, scores, connections, OneBand);
+                    CameraWalk::trace_two_bounces(path, scores, connections, OneBand);
                 }
             }
         }

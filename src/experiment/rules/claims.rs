@@ -13,9 +13,9 @@ use crate::experiment::sweep::SweepAxis;
 pub struct Known<'a> {
     /// What the experiment is made of.
     pub parts: ExperimentParts,
-    /// Names of estimators.
+    /// Names that claims may refer to as estimators.
     pub estimators: Vec<&'a str>,
-    /// Names of samplers.
+    /// Names that claims may refer to as samplers.
     pub samplers: Vec<&'a str>,
     /// Names of bands; none where they could not be read.
     pub bands: Option<Vec<String>>,
@@ -58,14 +58,14 @@ pub fn claim(at: At, claim: &ClaimEntry, known: &Known) {
     if claim.duel().is_some() && claim.expect == Some(Expect::Differs) {
         at.to("expect").report_help(
             "`differs` is about means, and this claim is about efficiency",
-            "say `expect = \"fails\"`",
+            "write `expect = \"fails\"`",
         );
     }
     if let Some(differs) = &claim.differs {
         let (names, across, only) = (&differs.estimators, &differs.across, &differs.only);
         pairs(at.to("differs"), names, across.as_deref(), only, known);
         if claim.expect.is_some() {
-            at.to("expect").report("`differs` says what is expected already");
+            at.to("expect").report("`differs` states what is expected already");
         }
     }
 }
@@ -85,7 +85,7 @@ fn samplers(at: At, claim: &SamplerClaim, known: &Known) {
             let help = suggest::help(name, &known.samplers, "samplers");
             at.item(i).report_help(format!("unknown sampler `{name}`"), help);
         } else if names[..i].contains(name) {
-            at.item(i).report(format!("`{name}` stands twice"));
+            at.item(i).report(format!("`{name}` occurs twice"));
         }
     }
 }
@@ -151,7 +151,7 @@ fn pairs(
     for (i, name) in estimators.iter().enumerate() {
         estimator(names.item(i), name, known);
         if estimators[..i].contains(name) {
-            names.item(i).report(format!("`{name}` stands twice"));
+            names.item(i).report(format!("`{name}` occurs twice"));
         }
     }
     if estimators.len() == 1 && across.is_none() {

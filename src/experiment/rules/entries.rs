@@ -42,7 +42,7 @@ pub const SCENE_KEYS: [&str; 6] = ["bands", "object", "sensor", "light", "estima
 /// Keys of samplers, likewise.
 pub const SAMPLER_KEYS: [&str; 2] = ["samples", "sampler"];
 
-/// Keys that say more of a scene.
+/// Keys that describe more of a scene.
 const MORE_OF_SCENES: [&str; 3] = ["sweep", "pair", "picture"];
 
 /// What an experiment is made of.
@@ -50,7 +50,7 @@ const MORE_OF_SCENES: [&str; 3] = ["sweep", "pair", "picture"];
 pub struct ExperimentParts {
     /// A scene with estimators.
     pub scene: bool,
-    /// Samplers.
+    /// Whether the experiment has samplers.
     pub samplers: bool,
 }
 
@@ -62,7 +62,7 @@ impl ExperimentParts {
     }
 }
 
-/// What the experiment `root` is made of: of something, and what says more of a scene needs one.
+/// What the experiment `root` is made of: of something, and keys that describe more of a scene need one.
 pub fn parts(at: At, root: &Node) -> ExperimentParts {
     let has = |keys: &[&str]| keys.iter().any(|key| root.get(key).is_some());
     let parts = ExperimentParts { scene: has(&SCENE_KEYS), samplers: has(&SAMPLER_KEYS) };
@@ -75,7 +75,7 @@ pub fn parts(at: At, root: &Node) -> ExperimentParts {
     } else if !parts.scene {
         for key in MORE_OF_SCENES.iter().filter(|key| root.get(key).is_some()) {
             at.to(key).key().report_help(
-                format!("`{key}` says more of a scene, and there is none"),
+                format!("`{key}` belongs to a scene, and there is none"),
                 format!("leave it out, or give the scene: {}", quoted[0]),
             );
         }

@@ -1,4 +1,4 @@
-//! What the schema cannot say: rules between values, each with the place of the offending key.
+//! What the schema cannot express: rules between values, each with the place of the offending key.
 
 use std::cell::RefCell;
 
@@ -77,7 +77,7 @@ impl<'a> At<'a> {
         self.node.at(&[word]).is_some()
     }
 
-    /// The key under which it stands.
+    /// The key that holds it.
     pub fn key(self) -> At<'a> {
         At { is_key: true, ..self }
     }
@@ -86,7 +86,7 @@ impl<'a> At<'a> {
         self.node.key.as_ref().filter(|_| self.is_key).unwrap_or(self.node.place())
     }
 
-    /// The element `index`.
+    /// The element `index` of an array.
     pub fn item(self, index: usize) -> At<'a> {
         self.to(&index.to_string())
     }
@@ -122,7 +122,7 @@ fn one_per_band(at: At, entries: usize, bands: usize) {
     }
 }
 
-/// A spectrum has an entry per band, and every entry keeps a rule: `must` says it in words.
+/// A spectrum has an entry per band, and every entry keeps a rule: `must` states it in words.
 fn spectrum(at: At, spectrum: &Spectrum, bands: usize, must: &str, holds: fn(f64) -> bool) {
     match spectrum {
         Spectrum::Grey(value) => value_rule(at, *value, must, holds),

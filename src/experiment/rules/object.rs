@@ -128,7 +128,7 @@ fn skin(at: At, words: &SkinFractions, bands: &[BandInterval]) {
     }
 }
 
-/// The pairs of keys that say what a medium is.
+/// The pairs of keys that define a medium.
 const PAIRS: [[&str; 2]; 3] = [
     ["sigma_t_per_mm", "albedo"],
     ["sigma_a_per_mm", "sigma_s_per_mm"],

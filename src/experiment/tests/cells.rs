@@ -136,7 +136,7 @@ fn sweeps_set_keys_of_cells_once() {
     assert!(message.contains("two axes are named `a`") && message.contains("x.toml:19:8"), "{message}");
     holds(
         &sweep(&radius.replace("[1, 2]", "[1, 1]")),
-        "label `1` stands twice on the axis",
+        "label `1` occurs twice on the axis",
         "16:14",
         "",
     );

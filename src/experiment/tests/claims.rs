@@ -25,7 +25,8 @@ fn estimators_have_unique_names() {
 
 #[test]
 fn a_claim_is_of_one_kind() {
-    let rule = "exactly one of `equals`, `agree`, `differs`, `reproduces`, `faster`, `not_slower`, `sampler` is needed, found none";
+    let rule = "exactly one of `equals`, `agree`, `differs`, `reproduces`, `faster`, `not_slower`, `sampler` is \
+                needed, found none";
     holds(&claim("name = \"x\""), rule, "18:1", "");
     let equals = "equals = { value = 1, column = \"r\", source = \"\" }";
     assert!(
@@ -42,7 +43,7 @@ fn claims_name_known_estimators() {
     let message = claim("agree = { estimators = [\"mis\"], detect = 0.1 }");
     holds(&message, "one estimator agrees with itself", "19:24", "`across`");
     let message = claim("agree = { estimators = [\"mis\", \"mis\"], detect = 0.1 }");
-    holds(&message, "`mis` stands twice", "19:32", "");
+    holds(&message, "`mis` occurs twice", "19:32", "");
     accepted("agree = { estimators = [\"mis\", \"snee\"], detect = 0.1 }");
 }
 

@@ -1,4 +1,5 @@
-//! Damaged files are refused or accepted, never a panic and never past the rules but not the types.
+//! Damaged files are refused or accepted, never a panic and never accepted by the rules but not by the
+//! types.
 
 use proptest::prelude::*;
 

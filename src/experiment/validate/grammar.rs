@@ -23,7 +23,7 @@ pub enum SchemaForm<'a> {
 pub struct Variant<'a> {
     /// Its name in the file.
     pub name: &'a str,
-    /// The schema of what stands under the name; none for a bare string.
+    /// The schema of the value under the name; none for a bare string.
     pub content: Option<&'a Json>,
     /// The first line of its documentation.
     pub doc: &'a str,
@@ -65,7 +65,7 @@ impl Grammar {
     }
 
     /// Whether the last word of `path` names a variant of an enum, so that setting it as a whole
-    /// replaces the variant that stood there.
+    /// replaces the variant that was there.
     pub fn is_variant(&self, path: &[&str]) -> bool {
         let Some((last, parents)) = path.split_last() else { return false };
         match self.at(parents).map(|parent| self.form(parent)) {

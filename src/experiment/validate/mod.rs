@@ -15,7 +15,7 @@ pub mod grammar;
 use grammar::{Grammar, SchemaForm, Variant};
 
 /// The keywords of JSON Schema that the walk understands, and those that carry no rule for it: `pattern`
-/// is of names, of which the rules say more than a pattern can.
+/// is of names, which the rules check more closely than a pattern can.
 const KEYWORDS: [&str; 24] = [
     "$defs",
     "$ref",
@@ -85,7 +85,7 @@ impl<'a> SchemaWalk<'a> {
         }
     }
 
-    /// Checks `node`, which stands at the dotted `path`, along `schema`.
+    /// Checks `node`, found at the dotted `path`, along `schema`.
     pub fn node(&mut self, node: &Node, schema: &Json, path: &str) {
         match self.grammar.form(schema) {
             SchemaForm::Anything => self.finite(node),

@@ -29,7 +29,7 @@ pub struct Better {
     flux: f64,
     /// alpha'^2 C_phi / (4 pi D).
     fluence: f64,
-    /// z_v^2 - z_r^2.
+    /// z_v^2 - z_r^2, mm^2.
     gap: f64,
     total: f64,
 }
@@ -78,7 +78,7 @@ impl Better {
     /// int_z_r^z_v q dz, and R is
     ///   flux (q(z_r) + q(z_v)) + fluence int_z_r^z_v q(z) dz:
     /// sources of the classical kind at the two ends and all depths between. Two sources of one strength
-    /// are a [`Dipole`]; the integral becomes three of them, by Gauss's rule of two nodes (which weighs
+    /// are a [`Dipole`]; the integral becomes three of them, by Gauss's rule of two nodes (which weights
     /// them alike) on three parts of the range that widen by one factor. A source at z has the integral
     /// 2 pi e^(-s z) over the plane.
     pub fn techniques(&self) -> Vec<(f64, Radial)> {
@@ -106,7 +106,7 @@ impl Better {
         self.total
     }
 
-    /// Its two sources.
+    /// The dipole of the real and the virtual source.
     pub fn shape(&self) -> Dipole {
         self.shape
     }

@@ -37,7 +37,7 @@ impl Classical {
         Classical { shape, strength: reduced.albedo / (4.0 * PI), total }
     }
 
-    /// R(r), 1/mm^2.
+    /// Exitance R(r) per unit flux, 1/mm^2.
     #[inline]
     pub fn exitance(&self, r: f64) -> f64 {
         let s = self.shape.sigma_tr;
@@ -54,12 +54,12 @@ impl Classical {
         self.total
     }
 
-    /// Its two sources.
+    /// The dipole of the real and the virtual source.
     pub fn shape(&self) -> Dipole {
         self.shape
     }
 
-    /// s, 1/mm.
+    /// Effective transport coefficient s, 1/mm.
     pub fn sigma_tr(&self) -> f64 {
         self.shape.sigma_tr
     }

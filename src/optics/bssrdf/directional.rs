@@ -53,15 +53,15 @@ const PARALLEL: f64 = 1e-12;
 /// The directional dipole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Directional {
-    /// D, mm.
+    /// Diffusion coefficient D, mm.
     diffusion: f64,
-    /// s, 1/mm.
+    /// Effective transport coefficient s, 1/mm.
     sigma_tr: f64,
-    /// d_e, mm.
+    /// Extrapolation distance d_e, mm.
     extrapolation: f64,
     /// 2 A d_e, mm.
     mirror: f64,
-    /// 1/(3 sigma_t)^2, mm^2.
+    /// Near-source correction 1/(3 sigma_t)^2, mm^2.
     correction: f64,
     /// C_phi / (4 C_phi(1/eta) 4 pi^2).
     fluence: f64,
@@ -78,11 +78,11 @@ pub struct DirectionalTerms {
     pub real: f64,
     /// The virtual source's kernel, 1/(mm^2 sr); S_d = real - mirrored.
     pub mirrored: f64,
-    /// d_r, mm.
+    /// Distance d_r to the real source, mm.
     pub d_r: f64,
-    /// d_v, mm.
+    /// Distance d_v to the virtual source, mm.
     pub d_v: f64,
-    /// mu0.
+    /// Cosine mu0 = -n_o.w12 of the refracted direction at the exit.
     pub mu0: f64,
 }
 
@@ -111,7 +111,7 @@ impl Directional {
         (parts.real - parts.mirrored).max(0.0)
     }
 
-    /// S_d's two sources.
+    /// Terms of S_d's real and virtual source.
     #[inline]
     pub fn parts(&self, entry: &Entry, exit: &Exit) -> DirectionalTerms {
         let x = exit.point - entry.point;
@@ -152,7 +152,7 @@ impl Directional {
         exp(-sr) / (square * r) * (self.fluence * fluence - self.flux * flux)
     }
 
-    /// s, 1/mm.
+    /// Effective transport coefficient s, 1/mm.
     pub fn sigma_tr(&self) -> f64 {
         self.sigma_tr
     }
@@ -163,7 +163,7 @@ impl Directional {
     }
 }
 
-/// n_i*.
+/// Normal n_i* of the modified tangent plane at the entry.
 #[inline]
 fn tangent_plane(x: DVec3, square: f64, entry: &Entry, exit: &Exit) -> DVec3 {
     if square == 0.0 {

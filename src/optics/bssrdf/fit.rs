@@ -97,7 +97,7 @@ struct Target {
     nodes: Vec<(f64, f64, f64)>,
     /// int (r R)^2 dr.
     norm: f64,
-    /// max (r R).
+    /// Maximum of r R(r), 1/mm.
     peak: f64,
 }
 

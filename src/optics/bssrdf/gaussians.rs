@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use crate::math::exp;
 
-/// One Gaussian.
+/// One Gaussian of the sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Term {
     /// Its integral over the plane.
@@ -54,7 +54,7 @@ impl Gaussians {
         )
     }
 
-    /// R(r), 1/mm^2.
+    /// Exitance R(r) per unit flux, 1/mm^2.
     #[inline]
     pub fn exitance(&self, r: f64) -> f64 {
         let square = r * r;

@@ -7,7 +7,7 @@
 //! Code that refracts at both ends has the transmittances in its hands (a path that is refracted with
 //! probability T21 must not multiply by it again), so what is evaluated here is K, the *kernel*.
 //!
-//! Every model but the directional dipole is reciprocal and never negative.
+//! Every model except the directional dipole is reciprocal and never negative.
 //!
 //! - *Classical dipole.* Loses the part 2 C1(1/eta) of the exitance on the way out unless it is
 //!   normalized. By its source's measure it leaves nothing out (its albedo counts all light), yet single
@@ -28,7 +28,7 @@
 //! normalised models have K = R / (pi (1 - 2 C1(1/eta))), so that their hemispherical exitance under T21
 //! is R. The classical dipole's total is the whole diffuse reflectance within 0.03 of exact transport,
 //! so that single scattering on top of it is counted twice in part; its source adds it nonetheless, and
-//! `leaves_out_single` says so.
+//! `leaves_out_single` states this.
 
 mod better;
 mod classical;
@@ -58,7 +58,7 @@ use serde::{Deserialize, Serialize};
 use crate::optics::medium::Medium;
 use crate::sampling::radial::Radial;
 
-/// What a model does with the flux that arrives under the boundary on its way out.
+/// Treatment of the flux that arrives under the boundary on its way out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outgoing {
@@ -78,7 +78,7 @@ pub enum Model {
         /// Where the Fresnel moments come from.
         #[serde(default)]
         moments: MomentKind,
-        /// What happens to the exitance on its way out.
+        /// Treatment of the exitance on its way out.
         #[serde(default)]
         outgoing: Outgoing,
     },
@@ -117,7 +117,7 @@ pub enum Model {
         /// Where its Fresnel moments come from.
         #[serde(default)]
         moments: MomentKind,
-        /// How many Gaussians.
+        /// Number of Gaussians.
         #[serde(default = "six")]
         #[schemars(range(min = 1, max = 12))]
         terms: usize,
@@ -132,9 +132,9 @@ fn six() -> usize {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FittedDipole {
-    /// The classical dipole's.
+    /// Profile of the classical dipole.
     Classical,
-    /// The better dipole's.
+    /// Profile of the better dipole.
     Better,
 }
 
@@ -180,7 +180,7 @@ impl Model {
     /// where the boundary is matched).
     ///
     /// # Errors
-    /// What the medium lacks (scattering, absorption) or what does not fit the bands, in words.
+    /// Why the medium does not fit the model or the bands (no scattering, no absorption), as text.
     pub fn of(&self, band: usize, bands: usize, medium: &Medium, eta: f64) -> Result<Bssrdf, String> {
         let reduced = Reduced::of(medium);
         let scatters = medium.albedo > 0.0 && reduced.albedo > 0.0;
@@ -309,7 +309,7 @@ impl MomentKind {
 }
 
 impl std::fmt::Display for Model {
-    /// Its name, with what its source leaves open.
+    /// Name, with the choices that its source leaves open.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Model::Classical { moments, outgoing } => {
@@ -394,7 +394,7 @@ impl Bssrdf {
 }
 
 impl RadialProfile {
-    /// R(r), 1/mm^2.
+    /// Exitance R(r) per unit flux, 1/mm^2.
     #[inline]
     pub fn exitance(&self, r: f64) -> f64 {
         match self {

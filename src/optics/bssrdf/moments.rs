@@ -106,12 +106,12 @@ impl FresnelMoments {
     }
 }
 
-/// 2 C1(x).
+/// Twice the first Fresnel moment: 2 C1(x).
 fn first(x: f64) -> f64 {
     moment(x, |mu| (2.0, 2.0 * mu))
 }
 
-/// 3 C2(x).
+/// Three times the second Fresnel moment: 3 C2(x).
 fn second(x: f64) -> f64 {
     moment(x, |mu| (3.0 * mu, 3.0 * mu * mu))
 }

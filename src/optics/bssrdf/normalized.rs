@@ -4,9 +4,9 @@
 //!
 //!   R(r) = A s (e^(-s r/l) + e^(-s r/(3l))) / (8 pi l r),
 //! whose integral over the plane is A, the surface's albedo, for any shape s:
-//!   s = 1.85 - A + 7 |A - 0.8|^3     searchlight along the normal, l = mean free path 1/sigma_t' (eq. 6)
-//!   s = 1.9 - A + 3.5 (A - 0.8)^2    diffuse light, the same l (eq. 7)
-//!   s = 3.5 + 100 (A - 0.33)^4       l = diffuse mean free path 1/sigma_tr (eq. 8)
+//!   s = 1.85 - A + 7 |A - 0.8|^3    searchlight along the normal, l = mean free path 1/sigma_t' (eq. 6)
+//!   s = 1.9 - A + 3.5 (A - 0.8)^2   diffuse light, the same l (eq. 7)
+//!   s = 3.5 + 100 (A - 0.33)^4      l = diffuse mean free path 1/sigma_tr (eq. 8)
 //!
 //! Reciprocal, never negative, infinite at r = 0.
 
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::math::exp;
 
-/// Which fit.
+/// Published fit that scales the profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scaling {
@@ -71,7 +71,7 @@ impl Normalized {
         Normalized { d, strength: albedo / (8.0 * PI * d), total: albedo }
     }
 
-    /// R(r), 1/mm^2.
+    /// Exitance R(r) per unit flux, 1/mm^2.
     #[inline]
     pub fn exitance(&self, r: f64) -> f64 {
         let slow = exp(-r / (3.0 * self.d));

@@ -9,9 +9,9 @@ pub struct Reduced {
     pub sigma_a: f64,
     /// sigma_s (1 - g), 1/mm.
     pub sigma_s: f64,
-    /// Their sum, 1/mm.
+    /// Reduced extinction, 1/mm.
     pub sigma_t: f64,
-    /// sigma_s' / sigma_t'.
+    /// Reduced albedo sigma_s' / sigma_t'.
     pub albedo: f64,
 }
 

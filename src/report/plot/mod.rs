@@ -13,14 +13,14 @@ mod scale;
 /// Colours with their names.
 pub mod swatches;
 
-/// A plot.
+/// A plot of named series over two axes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plot {
     /// The horizontal axis.
     pub x: PlotAxis,
     /// The vertical axis.
     pub y: PlotAxis,
-    /// The lines.
+    /// Series, in the order of the legend.
     pub series: Vec<Series>,
     /// Horizontal lines at known values, with their names.
     pub levels: Vec<(f64, String)>,
@@ -36,7 +36,7 @@ pub enum Size {
     Wide,
     /// One of several side by side.
     Small,
-    /// A strip.
+    /// A low strip.
     Flat,
 }
 
@@ -57,7 +57,7 @@ pub enum Style {
 /// A series of points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
-    /// Its name.
+    /// Name in the legend.
     pub name: String,
     /// Its points, by x.
     pub points: Vec<PlotPoint>,
@@ -75,9 +75,9 @@ impl Series {
 /// A point with an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlotPoint {
-    /// Abscissa.
+    /// Position on the horizontal axis.
     pub x: f64,
-    /// The value.
+    /// Position on the vertical axis.
     pub y: f64,
     /// Lower end of its interval.
     pub low: f64,
@@ -135,7 +135,7 @@ impl Plot {
         Plot { x, y, series, size: Size::Small, ..Plot::default() }
     }
 
-    /// The picture.
+    /// The plot as an SVG document.
     pub fn to_svg(&self) -> String {
         panels(std::slice::from_ref(self))
     }
@@ -187,13 +187,15 @@ impl Plot {
         for (value, _) in &self.levels {
             let at = y.at(*value);
             svg += &format!(
-                "<path d=\"M{left} {at:.1}H{right:.1}\" stroke=\"currentColor\" stroke-dasharray=\"5 4\" fill=\"none\"/>\n"
+                "<path d=\"M{left} {at:.1}H{right:.1}\" stroke=\"currentColor\" stroke-dasharray=\"5 4\" \
+                 fill=\"none\"/>\n"
             );
         }
         // A nested SVG clips what lies outside the axes.
         let (wide, high) = (right - left, bottom - top);
         svg += &format!(
-            "<svg x=\"{left}\" y=\"{top}\" width=\"{wide:.1}\" height=\"{high:.1}\" viewBox=\"{left} {top} {wide:.1} {high:.1}\">\n"
+            "<svg x=\"{left}\" y=\"{top}\" width=\"{wide:.1}\" height=\"{high:.1}\" viewBox=\"{left} {top} \
+             {wide:.1} {high:.1}\">\n"
         );
         let coloured = || self.series.iter().zip(self.colours());
         coloured().for_each(|(series, colour)| svg += &series.band(&x, &y, colour));
@@ -239,9 +241,10 @@ impl Plot {
             );
         }
         svg + &format!(
-            "<path d=\"M{left} {top}V{bottom}H{right:.1}\" stroke=\"currentColor\" fill=\"none\"/>\
-             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"currentColor\">{}</text>\
-             <text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\" fill=\"currentColor\">{}</text>\n",
+            "<path d=\"M{left} {top}V{bottom}H{right:.1}\" stroke=\"currentColor\" fill=\"none\"/><text \
+             x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"currentColor\">{}</text><text \
+             transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\" \
+             fill=\"currentColor\">{}</text>\n",
             0.5 * (left + right),
             height - 8.0,
             escape(&self.x.label),
@@ -397,7 +400,7 @@ mod tests {
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     }
 
-    /// Marks that stand side by side at one name are of that name.
+    /// Marks that are side by side at one name belong to that name.
     #[test]
     fn numbers_stand_by_their_names() {
         let points = vec![PlotPoint::bare(-0.2, 1.0), PlotPoint::bare(0.8, 2.0)];
@@ -410,7 +413,7 @@ mod tests {
         );
     }
 
-    /// Names whose lines end at one height do not stand on each other.
+    /// Names whose lines end at one height do not overlap.
     #[test]
     fn names_stand_apart() {
         let svg = plot().to_svg();

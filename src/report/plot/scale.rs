@@ -3,10 +3,10 @@
 use crate::math::log10;
 use crate::report::number::significant;
 
-/// An axis.
+/// Label, scale and range of an axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlotAxis {
-    /// What it shows, with its unit.
+    /// Label of the axis, with its unit.
     pub label: String,
     /// Whether it is logarithmic.
     pub is_log: bool,
@@ -64,7 +64,7 @@ impl<'a> Scale<'a> {
         }
     }
 
-    /// Where a value is; what is far outside stays near the picture, where it is clipped. A logarithmic
+    /// Position of a value; values far outside are clipped near the picture. A logarithmic
     /// axis has what is not positive below its lower end.
     pub(super) fn at(&self, value: f64) -> f64 {
         let share = match self.axis.is_log && value <= 0.0 {

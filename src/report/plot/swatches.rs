@@ -9,8 +9,9 @@ pub fn to_svg(colours: &[(String, [u8; 3])]) -> String {
         let top = 12.0 + 44.0 * place as f64;
         let name = escape(name);
         format!(
-            "<rect x=\"12\" y=\"{top}\" width=\"120\" height=\"36\" rx=\"4\" fill=\"rgb({r},{g},{b})\" stroke=\"currentColor\" \
-             stroke-opacity=\"0.3\"/><text x=\"146\" y=\"{}\" fill=\"currentColor\">{name}, rgb({r}, {g}, {b})</text>\n",
+            "<rect x=\"12\" y=\"{top}\" width=\"120\" height=\"36\" rx=\"4\" fill=\"rgb({r},{g},{b})\" \
+             stroke=\"currentColor\" stroke-opacity=\"0.3\"/><text x=\"146\" y=\"{}\" \
+             fill=\"currentColor\">{name}, rgb({r}, {g}, {b})</text>\n",
             top + 22.0
         )
     };

@@ -4,7 +4,7 @@
 //! independent means of m passes each; with G of them, s^2 = sum (mean_g - mean)^2 / (G - 1) estimates
 //! the variance of such a mean with G - 1 degrees of freedom, whatever m. For independent passes of
 //! finite variance s falls as 1/sqrt(m); with a heavy tail it falls more slowly, or in steps. The
-//! interval is that of s for near-normal means, s sqrt((G - 1) / chi2). Beside it stands the standard
+//! interval is that of s for near-normal means, s sqrt((G - 1) / chi2). Beside it is the standard
 //! error of m passes that the variance of all passes predicts.
 
 use super::section::{PlotFigure, Section, runs};
@@ -25,10 +25,11 @@ pub(super) fn section(stored: &Stored) -> Section {
     let cells = stored.record.cells.iter().enumerate();
     Section {
         heading: "Error against time and rays".into(),
-        text: "Relative root-mean-square error of the sensor's first observable, all bands together: how far independent \
-               means of so many passes lie apart (points, with 95 % intervals), and what 1 / sqrt(passes) promises from \
-               the variance of all passes (dotted, to the end of the run). Points above their dotted line, or falling \
-               more slowly, mean that the variance is not what the passes say."
+        text: "Relative root-mean-square error of the sensor's first observable, all bands together: how far \
+               independent means of so many passes lie apart (points, with 95 % intervals), and what 1 / \
+               sqrt(passes) promises from the variance of all passes (dotted, to the end of the run). Points \
+               above their dotted line, or falling more slowly, mean that the variance is not what the passes \
+               show."
             .into(),
         drawn: cells.flat_map(|(index, cell)| of_cell(stored, index, cell)).collect(),
         are_small: true,

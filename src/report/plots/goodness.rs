@@ -10,9 +10,10 @@ pub(super) fn section(stored: &Stored) -> Section {
     let runs = stored.record.samplers.iter().enumerate();
     Section {
         heading: "Observed, expected, residual".into(),
-        text: "Coarse bins in the order of their partition, discrete outcomes last. Above: draws counted (points) and expected \
-               (line), per draw. Below: (observed - expected) / sqrt(expected), near normal where the sampler draws from \
-               its density; the chi-square statistic is the sum of their squares."
+        text: "Coarse bins in the order of their partition, discrete outcomes last. Above: draws counted \
+               (points) and expected (line), per draw. Below: (observed - expected) / sqrt(expected), near \
+               normal where the sampler draws from its density; the chi-square statistic is the sum of their \
+               squares."
             .into(),
         drawn: runs.filter_map(|(index, run)| of_sampler(stored, index, run)).collect(),
         are_small: true,
@@ -77,10 +78,11 @@ mod tests {
 
     /// 100 draws in three bins of masses 0.25, 0.75 and 0, and an outcome that neither can be nor was.
     #[test]
-    fn residuals_are_in_standard_deviations_and_the_impossible_is_said() {
+    fn residuals_are_in_standard_deviations_and_the_impossible_is_noted() {
         let mut stored = sample::stored(0.1);
         let run = serde_json::json!({
-            "sampler": "coin", "kind": "test", "samples": 100, "coarse": "c", "fine": null, "serial": null, "deltas": [],
+            "sampler": "coin", "kind": "test", "samples": 100, "coarse": "c", "fine": null, "serial": null,
+            "deltas": [],
             "nulls": 0, "null": "never", "outside": 0, "own_density_differs": 0, "own_density_largest": 0.0,
             "total": 1.0, "total_bound": 0.0, "evaluations": 1, "senseless": 0, "senseless_contrasts": 0,
             "exhausted": false, "contrasts": [],

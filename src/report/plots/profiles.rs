@@ -22,8 +22,8 @@ pub(super) fn section(stored: &Stored) -> Section {
     };
     Section {
         heading: "Radial profiles".into(),
-        text: "Radial profile: light that leaves in a ring around the point where it came in, over the ring's area, at the \
-               middle of the ring, with its 95 % interval."
+        text: "Radial profile: light that leaves in a ring around the point where it came in, over the ring's \
+               area, at the middle of the ring, with its 95 % interval."
             .into(),
         drawn: match edges.len() {
             0 | 1 => Vec::new(),

@@ -36,8 +36,9 @@ pub(super) fn section(stored: &Stored, rows: &[EfficiencyRow]) -> Section {
     }
     Section {
         heading: "Efficiency along the sweep".into(),
-        text: "Variance of a pass times its cost, of the first estimator over the other: above 1 the other is the better. \
-               Bands are 95 % intervals; hollow points are not resolved (more passes may move them)."
+        text: "Variance of a pass times its cost, of the first estimator over the other: above 1 the other is \
+               the better. Bands are 95 % intervals; hollow points are not resolved (more passes may move \
+               them)."
             .into(),
         drawn,
         are_small: true,
@@ -65,7 +66,7 @@ fn axes(stored: &Stored) -> Vec<String> {
 struct Places {
     /// Label of the axis.
     what: String,
-    /// Label -> place.
+    /// Label -> position on the axis.
     at: BTreeMap<String, f64>,
     /// Names of the places 0, 1, ... of an axis of categories.
     names: Vec<String>,

@@ -31,8 +31,8 @@ pub(super) fn section(stored: &Stored, wanted: &[Wanted]) -> Section {
     Section { heading: "Means as passes add up".into(), text: String::new(), drawn, are_small: false }
 }
 
-const CAPTION: &str = "Mean over the first passes with the 95 % interval from their own variance; dashed: the value that is \
-                       expected.";
+const CAPTION: &str = "Mean over the first passes with the 95 % interval from their own variance; dashed: the \
+                       value that is expected.";
 
 fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option<(Plot, String)> {
     let band = stored.record.bands.iter().position(|band| band.name == running.band)?;

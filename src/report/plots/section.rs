@@ -12,18 +12,18 @@ use crate::results::store::{RecordFolder, Stored};
 pub struct PlotFigure {
     /// Stem of its files under `plots/`, unique on its page.
     pub name: String,
-    /// What it shows, in a few words.
+    /// Short description of the plot.
     pub title: String,
     /// How to read it.
     pub caption: String,
-    /// What is drawn.
+    /// Plots of the section, or why there are none.
     pub content: Content,
 }
 
-/// What is drawn.
+/// Content of a section.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
-    /// Plots.
+    /// Plots in order.
     Plots(Vec<Plot>),
     /// Names with their 8-bit sRGB colours.
     Swatches(Vec<(String, [u8; 3])>),
@@ -32,11 +32,11 @@ pub enum Content {
 /// Plots under one heading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
-    /// The heading.
+    /// Heading of the section.
     pub heading: String,
     /// Text for all of them.
     pub text: String,
-    /// The plots.
+    /// Plots with their files.
     pub drawn: Vec<PlotFigure>,
     /// Whether they are placed side by side.
     pub are_small: bool,

@@ -19,8 +19,9 @@ pub(super) fn section(stored: &Stored) -> Section {
     let cells = stored.record.cells.iter().enumerate();
     Section {
         heading: "Spectra".into(),
-        text: "Mean of the sensor's first observable by band, with 95 % intervals, and the colour that it gives: the sum over \
-               the bands of mean times display colour (CIE 1931, linear sRGB), shown at the exposure of the pictures."
+        text: "Mean of the sensor's first observable by band, with 95 % intervals, and the colour that it gives: \
+               the sum over the bands of mean times display colour (CIE 1931, linear sRGB), shown at the \
+               exposure of the pictures."
             .into(),
         drawn: match is_spectrum {
             true => cells.flat_map(|(index, cell)| of_cell(stored, index, cell)).collect(),
@@ -111,7 +112,7 @@ mod tests {
             display_rgb: [0.1, 0.2, 0.3],
         };
         stored.record.bands = (0..4).map(band).collect();
-        // The arrays of the sample have two bands: here each stands twice.
+        // The arrays of the sample have two bands: here each occurs twice.
         for array in
             stored.arrays.values_mut().filter(|array| array.shape.len() == 4 && array.shape[3] == 5)
         {

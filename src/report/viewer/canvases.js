@@ -34,7 +34,7 @@ class Canvases {
     return layer === "noise" ? picture.noise[band] : picture[layer]?.maps[band];
   }
 
-  // Where a picture has no map in the layer in view, its image stands there.
+  // Where a picture has no map in the layer in view, its image is shown there.
   has(picture) {
     return this.map(picture) !== undefined;
   }

@@ -1,4 +1,4 @@
-// A viewer's controls, and what it says in words.
+// A viewer's controls, and its texts.
 
 const LAYERS = { image: "Image", noise: "Noise", difference: "Difference", z: "z-score of the difference" };
 const ABOUT = {
@@ -82,7 +82,7 @@ class Controls extends Canvases {
       "split to move the seam, with Shift to pan. Two fingers zoom and pan; a tap flips.");
   }
 
-  // Decodes what is in view, paints it, and says what it is.
+  // Decodes, paints and describes the layer in view.
   async refresh() {
     const ticket = (this.ticket = {});
     this.stage.setAttribute("aria-busy", "true");
@@ -156,7 +156,7 @@ class Controls extends Canvases {
     this.explain(shown);
   }
 
-  // The colour bar and what there is to say of it.
+  // The colour bar and its description.
   explain(shown) {
     const { data } = this;
     const { layer, band } = this.state;
@@ -177,7 +177,7 @@ class Controls extends Canvases {
     }
   }
 
-  // What stands at equal steps of the colour bar.
+  // Labels at equal steps of the colour bar.
   ticks(layer) {
     const { limit, z_limit: zLimit, noise_range: [low, high] } = this.data;
     const words = {
@@ -209,7 +209,7 @@ class Controls extends Canvases {
     this.readout.replaceChildren(place, make("table", {}, ...rows));
   }
 
-  // The value that an index into a palette stands for.
+  // The value of an index into a palette.
   mapped(index) {
     const { data } = this;
     if (index === 0) return "no value";

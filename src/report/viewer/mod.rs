@@ -134,7 +134,7 @@ impl Data<'_> {
 
 /// The pictures of one estimator in a grid, tile by tile without a gap.
 pub(super) struct Sheet<'a> {
-    /// The estimator.
+    /// Name of the estimator.
     pub name: &'a str,
     /// Linear sRGB over what is shown as white, row by row from the top.
     pub rgb: Vec<[f64; 3]>,

@@ -111,7 +111,7 @@ fn models_are_not_compared_by_z() {
 }
 
 #[test]
-fn what_stands_against_a_score_is_said() {
+fn objections_to_a_score_are_shown() {
     let mut stored = sample::stored(0.5);
     stored.record.cells[0].runs[1].bias = StatedBias::Biased("a cut".into());
     let note = data(&stored).1["pictures"][1]["z"]["notes"][1].to_string();
@@ -142,7 +142,7 @@ fn names_are_escaped() {
 }
 
 #[test]
-fn what_the_page_has_no_room_for_is_said() {
+fn what_the_page_leaves_out_is_noted() {
     let stored = sample::stored(0.5);
     let size = data(&stored).0.len();
     let within = |room| viewers_within(&stored, &pictures(&stored), room).expect("viewers").remove(0);

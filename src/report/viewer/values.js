@@ -1,4 +1,4 @@
-// What the viewers' data holds, and how it is said. All files of this folder are one script.
+// Formats the values in the data of viewers. All files of this folder are one script.
 
 // The bytes of a PNG of one or three channels whose rows have no filter. They do not go through a canvas: some
 // browsers blur what is read back from one, against fingerprinting.

@@ -26,7 +26,7 @@ const OFFSET: f64 = 0.381_966_011_250_105_15;
 pub enum Extra {
     /// A discrete outcome.
     Delta(usize),
-    /// Nothing.
+    /// The sampler returned no sample.
     Null,
 }
 

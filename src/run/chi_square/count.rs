@@ -25,11 +25,11 @@ const MOST_GROUPS: usize = 16;
 
 /// What is drawn from, and into what.
 pub struct Counting<'a> {
-    /// The sampler.
+    /// Sampler under test.
     pub sampler: &'a dyn Sampler,
-    /// Its contrasts.
+    /// Contrasts whose means are known.
     pub contrasts: Vec<Contrast>,
-    /// Its bins.
+    /// Bins that draws are counted in.
     pub partition: &'a Partition,
     /// The extras of the partition.
     pub extras: &'a [(Extra, f64)],
@@ -37,7 +37,7 @@ pub struct Counting<'a> {
     pub groups: Vec<usize>,
     /// Number of groups; 0 for none.
     pub group_count: usize,
-    /// Names the streams.
+    /// Key of the random streams.
     pub key: StreamKey,
 }
 
@@ -46,11 +46,11 @@ pub struct Counting<'a> {
 pub struct DrawCounts {
     /// By leaf, then extra.
     pub leaves: Vec<u64>,
-    /// By discrete outcome.
+    /// Draws of each discrete outcome.
     pub deltas: Vec<u64>,
     /// Those of them that were not exact.
     pub inexact: Vec<u64>,
-    /// Draws of nothing.
+    /// Draws that returned no sample.
     pub nulls: u64,
     /// Draws that cannot be.
     pub outside: u64,

@@ -37,13 +37,13 @@ pub struct Draws {
     pub index: usize,
     /// The name that the file gives it.
     pub name: String,
-    /// Its kind.
+    /// Kind of the sampler.
     pub kind: String,
     /// Draws, and states its density.
     pub sampler: Box<dyn Sampler>,
     /// Number of draws.
     pub samples: u64,
-    /// Names the streams.
+    /// Key of the random streams.
     pub key: StreamKey,
 }
 

@@ -24,14 +24,14 @@ const BUDGET: u64 = 2_000_000;
 /// An integral and a bound of its error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mass {
-    /// The integral.
+    /// Estimate of the integral.
     pub value: f64,
-    /// The bound.
+    /// Bound of its error.
     pub bound: f64,
 }
 
 impl Mass {
-    /// Adds another.
+    /// Adds the mass and the bound of another region.
     pub fn add(&mut self, other: Mass) {
         self.value += other.value;
         self.bound += other.bound;
@@ -42,11 +42,11 @@ impl Mass {
 /// wrapped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
-    /// The piece.
+    /// Index of the piece of the chart.
     pub piece: usize,
-    /// Lower corner.
+    /// Lower corner, in coordinates of the piece.
     pub low: [f64; 2],
-    /// Upper corner.
+    /// Upper corner, in coordinates of the piece.
     pub high: [f64; 2],
 }
 
@@ -103,7 +103,7 @@ impl<'a> Quadrature<'a> {
         }
     }
 
-    /// The pieces.
+    /// Pieces of the sampler's chart.
     pub fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
@@ -129,7 +129,7 @@ impl<'a> Quadrature<'a> {
         self.region(0, Area { piece, low: [low, 0.0], high: [high, 1.0] }).mass.value
     }
 
-    /// Forgets everything kept.
+    /// Frees the values that are kept between calls.
     pub fn forget(&mut self) {
         self.regions.clear();
     }
@@ -225,7 +225,7 @@ impl<'a> Quadrature<'a> {
     }
 }
 
-/// The point of the range that a coordinate beyond it stands for.
+/// The point of the range that a coordinate beyond it denotes.
 pub fn wrap(axis: &Coordinate, x: f64) -> f64 {
     let [low, high] = axis.range;
     if !axis.periodic || (low..=high).contains(&x) { x } else { low + (x - low).rem_euclid(high - low) }

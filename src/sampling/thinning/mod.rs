@@ -1,7 +1,7 @@
 //! Thinning: each point x_i of a cloud is accepted independently with probability p(|x - x_i|), and what
-//! is accepted weighs 1/p, so that the expected sum over the accepted is the sum over all.
+//! is accepted has weight 1/p, so that the expected sum over the accepted is the sum over all.
 //!
-//! p is positive and does not increase with distance. `scan` asks every point; `PointTree` makes
+//! p is positive and does not increase with distance. `scan` evaluates every point; `PointTree` makes
 //! acceptances of the same law from a hierarchy, without visiting most of the points that it rejects.
 //!
 //! Uniform numbers decide against p down to 2^-106 (`Stream::draw_fine`): with 24 bits, the one number 0
@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use super::stream::Stream;
 use crate::math::exp;
 
-/// The probability of acceptance by distance (mm), and what makes deciding cheap.
+/// The probability of acceptance by distance (mm), with bounds for cheap decisions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThinningRule {
     form: ThinningForm,
@@ -35,33 +35,33 @@ pub struct ThinningRule {
 /// Halvings that have a reach of their own; smaller numbers decide without.
 const LEVELS: usize = 64;
 
-/// Forms of p(d).
+/// Forms of the acceptance probability p(d).
 #[derive(Clone, Debug, PartialEq)]
 pub enum ThinningForm {
     /// Every point is accepted.
     All,
     /// An exponential of the distance, e^(-sigma d).
     Exponential {
-        /// 1/mm, not negative.
+        /// Rate sigma, 1/mm; not negative.
         sigma: f64,
     },
     /// The mean of e^(-sigma d) over several sigma.
     MeanOfExponentials {
-        /// 1/mm, not negative.
+        /// Rates, 1/mm; not negative.
         sigmas: Vec<f64>,
     },
     /// max(e^(-sigma d), least).
     Floor {
-        /// 1/mm, not negative.
+        /// Rate sigma, 1/mm; not negative.
         sigma: f64,
-        /// In (0, 1].
+        /// Least probability, in (0, 1].
         least: f64,
     },
     /// Linear between values at distances `reach` (k/n)^2, k = 0..=n; beyond `reach` the last value.
     Table {
         /// Not increasing, in (0, 1].
         values: Vec<f64>,
-        /// mm, positive.
+        /// Reach, mm; positive.
         reach: f64,
     },
 }
@@ -132,13 +132,13 @@ impl ThinningRule {
         ThinningRule { form, reach_squared }
     }
 
-    /// p(d), in (0, 1] but for underflow.
+    /// p(d), in (0, 1] except for underflow.
     #[inline]
     pub fn probability(&self, d: f64) -> f64 {
         self.form.probability(d)
     }
 
-    /// What an accepted point at distance d weighs: 1/p(d).
+    /// Weight of an accepted point at distance d: 1/p(d).
     #[inline]
     pub fn weight(&self, d: f64) -> f64 {
         1.0 / self.probability(d)
@@ -149,7 +149,7 @@ impl ThinningRule {
     fn varies(&self, factor: f64, [near, far]: [f64; 2], most: f64) -> bool {
         match self.form {
             ThinningForm::All => false,
-            // Without another exponential: e^x > 1 + x + x^2/2 says yes too rarely by what does not
+            // Without another exponential: e^x > 1 + x + x^2/2 accepts too rarely by what does not
             // matter here.
             ThinningForm::Exponential { sigma } => {
                 let x = sigma * (far - near);
@@ -200,7 +200,7 @@ pub enum Search {
     /// By a hierarchy over the points.
     #[default]
     Hierarchy,
-    /// By asking every point.
+    /// Thins by evaluating every point.
     Scan,
 }
 
@@ -209,20 +209,20 @@ pub enum Search {
 pub struct Accepted {
     /// Its index, in the order of the tree.
     pub index: usize,
-    /// Its distance, mm.
+    /// Distance to the query, mm.
     pub distance: f64,
     /// Its weight, one over the probability of acceptance.
     pub weight: f64,
 }
 
-/// Counts of what a query did.
+/// Work of a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ThinningWork {
     /// Nodes of the hierarchy.
     pub nodes: u64,
     /// Points that a random number was spent on.
     pub candidates: u64,
-    /// Points accepted.
+    /// Number of points accepted.
     pub accepted: u64,
 }
 

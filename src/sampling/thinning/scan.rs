@@ -1,4 +1,4 @@
-//! Thinning by asking every point: the oracle, and what the hierarchy does where nearly all are
+//! Thinning by evaluating every point: the oracle, and what the hierarchy does where nearly all are
 //! accepted.
 
 use super::{Accepted, ThinningRule, ThinningWork, decide};

@@ -1,20 +1,21 @@
 //! Thinning by a hierarchy, exact in law.
 //!
-//! Points stand in the order of their Morton codes, so that a node is a range of them, with a box around
+//! Points are in the order of their Morton codes, so that a node is a range of them, with a box around
 //! it. A query descends from the root; where it stops at a node, with p_m = p(distance to its box), it
 //! draws candidates among the node's points at a rate q >= p_m, and accepts candidate i with probability
 //! p_i / q.
 //!
 //! Same law as independent Bernoulli(p_i):
-//!   1. The nodes at which a query stops depend on the query point, the tree and constants alone, not on random numbers,
-//!      and their ranges partition the points.
-//!   2. The candidates of a range are independent Bernoulli(q), made in one of two ways that p_m alone decides:
-//!      by gaps, q = p_m: floor(ln U / ln(1 - q)) is geometric with success q on 0, 1, ..., and independent geometric
-//!      gaps between successes are what a Bernoulli process has;
-//!      by words, q = ceil(256 p_m) / 256: bit by bit from the last binary digit of q, a random word is or-ed (digit 1)
-//!      or and-ed (digit 0) to the result, each of whose 64 bits is then 1 with probability (digit + before) / 2.
-//!   3. A candidate is accepted by a fresh number with p_i / q <= 1, as p does not increase and no point is nearer than
-//!      its box: independent Bernoulli(q p_i / q) = Bernoulli(p_i).
+//!   1. The nodes at which a query stops depend on the query point, the tree and constants alone, not on
+//!      random numbers, and their ranges partition the points.
+//!   2. The candidates of a range are independent Bernoulli(q), made in one of two ways that p_m alone
+//!      decides: by gaps, q = p_m: floor(ln U / ln(1 - q)) is geometric with success q on 0, 1, ..., and
+//!      independent geometric gaps between successes are what a Bernoulli process has; by words, q =
+//!      ceil(256 p_m) / 256: bit by bit from the last binary digit of q, a random word is or-ed
+//!      (digit 1) or and-ed (digit 0) to the result, each of whose 64 bits is then 1 with probability
+//!      (digit + before) / 2.
+//!   3. A candidate is accepted by a fresh number with p_i / q <= 1, as p does not increase and no point
+//!      is nearer than its box: independent Bernoulli(q p_i / q) = Bernoulli(p_i).
 //!   4. Different ranges use different numbers of the stream.
 
 use std::ops::Range;
@@ -39,7 +40,7 @@ const DIGITS: u32 = 8;
 pub struct PointTree {
     /// Coordinates, mm, in the order of the tree.
     axes: [Vec<f64>; 3],
-    /// Where each of them stood before.
+    /// The index that each of them had before.
     order: Vec<u32>,
     /// Depth first: a node's left child follows it.
     nodes: Vec<Node>,
@@ -73,7 +74,7 @@ impl PointTree {
         PointTree { axes, order, nodes }
     }
 
-    /// Where the point at each place of the tree stood before.
+    /// The index that the point at each place of the tree had before.
     pub fn order(&self) -> &[u32] {
         &self.order
     }

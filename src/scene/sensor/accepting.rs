@@ -14,7 +14,7 @@ pub struct Accepting {
     screen: Screen,
     /// Middle of the plane on which the image is sharp, mm.
     center: DVec3,
-    /// About the view.
+    /// Frame about the viewing direction.
     frame: Frame,
     /// Squared sine of the cap's half angle.
     sin2: f64,

@@ -27,7 +27,7 @@ pub use vertex::Vertex;
 use crate::geometry::{Ray, Side};
 use crate::math::DVec3;
 
-/// What is measured.
+/// Sensor of a scene: what is measured.
 #[derive(Clone, Debug)]
 pub enum Sensor {
     /// Parallel rays through the pixels of a screen.
@@ -65,7 +65,7 @@ macro_rules! call {
     };
 }
 
-/// What a kind of sensor says of itself; the methods of [`Sensor`] tell what each means.
+/// What a kind of sensor declares; the methods of [`Sensor`] document each.
 trait SensorKind {
     fn rays_per_pass(&self) -> usize;
 
@@ -158,23 +158,23 @@ impl Sensor {
     }
 }
 
-/// A ray of the sensor and what it counts.
+/// A ray of the sensor with its weight and slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorRay {
     /// The ray, against the flow of light.
     pub ray: Ray,
     /// Factor from radiance to the slot's unit, the mean over the slot's rays included.
     pub weight: f64,
-    /// Pixel or bin.
+    /// Index of the pixel or bin.
     pub slot: usize,
 }
 
 /// A sum of slots that tables speak of.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SensorRegion {
-    /// Its name.
+    /// Name of the region in observables.
     pub name: String,
-    /// Whether transport classes and lights are told apart.
+    /// Whether transport classes and lights are distinguished.
     pub split: bool,
     /// The pixels of an image's tile; none for any other region.
     pub tile: Option<PixelRectangle>,

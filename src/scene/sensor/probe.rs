@@ -7,7 +7,7 @@ use crate::math::DVec3;
 /// Radiance along one ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
-    /// The ray.
+    /// Ray along which radiance is measured.
     pub ray: Ray,
     /// Paths per pass.
     pub paths: usize,

@@ -6,9 +6,9 @@ use crate::math::DVec3;
 /// A rectangle of square pixels; row 0 at the top.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
-    /// Columns.
+    /// Number of columns, pixels.
     pub width: usize,
-    /// Rows.
+    /// Number of rows, pixels.
     pub height: usize,
     /// To the right by one pixel: mm, or at unit distance from a pinhole.
     pub right: DVec3,

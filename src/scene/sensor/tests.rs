@@ -69,7 +69,7 @@ fn directions_lie_in_their_bins() {
 }
 
 fn accepting(height: f64) -> Sensor {
-    // The screen is seen from below, turned, and stands in the body.
+    // The screen is seen from below, turned, and lies in the body.
     let view = DVec3::new(0.36, -0.48, 0.8);
     let right = view.cross(DVec3::Z).normalize();
     let screen = Screen {

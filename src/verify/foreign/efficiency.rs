@@ -11,7 +11,7 @@ use crate::stats::hypothesis::Estimate;
 use crate::stats::moments::Moments;
 use crate::stats::tree::Merge;
 
-/// Seeds below this say nothing about a variance.
+/// Fewer seeds than this give no variance.
 const MIN_SEEDS: usize = 4;
 
 /// Confidence of the interval.
@@ -20,13 +20,13 @@ const CONFIDENCE: f64 = 0.95;
 /// An interval wider than this factor either way decides nothing.
 const WIDEST: f64 = 2.0;
 
-/// One pixel's share of the spread above which its variance is one sample's affair.
+/// One pixel's share of the spread above which a single sample dominates the variance.
 const SHARE: f64 = 0.05;
 
 /// The ratio of costs at equal error: how much longer the other renderer takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ratio {
-    /// BandImages name.
+    /// Name of the band.
     pub band: String,
     /// (variance of a pixel's mean x seconds) of the images over that of the record, pixels averaged.
     pub ratio: f64,
@@ -36,11 +36,13 @@ pub struct Ratio {
     pub unresolved: Option<String>,
 }
 
-/// The ratio in every band, for a run of a cell. `seconds` are CPU seconds of all the images, and of the record's run.
+/// The ratio in every band, for a run of a cell. `seconds` are CPU seconds of all the images, and of the
+/// record's run.
 ///
-/// log V of the images is the pooled variance of their pixels, its error by a jackknife over seeds; of the
-/// record's, that of its pixels, its error by a jackknife over batches of the sum of its tiles' variances,
-/// which is the same sum of pixels. Seconds are taken as exact. t has K - 1 degrees of freedom.
+/// log V of the images is the pooled variance of their pixels, its error by a jackknife over seeds; of
+/// the record's, that of its pixels, its error by a jackknife over batches of the sum of its tiles'
+/// variances, which is the same sum of pixels. Seconds are taken as exact. t has K - 1 degrees of
+/// freedom.
 pub fn ratios(
     stored: &Stored,
     cell: usize,
@@ -71,7 +73,7 @@ pub fn ratios(
             let unresolved = if seeds < MIN_SEEDS {
                 Some(format!("{seeds} seeds; at least {MIN_SEEDS} are needed"))
             } else if !(log.value.is_finite() && log.std_error.is_finite()) {
-                Some("a side has no variance".into())
+                Some("a side has zero variance".into())
             } else if share > SHARE + 10.0 / pixels.len() as f64 {
                 Some(format!("one pixel holds {:.0} % of the images' spread", 100.0 * share))
             } else if interval[1] > WIDEST * found.ratio() {

@@ -22,7 +22,7 @@ pub struct Planes {
     pub seeds: Vec<Vec<Vec<f64>>>,
     /// Relative error of arithmetic and storage, the same in every seed.
     pub rounding: f64,
-    /// What a reader must know: which channel stands for which band, and what was not looked at.
+    /// What a reader must know: which channel is which band, and what was not compared.
     pub notes: Vec<String>,
 }
 
@@ -44,7 +44,7 @@ pub fn planes(
 ) -> Result<Planes> {
     if images.len() < 2 {
         return Err(Error::input_help(
-            "one image has no error: nothing can be said of its mean",
+            "one image has no error: its mean cannot be tested",
             "name two or more images of the same scene, rendered with different seeds",
         ));
     }
@@ -91,7 +91,7 @@ pub fn planes(
     let rounding = if images.iter().any(|(_, image)| image.has_half) { HALF } else { SINGLE };
     if rounding == HALF {
         notes.push(format!(
-            "stored as half floats: {:.2} % of a value are their error, whatever the seeds say",
+            "stored as half floats: {:.2} % of a value are their error, whatever the seeds' spread",
             100.0 * HALF
         ));
     }
@@ -128,7 +128,7 @@ fn channel(
         (Some(a), Some(b)) => {
             return Err(Error::input_help(
                 format!("{name}: both `{a}` and `{b}` could be band `{}`", band.name),
-                format!("say which: --channel {}={a}", band.name),
+                format!("state which: --channel {}={a}", band.name),
             ));
         }
         _ => {}
@@ -144,7 +144,7 @@ fn channel(
             }
             return Err(Error::input_help(
                 format!("{name}: R, G and B differ, and the record has the one band `{}`", band.name),
-                format!("render in one band, or say which channel it is: --channel {}=R", band.name),
+                format!("render in one band, or name its channel: --channel {}=R", band.name),
             ));
         }
     }
@@ -154,7 +154,7 @@ fn channel(
     ))
 }
 
-/// What stands for what, and what was left out, once for all images that are alike.
+/// Which channel is which band, and what was left out, once for all images that are alike.
 fn note(notes: &mut Vec<String>, image: &ExrImage, bands: &[Band], found: &[String]) {
     let renamed = bands.iter().zip(found).filter(|(band, channel)| band.name != **channel);
     let renamed: Vec<String> = renamed.map(|(b, c)| format!("channel {c} is band {}", b.name)).collect();

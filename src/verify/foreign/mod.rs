@@ -3,11 +3,11 @@
 //! What is tested, at one family-wise level over all bands (Holm):
 //! - the image mean and the tiles: the seeds' means against the record's batches, both with their
 //!   errors. By default a seed is one observation; where a user vouches for independent pixels, the
-//!   pixels' own spread says what a region's mean is worth, which has far more degrees of freedom;
+//!   pixels' own spread gives the error of a region's mean, which has far more degrees of freedom;
 //! - the squared bias of all pixels, from products of different seeds (`pixels::squared_bias`).
 //!
 //! Convention: row 0 is the top of the image and column 0 its left; OpenEXR files are read as their data
-//! window says, whatever the order of their lines. Values are radiance, linear, without exposure.
+//! window states, whatever the order of their lines. Values are radiance, linear, without exposure.
 
 use super::evidence::Evidence;
 use super::family::{Finding, conclude};
@@ -25,7 +25,7 @@ use crate::stats::tails::{chi_square_sf, normal_two_sided};
 pub mod efficiency;
 /// Images made elsewhere, as planes of a record's bands.
 pub mod images;
-/// Per pixel.
+/// Statistics per pixel.
 mod pixels;
 
 use images::Planes;
@@ -37,12 +37,13 @@ pub const LEVEL: f64 = 1e-4;
 /// One pixel of fewer than this many may well hold half of their spread.
 const FEW_PIXELS: usize = 64;
 
-/// The record disowns the user's word on independent pixels where their seeds' spread is less likely.
+/// The record contradicts the user's assertion of independent pixels where the seeds' spread is less
+/// likely than this.
 const SPREAD_LEVEL: f64 = 1e-6;
 
-/// What the images are held against, and how.
+/// What the images are compared with, and how.
 pub struct Question<'a> {
-    /// The record.
+    /// Record that the images are compared with.
     pub stored: &'a Stored,
     /// Index of the cell.
     pub cell: usize,
@@ -54,37 +55,37 @@ pub struct Question<'a> {
     pub level: f64,
     /// The smallest bias of an image mean that must not go unseen, relative to it.
     pub detect: f64,
-    /// The user vouches that the noise of one pixel says nothing of another's.
+    /// The user vouches that the noise of one pixel is independent of another's.
     pub independent_pixels: bool,
 }
 
 /// One band's pixels for a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PixelMap {
-    /// BandImages name.
+    /// Name of the band.
     pub band: String,
     /// Scores: differences in units of their error, as normal values.
     pub z: Vec<f64>,
     /// Theirs less ours, relative to ours; NaN where ours is 0.
     pub relative: Vec<f64>,
-    /// Mean over seeds.
+    /// Mean over seeds of each pixel.
     pub mean: Vec<f64>,
-    /// Its standard error.
+    /// Standard error of each pixel's mean.
     pub std_error: Vec<f64>,
 }
 
-/// What the images show.
+/// Result of judging the images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// One verdict a test.
     pub verdicts: Vec<Verdict>,
-    /// One map a band; none for a single class, of which the record has no pixels.
+    /// One map for each band; none for a single class, of which the record has no pixels.
     pub maps: Vec<PixelMap>,
     /// What a reader must know.
     pub notes: Vec<String>,
 }
 
-/// The run that a question is about.
+/// The run that images are compared with.
 ///
 /// # Errors
 /// No such estimator in the cell, or no image of it.
@@ -177,7 +178,7 @@ fn finite_or_nan(x: f64) -> f64 {
     if x.is_finite() { x } else { f64::NAN }
 }
 
-/// One band of a question.
+/// One band of the comparison.
 struct BandQuestion<'a> {
     question: &'a Question<'a>,
     band: &'a BandImages<'a>,
@@ -245,7 +246,7 @@ impl BandQuestion<'_> {
             finding.detect = Some(self.question.detect);
             if arm.mean.value == 0.0 && !matches!(finding.evidence, Evidence::Nothing(_)) {
                 finding.evidence =
-                    Evidence::Nothing("the record's image is black: nothing to hold".into());
+                    Evidence::Nothing("the record's image is black: there is nothing to compare".into());
             }
         }
         finding
@@ -293,7 +294,8 @@ impl BandQuestion<'_> {
             false => TestKind::TOfSeeds,
         });
         let (a, b) = (theirs.std_error, arm.mean.std_error);
-        // The fewer degrees of freedom bound the tails for every ratio of variances: see `BandImages::difference`.
+        // The fewer degrees of freedom bound the tails for every ratio of variances: see
+        // `BandImages::difference`.
         Evidence::of_difference(Estimate {
             value: theirs.value - arm.mean.value,
             std_error: (a * a + b * b).sqrt(),
@@ -357,7 +359,7 @@ impl BandQuestion<'_> {
         finding
     }
 
-    /// What a band's pixels look like.
+    /// Maps of a band's pixels.
     fn notes(&self, name: &str) -> Vec<String> {
         let judged = (0..self.band.ours.len()).filter(|&i| self.band.difference(i).std_error > 0.0);
         let z: Vec<f64> = judged.map(|i| self.band.z(i)).collect();

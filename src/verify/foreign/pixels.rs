@@ -1,4 +1,4 @@
-//! Per pixel: what the seeds say, scores against a record's pixels, and one test of all of them.
+//! Per pixel: moments of the seeds, scores against a record's pixels, and one test of all of them.
 
 use super::images::Planes;
 use crate::results::image::Picture;
@@ -15,7 +15,7 @@ const LARGEST_Z: f64 = 37.0;
 pub(super) struct BandImages<'a> {
     pub width: usize,
     pub height: usize,
-    /// `[seed][pixel]`.
+    /// Values of the images, `[seed][pixel]`.
     pub theirs: Vec<&'a [f64]>,
     /// The record's mean and standard error.
     pub ours: Vec<f64>,
@@ -65,9 +65,9 @@ impl<'a> BandImages<'a> {
     }
 
     /// The difference at a pixel with both errors. It has the fewer of both sides' degrees of freedom:
-    /// with these Student's t bounds the tails for every ratio of the two variances (M. Mickey, M. Brown,
-    /// "Bounds on the distribution functions of the Behrens-Fisher statistic", 1966). The number that
-    /// Satterthwaite estimates is too large where a few seeds agree by chance.
+    /// with these Student's t bounds the tails for every ratio of the two variances (M. Mickey, M.
+    /// Brown, "Bounds on the distribution functions of the Behrens-Fisher statistic", 1966). The number
+    /// that Satterthwaite estimates is too large where a few seeds agree by chance.
     pub fn difference(&self, pixel: usize) -> Estimate {
         let (a, b) = (self.std_error(pixel), self.ours_error[pixel]);
         let dof = self.ours_dof.min(self.seeds() - 1.0);
@@ -75,8 +75,8 @@ impl<'a> BandImages<'a> {
         Estimate { value, std_error: (a * a + b * b).sqrt(), dof }
     }
 
-    /// The score of a pixel: the normal value with the p-value and sign of its t test; 0 where both sides
-    /// are the same, without any error.
+    /// The score of a pixel: the normal value with the p-value and sign of its t test; 0 where both
+    /// sides are the same, without any error.
     pub fn z(&self, pixel: usize) -> f64 {
         let difference = self.difference(pixel);
         if difference.value == 0.0 {
@@ -120,9 +120,9 @@ impl<'a> BandImages<'a> {
 
 /// The mean over pixels of the squared bias, its noise, and the statistic that tests it.
 pub(super) struct SquaredBias {
-    /// Unbiased: below 0 where there is none and chance has it so.
+    /// Unbiased: may be below 0 by chance where there is no bias.
     pub mean: f64,
-    /// Standard deviation of that where there is no bias.
+    /// Standard deviation of the estimate without bias.
     pub noise: f64,
     /// Number of blocks that hold anything.
     pub terms: f64,
@@ -132,10 +132,10 @@ pub(super) struct SquaredBias {
 ///
 /// With x_k the value of seed k, m the record's with error s, d_k = x_k - m and bias b:
 /// E[d_k d_l] = b^2 + E[s^2] for k != l, whatever the distributions, since the seeds are independent of
-/// each other and of the record. So u = mean over k != l of d_k d_l, less s^2, has expectation b^2 at every
-/// pixel, and no estimated variance of a few seeds enters it. The sums of u over 8 x 8 blocks of the image
-/// are independent where noise does not reach across blocks, and symmetric about 0 without bias up to
-/// the skewness of s^2. A bias as small as the other renderer's rounding is taken off too.
+/// each other and of the record. So u = mean over k != l of d_k d_l, less s^2, has expectation b^2 at
+/// every pixel, and no estimated variance of a few seeds enters it. The sums of u over 8 x 8 blocks of
+/// the image are independent where noise does not reach across blocks, and symmetric about 0 without
+/// bias up to the skewness of s^2. A bias as small as the other renderer's rounding is taken off too.
 pub(super) fn squared_bias(band: &BandImages) -> SquaredBias {
     let seeds = band.seeds();
     let mut blocks = vec![0.0; BLOCKS * BLOCKS];

@@ -149,8 +149,9 @@ fn ordinary_ends_turn_with_the_scene() {
 }
 
 /// The exitance of the fluence phi of the source, C_phi phi - C_E D n.grad phi, by differences: S' is
-/// that over pi 4 C_phi(1/eta) per power, for an exit that looks away so that nothing is corrected but
-/// the distance, which the table has; here the virtual source, which uses its own distance throughout.
+/// that over pi 4 C_phi(1/eta) per power, for an exit that looks away so that nothing is corrected
+/// except the distance, which the table has; here the virtual source, which uses its own distance
+/// throughout.
 #[test]
 fn the_kernel_is_the_exitance_of_the_rays_fluence() {
     let reduced = Reduced::new(0.032, 0.74);

@@ -3,7 +3,7 @@
 use super::super::{Better, Classical, FresnelMoments, GaussianFit, Gaussians, Reduced, Term, fit};
 use crate::optics::materials::MATERIALS;
 
-/// More Gaussians fit better, the integral is kept, and six are as close as the module says.
+/// More Gaussians fit better, the integral is kept, and six are as close as the module states.
 #[test]
 fn fits_of_dipoles() {
     for material in &MATERIALS {

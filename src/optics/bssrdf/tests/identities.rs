@@ -131,7 +131,7 @@ fn far_fields_fall_with_sigma_tr() {
     }
 }
 
-/// Ends exchanged: all but the directional dipole are functions of distance.
+/// Ends exchanged: all except the directional dipole are functions of distance.
 #[test]
 fn reciprocity() {
     let (entry, exit) = ends(1.0);

@@ -6,7 +6,7 @@ fn model(text: &str) -> Result<Model, serde_json::Error> {
     serde_json::from_str(text)
 }
 
-/// Every word means what it says, and what is left out is exact, plain, the searchlight, six terms.
+/// Every key is taken as written, and a missing key is exact, plain, the searchlight, six terms.
 #[test]
 fn words_of_every_model() {
     let exact = MomentKind::Exact;

@@ -1,4 +1,4 @@
-//! Plays of defects: child processes, as many at once as there are cores, and what their verdicts were.
+//! Runs of defects: child processes, as many at once as there are cores, and their verdicts.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -16,25 +16,25 @@ use scatterproof::results::record::Band;
 
 use super::defects::{Family, Planted};
 
-/// What `verify` said of one defect with one seed.
+/// Output of `verify` on one defect with one seed.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Exit code; -1 where a signal ended it.
     pub exit: i32,
     /// Tests, and what each saw: the worst of its verdicts.
     pub tests: BTreeMap<String, Seen>,
-    /// What it wrote, for people.
+    /// Its printed output.
     pub said: String,
     /// Wall time, seconds.
     pub seconds: f64,
 }
 
-/// What a test saw.
+/// Result of a test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Seen {
-    /// Nothing.
+    /// The test passed: it saw no defect.
     Green,
-    /// Nothing, and too little for what its claim wants: no evidence of a defect either.
+    /// Underpowered: no evidence of a defect either.
     Underpowered,
     /// A failure, or that the record is worth nothing.
     Defect,
@@ -47,7 +47,7 @@ impl Outcome {
         caught.map(|(name, _)| name.as_str()).collect()
     }
 
-    /// `verify` came to a verdict, whatever it is.
+    /// Whether `verify` reached a verdict.
     pub fn is_verdict(&self) -> bool {
         matches!(self.exit, 0 | 1 | 3) && !self.tests.is_empty()
     }
@@ -77,10 +77,10 @@ const EXPERIMENTS: [(Family, &str, &str); 15] = [
     (Family::Cloud, "faces.toml", include_str!("faces.toml")),
 ];
 
-/// Those on samplers.
+/// Names of the experiments on samplers.
 const ON_SAMPLERS: [&str; 3] = ["samplers", "acceptance", "thinning"];
 
-/// A sky of 8 x 4 texels, dim but for one next to the zenith.
+/// A sky of 8 x 4 texels, dim except one next to the zenith.
 fn write_sky(path: &Path) {
     let bands = [Band { name: "R".into(), range_nm: None, display_rgb: [1.0; 3] }];
     let mut texels = vec![0.1; 64];
@@ -88,8 +88,8 @@ fn write_sky(path: &Path) {
     write_exr(path, &Picture::new(&bands, &Array::new(vec![2, 4, 8, 1], texels)), &[]).expect("a sky");
 }
 
-/// Plays every (defect, number of the seed), and tells of each as it ends.
-pub fn all(plays: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcome)) {
+/// Runs every pair (defect, number of the seed) and reports each as it ends.
+pub fn all(runs: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcome)) {
     let folder = tempfile::tempdir().expect("a folder");
     for (_, name, text) in EXPERIMENTS {
         fs::write(folder.path().join(name), text).expect("an experiment");
@@ -106,23 +106,23 @@ pub fn all(plays: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcom
             scope.spawn(move || {
                 loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some((row, seed)) = plays.get(index) else { return };
-                    let outcome = play(row, *seed, folder, index);
-                    send.send((index, outcome)).expect("somebody listens");
+                    let Some((row, seed)) = runs.get(index) else { return };
+                    let outcome = run(row, *seed, folder, index);
+                    send.send((index, outcome)).expect("a receiver");
                 }
             });
         }
         drop(send);
         for (index, outcome) in receive {
-            let (row, seed) = &plays[index];
+            let (row, seed) = &runs[index];
             tell(row, *seed, &outcome);
         }
     });
 }
 
-/// One play: in a child process `verify` on the experiments of the defect's family, and its identities.
-fn play(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
-    let out = folder.join(format!("play-{index}"));
+/// One run: in a child process `verify` on the experiments of the defect's family, and its identities.
+fn run(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
+    let out = folder.join(format!("run-{index}"));
     let verdicts = out.with_extension("csv");
     let mut command = Command::new(std::env::current_exe().expect("this program"));
     command.args(["defect", row.name]);
