@@ -45,11 +45,11 @@ pub struct Compared {
     pub changes: Vec<String>,
     /// One verdict a quantity that both hold.
     pub verdicts: Vec<Verdict>,
-    /// WorkChange of every run that both hold.
+    /// Change of work of every run that both hold.
     pub work: Vec<WorkChange>,
 }
 
-/// WorkChange and its worth, second record over first.
+/// Work and its worth, second record over first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkChange {
     /// Cell label.
