@@ -90,7 +90,8 @@ pub mod samplers;
 pub mod estimators;
 
 /// Closed forms that tests compare with: a value and its stated error.
-pub mod reference;
+#[cfg(test)]
+mod reference;
 
 /// Moments, hypothesis tests, multiple testing.
 pub mod stats;

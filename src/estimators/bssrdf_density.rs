@@ -23,9 +23,9 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::bssrdf_single::{adds_single, score_single};
+use super::bssrdf_single::score_single;
 use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
-use super::illumination::{Entrance, Illumination};
+use super::illumination::Entrance;
 use super::{
     BandUse, Bias, Bodies, Cost, Estimator, EstimatorKind, Scores, Serves, TransportClass, read_options,
 };
@@ -60,12 +60,9 @@ pub struct DensityOptions {
 #[derive(Debug)]
 pub struct BssrdfDensity {
     bssrdf: BssrdfScene,
-    illumination: Illumination,
     sampler: BodySampler,
     samples: usize,
     radius: Option<f64>,
-    single: bool,
-    model: String,
 }
 
 impl BssrdfDensity {
@@ -87,22 +84,14 @@ impl BssrdfDensity {
         BssrdfDensity::KIND.check(&scene)?;
         let sampler = BodySampler::new(&scene.shape, FaceChoice::Area)
             .ok_or_else(|| Error::input("bssrdf_density needs a finite body"))?;
-        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
+        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight, options.single)?;
         if bssrdf.models.iter().any(|model| model.needs_directions()) {
             return Err(Error::input_help(
                 "bssrdf_density stores irradiance, which has lost the direction of light that this model needs",
                 "use bssrdf_probe or point_cloud",
             ));
         }
-        Ok(BssrdfDensity {
-            illumination: Illumination::new(&bssrdf.scene),
-            sampler,
-            samples: options.samples,
-            radius: options.radius,
-            single: adds_single(&bssrdf, options.single),
-            model: options.model.to_string(),
-            bssrdf,
-        })
+        Ok(BssrdfDensity { bssrdf, sampler, samples: options.samples, radius: options.radius })
     }
 
     /// Points of one pass with their irradiance.
@@ -131,7 +120,7 @@ impl BssrdfDensity {
         let hit = Hit { t: 0.0, point, normal, shading_normal, face };
         let mut last: Option<(DVec3, bool)> = None;
         for band in 0..scene.bands() {
-            let Some(arrival) = self.illumination.draw(scene, band, u) else { continue };
+            let Some(arrival) = self.bssrdf.illumination.draw(scene, band, u) else { continue };
             let eta = self.bssrdf.eta[band];
             let Some(entrance) = Entrance::at(&hit, arrival.wi, eta, scores) else { continue };
             let is_lit = match last {
@@ -197,13 +186,7 @@ struct StoredPoints {
 impl Estimator for BssrdfDensity {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         let stored = self.store(key, scores);
-        for group in self.bssrdf.groups_among(bands) {
-            for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(&self.bssrdf, key, index, &group);
-                let mut sum = Sum { estimator: self, stored: &stored, streams };
-                self.bssrdf.trace(&group, index, key, scores, &mut sum);
-            }
-        }
+        self.bssrdf.pass(bands, key, scores, |_| Sum { estimator: self, stored: &stored });
     }
 
     fn band_use(&self) -> BandUse {
@@ -211,7 +194,7 @@ impl Estimator for BssrdfDensity {
     }
 
     fn model(&self) -> Option<String> {
-        Some(self.model.clone())
+        Some(self.bssrdf.model.clone())
     }
 
     fn bias(&self) -> Bias {
@@ -235,15 +218,12 @@ impl Estimator for BssrdfDensity {
 struct Sum<'a> {
     estimator: &'a BssrdfDensity,
     stored: &'a StoredPoints,
-    streams: PathStreams,
 }
 
 impl Gather for Sum<'_> {
-    fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let BssrdfDensity { bssrdf, illumination, sampler, single, .. } = self.estimator;
-        if *single {
-            score_single(bssrdf, illumination, emergence, &mut self.streams.single, scores);
-        }
+    fn gather(&mut self, emergence: &Emergence<'_>, streams: &mut PathStreams, scores: &mut Scores) {
+        let BssrdfDensity { bssrdf, sampler, .. } = self.estimator;
+        score_single(bssrdf, emergence, &mut streams.single, scores);
         let StoredPoints { points, irradiance, stride } = self.stored;
         let bands = bssrdf.scene.bands();
         let area = sampler.area() / points.len() as f64;

@@ -22,9 +22,8 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::bssrdf_single::{adds_single, score_single};
+use super::bssrdf_single::score_single;
 use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
-use super::illumination::Illumination;
 use super::{Anomaly, BandUse, Bias, Cost, Estimator, EstimatorKind, Scores, Serves, read_options};
 use crate::error::Result;
 use crate::geometry::{Hit, Lines};
@@ -59,10 +58,7 @@ pub struct ProbeOptions {
 pub struct BssrdfProbe {
     bssrdf: BssrdfScene,
     lines: Lines,
-    illumination: Illumination,
     probes: usize,
-    single: bool,
-    model: String,
     reach: Option<f64>,
 }
 
@@ -82,16 +78,13 @@ impl BssrdfProbe {
     /// A scene that it does not serve; a medium that the model does not fit.
     pub fn new(scene: Arc<Scene>, options: &ProbeOptions) -> Result<BssrdfProbe> {
         BssrdfProbe::KIND.check(&scene)?;
-        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
+        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight, options.single)?;
         Ok(BssrdfProbe {
             lines: Lines::new(
                 &bssrdf.scene.shape,
                 bssrdf.models.iter().map(|model| model.techniques()).collect(),
             ),
-            illumination: Illumination::new(&bssrdf.scene),
             probes: options.probes,
-            single: adds_single(&bssrdf, options.single),
-            model: options.model.to_string(),
             reach: options.reach,
             bssrdf,
         })
@@ -100,13 +93,7 @@ impl BssrdfProbe {
 
 impl Estimator for BssrdfProbe {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
-        for group in self.bssrdf.groups_among(bands) {
-            for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(&self.bssrdf, key, index, &group);
-                let mut gather = Probing { estimator: self, streams, hits: Vec::new() };
-                self.bssrdf.trace(&group, index, key, scores, &mut gather);
-            }
-        }
+        self.bssrdf.pass(bands, key, scores, |_| Probing { estimator: self, hits: Vec::new() });
     }
 
     fn band_use(&self) -> BandUse {
@@ -114,7 +101,7 @@ impl Estimator for BssrdfProbe {
     }
 
     fn model(&self) -> Option<String> {
-        Some(self.model.clone())
+        Some(self.bssrdf.model.clone())
     }
 
     fn bias(&self) -> Bias {
@@ -131,21 +118,17 @@ impl Estimator for BssrdfProbe {
 
 struct Probing<'a> {
     estimator: &'a BssrdfProbe,
-    streams: PathStreams,
     hits: Vec<Hit>,
 }
 
 impl Gather for Probing<'_> {
-    fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let BssrdfProbe { bssrdf, lines, illumination, probes, single, reach, .. } = self.estimator;
-        if *single {
-            score_single(bssrdf, illumination, emergence, &mut self.streams.single, scores);
-        }
+    fn gather(&mut self, emergence: &Emergence<'_>, streams: &mut PathStreams, scores: &mut Scores) {
+        let BssrdfProbe { bssrdf, lines, probes, reach } = self.estimator;
+        score_single(bssrdf, emergence, &mut streams.single, scores);
         let frame = Frame::about(emergence.exit.normal);
         let reach = reach.unwrap_or(f64::INFINITY);
         for _ in 0..*probes {
-            let line =
-                lines.draw(emergence.exit.point, &frame, emergence.bands, &mut self.streams.entries);
+            let line = lines.draw(emergence.exit.point, &frame, emergence.bands, &mut streams.entries);
             if line.radius > reach {
                 continue; // all its points are too far
             }
@@ -156,13 +139,13 @@ impl Gather for Probing<'_> {
                 scores.note(Anomaly::LostRay);
             }
             for hit in &self.hits {
-                let u = self.streams.lights.draw3();
+                let u = streams.lights.draw3();
                 let offset = hit.point - emergence.exit.point;
                 if offset.length() > reach {
                     continue;
                 }
                 let pdf_area = lines.pdf_area(emergence.bands, &frame, offset, hit.normal);
-                illumination.enter(bssrdf, emergence, hit, *probes as f64 * pdf_area, u, scores);
+                bssrdf.enter(emergence, hit, *probes as f64 * pdf_area, u, scores);
             }
         }
     }

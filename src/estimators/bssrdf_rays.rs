@@ -16,9 +16,8 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::bssrdf_single::{adds_single, score_single};
+use super::bssrdf_single::score_single;
 use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
-use super::illumination::Illumination;
 use super::{Anomaly, BandUse, Bias, Cost, Estimator, EstimatorKind, Scores, Serves, read_options};
 use crate::error::Result;
 use crate::geometry::{Mesh, Ray, Shape, Side};
@@ -56,11 +55,8 @@ pub struct RayOptions {
 #[derive(Debug)]
 pub struct BssrdfRays {
     bssrdf: BssrdfScene,
-    illumination: Illumination,
     rays: usize,
     depth: Option<f64>,
-    single: bool,
-    model: String,
     sees_all: bool,
 }
 
@@ -80,13 +76,10 @@ impl BssrdfRays {
     /// A scene that it does not serve; a medium that the model does not fit.
     pub fn new(scene: Arc<Scene>, options: &RayOptions) -> Result<BssrdfRays> {
         BssrdfRays::KIND.check(&scene)?;
-        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
+        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight, options.single)?;
         Ok(BssrdfRays {
-            illumination: Illumination::new(&bssrdf.scene),
             rays: options.rays,
             depth: options.depth,
-            single: adds_single(&bssrdf, options.single),
-            model: options.model.to_string(),
             sees_all: match &*bssrdf.scene.shape {
                 Shape::Mesh(mesh) => is_convex(mesh),
                 shape => shape.is_convex(),
@@ -128,14 +121,8 @@ fn is_convex(mesh: &Mesh) -> bool {
 
 impl Estimator for BssrdfRays {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
-        for group in self.bssrdf.groups_among(bands) {
-            let depth = self.depth(&group);
-            for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(&self.bssrdf, key, index, &group);
-                let mut gather = Shooting { estimator: self, streams, depth };
-                self.bssrdf.trace(&group, index, key, scores, &mut gather);
-            }
-        }
+        let shooting = |group: &[usize]| Shooting { estimator: self, depth: self.depth(group) };
+        self.bssrdf.pass(bands, key, scores, shooting);
     }
 
     fn band_use(&self) -> BandUse {
@@ -143,7 +130,7 @@ impl Estimator for BssrdfRays {
     }
 
     fn model(&self) -> Option<String> {
-        Some(self.model.clone())
+        Some(self.bssrdf.model.clone())
     }
 
     fn bias(&self) -> Bias {
@@ -161,21 +148,18 @@ impl Estimator for BssrdfRays {
 
 struct Shooting<'a> {
     estimator: &'a BssrdfRays,
-    streams: PathStreams,
     depth: f64,
 }
 
 impl Gather for Shooting<'_> {
-    fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let BssrdfRays { bssrdf, illumination, rays, single, .. } = self.estimator;
-        if *single {
-            score_single(bssrdf, illumination, emergence, &mut self.streams.single, scores);
-        }
+    fn gather(&mut self, emergence: &Emergence<'_>, streams: &mut PathStreams, scores: &mut Scores) {
+        let BssrdfRays { bssrdf, rays, .. } = self.estimator;
+        score_single(bssrdf, emergence, &mut streams.single, scores);
         let Some(origin) = self.below(emergence, scores) else { return };
         let shape = &bssrdf.scene.shape;
         for _ in 0..*rays {
-            let u = self.streams.entries.draw2();
-            let u_light = self.streams.lights.draw3();
+            let u = streams.entries.draw2();
+            let u_light = streams.lights.draw3();
             let ray = Ray { origin, dir: square_to_cap(2.0, u) };
             scores.count(Cost::Rays);
             let Some(hit) = shape.intersect(&ray, Side::Inside, None, f64::INFINITY) else {
@@ -185,7 +169,7 @@ impl Gather for Shooting<'_> {
                 continue;
             };
             let pdf_area = pdf_cap(2.0) * ray.dir.dot(hit.normal).abs() / (hit.t * hit.t);
-            illumination.enter(bssrdf, emergence, &hit, *rays as f64 * pdf_area, u_light, scores);
+            bssrdf.enter(emergence, &hit, *rays as f64 * pdf_area, u_light, scores);
         }
     }
 }

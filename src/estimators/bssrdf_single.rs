@@ -20,26 +20,23 @@
 //! refracted with that probability.
 
 use super::emergence::{BssrdfScene, Emergence};
-use super::illumination::{Entrance, Illumination};
+use super::illumination::Entrance;
 use super::{Anomaly, Cost, Scores, TransportClass};
 use crate::geometry::{Ray, Side};
 use crate::math::DVec3;
 use crate::sampling::distance::{sample_exponential, transmittance};
 use crate::sampling::stream::Stream;
 
-/// Whether single scattering is added to a model.
-pub(super) fn adds_single(bssrdf: &BssrdfScene, wanted: Option<bool>) -> bool {
-    wanted.unwrap_or_else(|| bssrdf.models.iter().any(|model| model.leaves_out_single))
-}
-
-/// Scores the term once per emergence and band.
+/// Scores the term once per emergence and band, where it is added.
 pub(super) fn score_single(
     bssrdf: &BssrdfScene,
-    illumination: &Illumination,
     emergence: &Emergence<'_>,
     stream: &mut Stream,
     scores: &mut Scores,
 ) {
+    if !bssrdf.single {
+        return;
+    }
     let u = stream.draw();
     let u_light = stream.draw3();
     let shape = &bssrdf.scene.shape;
@@ -55,7 +52,7 @@ pub(super) fn score_single(
         scores.count(Cost::MediumEvents);
         let vertex = ray.at(t);
         if let Some(Scattered { light, entry, value }) =
-            scattered(bssrdf, illumination, emergence, band, vertex, u_light, scores)
+            scattered(bssrdf, emergence, band, vertex, u_light, scores)
         {
             let slot = bssrdf.scene.sensor.slot_of(emergence.slot, entry);
             scores.add(slot, band, TransportClass::Single, light, throughput * value);
@@ -76,7 +73,6 @@ struct Scattered {
 /// out.
 fn scattered(
     bssrdf: &BssrdfScene,
-    illumination: &Illumination,
     emergence: &Emergence<'_>,
     band: usize,
     vertex: DVec3,
@@ -84,7 +80,7 @@ fn scattered(
     scores: &mut Scores,
 ) -> Option<Scattered> {
     let scene = &*bssrdf.scene;
-    let arrival = illumination.draw(scene, band, u)?;
+    let arrival = bssrdf.illumination.draw(scene, band, u)?;
     let to_light = Ray { origin: vertex, dir: arrival.wi };
     scores.count(Cost::Rays);
     let Some(hit) = scene.shape.intersect(&to_light, Side::Inside, None, f64::INFINITY) else {
@@ -144,8 +140,7 @@ mod tests {
                 });
                 let mut scores = Scores::new(Layout::new(&scene));
                 let model = Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
-                let bssrdf = BssrdfScene::new(scene, &model, true).expect("a model");
-                let illumination = Illumination::new(&bssrdf.scene);
+                let bssrdf = BssrdfScene::new(scene, &model, true, None).expect("a model");
                 let emergence = Emergence {
                     exit,
                     face: FaceId(0),
@@ -157,8 +152,7 @@ mod tests {
                 };
                 let mut at = |t: f64| {
                     let vertex = exit.point + dir * t;
-                    let drawn =
-                        scattered(&bssrdf, &illumination, &emergence, 0, vertex, [0.5; 3], &mut scores);
+                    let drawn = scattered(&bssrdf, &emergence, 0, vertex, [0.5; 3], &mut scores);
                     pdf_distance_exponential(3.0, t) * drawn.map_or(0.0, |drawn| drawn.value)
                 };
                 let mean = integrate(&mut at, 0.0, 15.0, 1e-13).value;

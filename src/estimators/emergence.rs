@@ -14,13 +14,14 @@
 use std::sync::Arc;
 
 use super::choice::{choose_light, light_shares};
+use super::illumination::{Entrance, Illumination};
 use super::walk::unscattered_notes;
 use super::{Anomaly, Cost, Scores, TransportClass};
 use crate::error::{Error, Result};
 use crate::geometry::{FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
-use crate::optics::bssrdf::{Bssrdf, Exit, Model};
+use crate::optics::bssrdf::{Bssrdf, Entry, Exit, Model};
 use crate::optics::fresnel::fresnel;
 use crate::sampling::distance::transmittance;
 use crate::sampling::stream::{PassKey, Purpose, Stream};
@@ -30,7 +31,9 @@ use crate::scene::Scene;
 #[derive(Debug)]
 pub(super) struct BssrdfScene {
     pub scene: Arc<Scene>,
-    /// BSSRDF model of each band.
+    /// The model's name.
+    pub model: String,
+    /// Per band.
     pub models: Vec<Bssrdf>,
     /// Per band: index inside over outside.
     pub eta: Vec<f64>,
@@ -38,6 +41,9 @@ pub(super) struct BssrdfScene {
     pub groups: Vec<Vec<usize>>,
     /// Whether light that goes straight through is followed.
     pub straight: bool,
+    /// Whether single scattering is added by sampling.
+    pub single: bool,
+    pub illumination: Illumination,
     /// Probability of choosing each light, the mean over the bands.
     choice: Vec<f64>,
 }
@@ -80,7 +86,7 @@ const SINGLE: u64 = 1 << 63;
 
 impl PathStreams {
     /// For path `index` of a pass and a group of bands.
-    pub fn new(bssrdf: &BssrdfScene, key: &PassKey, index: usize, bands: &[usize]) -> PathStreams {
+    fn new(bssrdf: &BssrdfScene, key: &PassKey, index: usize, bands: &[usize]) -> PathStreams {
         let lane = bssrdf.lane(index, bands);
         PathStreams {
             lights: key.stream(lane, Purpose::Light),
@@ -94,18 +100,25 @@ impl PathStreams {
 pub(super) trait Gather {
     /// Scores what arrives at the exit from the rest of the surface: the integral of K T12 L |cos|,
     /// times the path's throughput.
-    fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores);
+    fn gather(&mut self, emergence: &Emergence<'_>, streams: &mut PathStreams, scores: &mut Scores);
 }
 
 /// Weight of a straight path below which roulette decides.
 const ROULETTE: f64 = 0.05;
 
 impl BssrdfScene {
-    /// For a scene with smooth or matched boundaries, as [`super::Serves::BSSRDF`] has it.
+    /// For a scene with smooth or matched boundaries, as [`super::Serves::BSSRDF`] has it. Unless told
+    /// otherwise, it adds single scattering where the model leaves it out.
     ///
     /// # Errors
     /// A medium that the model does not fit.
-    pub fn new(scene: Arc<Scene>, model: &Model, straight: bool) -> Result<BssrdfScene> {
+    pub fn new(
+        scene: Arc<Scene>,
+        model: &Model,
+        straight: bool,
+        single: Option<bool>,
+    ) -> Result<BssrdfScene> {
+        let name = model.to_string();
         let eta: Vec<f64> = scene.boundary.iter().map(Boundary::eta).collect();
         let bands = eta.len();
         let models = scene.medium.iter().zip(&eta).enumerate();
@@ -123,7 +136,19 @@ impl BssrdfScene {
         let mean =
             |light: usize| shares.iter().map(|band| band[light]).sum::<f64>() / shares.len() as f64;
         let choice = (0..scene.lights.len()).map(mean).collect();
-        Ok(BssrdfScene { models, eta, groups, straight, choice, scene })
+        let single = single.unwrap_or_else(|| models.iter().any(|model| model.leaves_out_single));
+        let illumination = Illumination::new(&scene);
+        Ok(BssrdfScene {
+            model: name,
+            models,
+            eta,
+            groups,
+            straight,
+            single,
+            illumination,
+            choice,
+            scene,
+        })
     }
 
     /// A light for all bands, and the probability of that choice.
@@ -134,19 +159,52 @@ impl BssrdfScene {
 
     /// The index of a path's streams: each group of bands has its own.
     #[inline]
-    pub fn lane(&self, index: usize, bands: &[usize]) -> u64 {
+    fn lane(&self, index: usize, bands: &[usize]) -> u64 {
         index as u64 * self.eta.len() as u64 + bands[0] as u64
     }
 
     /// The groups of bands, as far as they are among `bands`.
-    pub fn groups_among(&self, bands: &[usize]) -> Vec<Vec<usize>> {
+    fn groups_among(&self, bands: &[usize]) -> Vec<Vec<usize>> {
         let among = |group: &Vec<usize>| -> Vec<usize> {
             group.iter().copied().filter(|band| bands.contains(band)).collect()
         };
         self.groups.iter().map(among).filter(|group| !group.is_empty()).collect()
     }
 
-    /// Notes on light that camera paths cannot find.
+    /// Scores, for one light sample per band, what enters at `hit` and leaves at the emergence.
+    /// `pdf_area` is the density of the entry point, 1/mm^2, times the number of points that are drawn
+    /// so.
+    ///
+    /// Bands whose light samples are the same direction share its shadow ray.
+    pub fn enter(
+        &self,
+        emergence: &Emergence<'_>,
+        hit: &Hit,
+        pdf_area: f64,
+        u: [f64; 3],
+        scores: &mut Scores,
+    ) {
+        let scene = &*self.scene;
+        let slot = scene.sensor.slot_of(emergence.slot, hit.point);
+        let mut last: Option<(DVec3, Option<Entrance>)> = None;
+        for (&band, throughput) in emergence.bands.iter().zip(emergence.throughput) {
+            let Some(arrival) = self.illumination.draw(scene, band, u) else { continue };
+            let entrance = match last {
+                Some((wi, entrance)) if wi == arrival.wi => entrance,
+                _ => Entrance::lit(scene, hit, arrival.wi, emergence.eta, scores),
+            };
+            last = Some((arrival.wi, entrance));
+            let Some(entrance) = entrance else { continue };
+            let entry = Entry { point: hit.point, normal: hit.shading_normal, dir: entrance.dir };
+            scores.count(Cost::Evaluations);
+            let kernel = self.models[band].kernel(&entry, &emergence.exit);
+            let irradiance = entrance.transmittance * entrance.cos * arrival.value;
+            let value = throughput * kernel * irradiance / pdf_area;
+            scores.add(slot, band, TransportClass::Multiple, arrival.light, value);
+        }
+    }
+
+    /// What camera paths cannot find.
     pub fn notes(&self) -> Vec<String> {
         let parallel = self.scene.lights.iter().filter(|light| light.is_directional());
         parallel
@@ -162,8 +220,25 @@ impl BssrdfScene {
             .collect()
     }
 
+    /// Traces the camera paths of a pass: all of the sensor's for each group of bands, with what
+    /// `gather_in` makes for that group.
+    pub fn pass<G: Gather>(
+        &self,
+        bands: &[usize],
+        key: &PassKey,
+        scores: &mut Scores,
+        gather_in: impl Fn(&[usize]) -> G,
+    ) {
+        for group in self.groups_among(bands) {
+            let mut gather = gather_in(&group);
+            for index in 0..self.scene.sensor.rays_per_pass() {
+                self.trace(&group, index, key, scores, &mut gather);
+            }
+        }
+    }
+
     /// Traces path `index` of a pass for one group of bands.
-    pub fn trace(
+    fn trace(
         &self,
         bands: &[usize],
         index: usize,
@@ -186,6 +261,7 @@ impl BssrdfScene {
             from: None,
             has_met: false,
             stream: key.stream(self.lane(index, bands), Purpose::Walk),
+            streams: PathStreams::new(self, key, index, bands),
         };
         scores.count(Cost::Paths);
         while path.step(scores, gather).is_some() {}
@@ -204,6 +280,7 @@ struct CameraPath<'a> {
     from: Option<FaceId>,
     has_met: bool,
     stream: Stream,
+    streams: PathStreams,
 }
 
 impl CameraPath<'_> {
@@ -241,7 +318,7 @@ impl CameraPath<'_> {
             throughput: &self.throughput,
             slot: self.slot,
         };
-        gather.gather(&emergence, scores);
+        gather.gather(&emergence, &mut self.streams, scores);
         if self.bssrdf.straight { self.go_through(scores) } else { None }
     }
 

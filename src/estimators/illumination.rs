@@ -2,11 +2,9 @@
 //! part that all ways of choosing the point share.
 
 use super::choice::{choose_light, light_shares};
-use super::emergence::{BssrdfScene, Emergence};
-use super::{Anomaly, Cost, Scores, TransportClass};
+use super::{Anomaly, Cost, Scores};
 use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, Frame};
-use crate::optics::bssrdf::Entry;
 use crate::optics::fresnel::fresnel;
 use crate::scene::Scene;
 
@@ -40,40 +38,6 @@ impl Illumination {
         let sample = scene.lights[light].sample(band, [u[1], u[2]]);
         let value = sample.radiance / (choice * sample.pdf.unwrap_or(1.0));
         Some(Arrival { light, wi: sample.wi, value })
-    }
-
-    /// Scores, for one light sample per band, what enters at `hit` and leaves at the emergence.
-    /// `pdf_area` is the density of the entry point, 1/mm^2, times the number of points that are drawn
-    /// so.
-    ///
-    /// Bands whose light samples are the same direction share its shadow ray.
-    pub fn enter(
-        &self,
-        bssrdf: &BssrdfScene,
-        emergence: &Emergence<'_>,
-        hit: &Hit,
-        pdf_area: f64,
-        u: [f64; 3],
-        scores: &mut Scores,
-    ) {
-        let scene = &*bssrdf.scene;
-        let slot = scene.sensor.slot_of(emergence.slot, hit.point);
-        let mut last: Option<(DVec3, Option<Entrance>)> = None;
-        for (&band, throughput) in emergence.bands.iter().zip(emergence.throughput) {
-            let Some(arrival) = self.draw(scene, band, u) else { continue };
-            let entrance = match last {
-                Some((wi, entrance)) if wi == arrival.wi => entrance,
-                _ => Entrance::lit(scene, hit, arrival.wi, emergence.eta, scores),
-            };
-            last = Some((arrival.wi, entrance));
-            let Some(entrance) = entrance else { continue };
-            let entry = Entry { point: hit.point, normal: hit.shading_normal, dir: entrance.dir };
-            scores.count(Cost::Evaluations);
-            let kernel = bssrdf.models[band].kernel(&entry, &emergence.exit);
-            let irradiance = entrance.transmittance * entrance.cos * arrival.value;
-            let value = throughput * kernel * irradiance / pdf_area;
-            scores.add(slot, band, TransportClass::Multiple, arrival.light, value);
-        }
     }
 }
 

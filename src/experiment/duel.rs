@@ -6,21 +6,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::schema::ClaimEntry;
+pub use crate::results::record::CostMeasure;
 
 /// Suffix to the name of an estimator that is run a second time as a control.
 pub const CONTROL: &str = " (control)";
-
-/// Measure of an estimator's work.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum CostMeasure {
-    /// Counts of rays, events and paths with fixed weights: the same on every machine.
-    #[default]
-    Counters,
-    /// CPU time. The estimators are run side by side, and the baseline twice, so that what the
-    /// machine adds is seen.
-    Cpu,
-}
 
 /// In every cell and band, the candidate reaches an error at less cost than the baseline, by more than
 /// `ratio`: variance times cost of the baseline over that of the candidate exceeds it. The claim must be
@@ -96,61 +85,19 @@ fn tenth_more() -> f64 {
     1.1
 }
 
-/// Common form of both claims: an efficiency ratio that must exceed a bound.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Duel<'a> {
-    /// The estimator under test.
-    pub candidate: &'a str,
-    /// Estimator that the candidate is compared with.
-    pub baseline: &'a str,
-    /// What variance times cost of the baseline over that of the candidate must exceed.
-    pub exceeds: f64,
-    /// What counts as cost.
-    pub cost: CostMeasure,
-    /// Observable whose variance is compared; the sensor's first by default.
-    pub observable: &'a Option<String>,
-    /// Transport class whose variance is compared.
-    pub class: &'a Option<String>,
-    /// The largest relative difference of the two means that may go unseen.
-    pub detect: Option<f64>,
-    /// Cells that the claim is on: label of each axis.
-    pub only: &'a BTreeMap<String, String>,
-}
-
-impl<'a> From<&'a Faster> for Duel<'a> {
-    fn from(words: &'a Faster) -> Duel<'a> {
-        Duel {
-            candidate: &words.candidate,
-            baseline: &words.baseline,
-            exceeds: words.ratio,
-            cost: words.cost,
-            observable: &words.observable,
-            class: &words.class,
-            detect: words.detect,
-            only: &words.only,
-        }
-    }
-}
-
-impl<'a> From<&'a NotSlower> for Duel<'a> {
-    fn from(words: &'a NotSlower) -> Duel<'a> {
-        Duel {
-            candidate: &words.candidate,
-            baseline: &words.baseline,
-            exceeds: 1.0 / words.margin,
-            cost: words.cost,
-            observable: &words.observable,
-            class: &words.class,
-            detect: words.detect,
-            only: &words.only,
-        }
+impl From<&NotSlower> for Faster {
+    /// Its ratio of inverse efficiencies stays below `margin` where the efficiency ratio exceeds 1 / `margin`.
+    fn from(words: &NotSlower) -> Faster {
+        let NotSlower { candidate, baseline, margin, cost, observable, class, detect, only } =
+            words.clone();
+        Faster { candidate, baseline, ratio: 1.0 / margin, cost, observable, class, detect, only }
     }
 }
 
 impl ClaimEntry {
     /// The comparison of efficiencies that the claim makes, if it makes one.
-    pub fn duel(&self) -> Option<Duel<'_>> {
-        let not_slower = || self.not_slower.as_ref().map(Duel::from);
-        self.faster.as_ref().map(Duel::from).or_else(not_slower)
+    pub fn duel(&self) -> Option<Faster> {
+        let not_slower = || self.not_slower.as_ref().map(Faster::from);
+        self.faster.clone().or_else(not_slower)
     }
 }

@@ -29,11 +29,6 @@ impl Registry {
     pub fn get(&self, kind: &str) -> Option<&EstimatorKind> {
         self.estimators.iter().find(|known| known.kind == kind)
     }
-
-    /// The names of all kinds of estimators.
-    pub fn kinds(&self) -> Vec<&'static str> {
-        self.estimators.iter().map(|known| known.kind).collect()
-    }
 }
 
 /// Options, by the schema of their type, with the first line of their documentation.

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 pub use super::claim_words::{Agree, ClaimEntry, Differs, Equals, Expect, Reproduces, SamplerClaim};
 pub use super::direction::{Direction, Polar};
-pub use super::duel::{CONTROL, CostMeasure, Duel, Faster, NotSlower};
+pub use super::duel::{CONTROL, CostMeasure, Faster, NotSlower};
 use super::picture::PictureEntry;
 pub use super::sensor::SensorEntry;
 pub use crate::optics::microfacet::MicrofacetKind;

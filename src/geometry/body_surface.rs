@@ -108,14 +108,6 @@ impl BodySampler {
             BodySampler::Triangles(sampler) => sampler.area(),
         }
     }
-
-    /// Memory behind it, bytes.
-    pub fn heap_bytes(&self) -> usize {
-        match self {
-            BodySampler::Triangles(sampler) => sampler.heap_bytes(),
-            _ => 0,
-        }
-    }
 }
 
 fn interpolated(mesh: &Mesh, triangle: FaceId, weights: [f64; 3]) -> Option<DVec3> {

@@ -3,7 +3,8 @@
 //! scales every result exactly (no absolute epsilon anywhere).
 
 mod analytic;
-pub mod audit;
+#[cfg(test)]
+mod audit;
 mod body_surface;
 mod clearance;
 mod lines;
@@ -213,14 +214,6 @@ impl Shape {
     /// Whether the body is known to be convex: then all its points see each other.
     pub fn is_convex(&self) -> bool {
         !matches!(self, Shape::Mesh(_))
-    }
-
-    /// Number of triangles; 0 for analytic shapes.
-    pub fn triangle_count(&self) -> usize {
-        match self {
-            Shape::Mesh(mesh) => mesh.triangles().len(),
-            _ => 0,
-        }
     }
 
     /// Estimate of the memory that the shape holds, bytes.

@@ -118,11 +118,6 @@ impl SurfaceSampler {
     pub fn area(&self) -> f64 {
         self.area
     }
-
-    /// Memory behind the sampler, bytes.
-    pub fn heap_bytes(&self) -> usize {
-        size_of_val(&*self.faces) + self.by_area.as_ref().map_or(0, AliasTable::heap_bytes)
-    }
 }
 
 fn triangles(mesh: &Mesh) -> impl Iterator<Item = Triangle> {

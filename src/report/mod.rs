@@ -155,7 +155,7 @@ mod tests {
     use super::*;
     use crate::results::provenance::Provenance;
     use crate::results::sample;
-    use crate::results::timing::{Cost, Timing};
+    use crate::results::timing::{TimeSpent, Timing};
 
     #[test]
     fn views_are_made_from_the_folder_alone_and_again() {
@@ -169,7 +169,7 @@ mod tests {
         timing.add(
             "smooth",
             "mis",
-            Cost { cpu_seconds: 2.0, wall_seconds: 1.0, passes: 256, paths: 1000 },
+            TimeSpent { cpu_seconds: 2.0, wall_seconds: 1.0, passes: 256, paths: 1000 },
         );
         folder.write_timing(&timing).expect("a timing");
         folder.write_provenance(&Provenance::collect(2)).expect("a provenance");

@@ -6,7 +6,7 @@ use crate::results::image::decoded;
 use crate::results::npy::Array;
 use crate::results::sample;
 use crate::results::store::pixels_path;
-use crate::results::timing::{Cost, Timing};
+use crate::results::timing::{TimeSpent, Timing};
 
 fn wanted(exposure_stops: Option<f64>) -> Split {
     let (left, right) = ("mis".into(), "snee".into());
@@ -37,7 +37,7 @@ fn grid(brightness: fn(usize) -> f64, seconds: [f64; 2]) -> Stored {
             let path = pixels_path(index, number);
             stored.arrays.insert(path.clone(), Array::new(vec![2, 2, 3, 2], data));
             run.image.as_mut().expect("an image").pixels = path;
-            let cost = Cost { cpu_seconds: time, wall_seconds: time, passes: run.passes, paths: 1 };
+            let cost = TimeSpent { cpu_seconds: time, wall_seconds: time, passes: run.passes, paths: 1 };
             timing.add(&cell.label, &run.estimator, cost);
         }
         cells.push(cell);

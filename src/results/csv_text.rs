@@ -37,14 +37,6 @@ pub fn number(x: f64) -> String {
     if x.is_nan() { String::new() } else { format!("{x:?}") }
 }
 
-/// The rows of a CSV text, its header among them; rows after a malformed one are left out.
-pub fn rows(text: &str) -> Vec<Vec<String>> {
-    let mut reader =
-        csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
-    let fields = |record: csv::StringRecord| record.iter().map(String::from).collect();
-    reader.records().map_while(Result::ok).map(fields).collect()
-}
-
 /// The names of a struct's fields, and their texts.
 #[derive(Default)]
 struct Fields {

@@ -87,7 +87,7 @@ fn of_run(
 #[cfg(test)]
 mod tests {
     use super::super::sample;
-    use super::super::timing::Cost;
+    use super::super::timing::TimeSpent;
     use super::*;
 
     #[test]
@@ -97,7 +97,7 @@ mod tests {
         timing.add(
             "smooth",
             "mis",
-            Cost { cpu_seconds: 64.0, wall_seconds: 64.0, passes: 256, paths: 1 },
+            TimeSpent { cpu_seconds: 64.0, wall_seconds: 64.0, passes: 256, paths: 1 },
         );
         let rows = measurements(&stored, Some(&timing));
         assert_eq!(rows.len(), 2 * 2 * 2);

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::sampler::SamplerRun;
@@ -383,13 +384,14 @@ pub enum Against {
     },
 }
 
-/// Measure of an estimator's work.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// What an estimator's work is measured by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CostMeasure {
-    /// A weighted sum of the record's counters: exactly reproducible.
+    /// Counts of rays, events and paths with fixed weights: the same on every machine.
     #[default]
     Counters,
-    /// CPU time, of `timing.json`.
+    /// CPU time. The estimators are run side by side, and the baseline twice, so that what the
+    /// machine adds is seen.
     Cpu,
 }

@@ -3,7 +3,7 @@
 use tempfile::TempDir;
 
 use super::super::sample;
-use super::super::timing::Cost;
+use super::super::timing::TimeSpent;
 use super::*;
 
 fn written() -> (TempDir, RecordFolder, Stored) {
@@ -157,7 +157,7 @@ fn timing_and_provenance() {
     let (_temp, folder, _) = written();
     assert_eq!(folder.read_timing().expect("no timing"), None);
     let mut timing = Timing::default();
-    timing.add("smooth", "mis", Cost { cpu_seconds: 0.1, wall_seconds: 0.1, passes: 1, paths: 6 });
+    timing.add("smooth", "mis", TimeSpent { cpu_seconds: 0.1, wall_seconds: 0.1, passes: 1, paths: 6 });
     folder.write_timing(&timing).expect("a write");
     assert_eq!(folder.read_timing().expect("a timing"), Some(timing));
     let provenance = Provenance::collect(1);

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Timing {
     /// Cell label -> estimator -> cost.
-    pub cells: BTreeMap<String, BTreeMap<String, Cost>>,
+    pub cells: BTreeMap<String, BTreeMap<String, TimeSpent>>,
     /// Cell label -> estimator -> CPU time by batch of the record.
     #[serde(default)]
     pub batches: BTreeMap<String, BTreeMap<String, Batches>>,
@@ -31,7 +31,7 @@ pub struct Batches {
 /// Time spent on one estimator in one cell, all bands together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Cost {
+pub struct TimeSpent {
     /// CPU seconds, summed over threads.
     pub cpu_seconds: f64,
     /// Wall-clock seconds of its blocks, summed; with several threads they overlap.
@@ -44,7 +44,7 @@ pub struct Cost {
 
 impl Timing {
     /// Adds a block's cost.
-    pub fn add(&mut self, cell: &str, estimator: &str, cost: Cost) {
+    pub fn add(&mut self, cell: &str, estimator: &str, cost: TimeSpent) {
         let sum = self.cells.entry(cell.into()).or_default().entry(estimator.into()).or_default();
         sum.cpu_seconds += cost.cpu_seconds;
         sum.wall_seconds += cost.wall_seconds;
@@ -62,13 +62,13 @@ impl Timing {
         self.batches.get(cell)?.get(estimator)
     }
 
-    /// Times of one estimator in one cell.
-    pub fn of(&self, cell: &str, estimator: &str) -> Option<&Cost> {
+    /// What was measured of one estimator in one cell.
+    pub fn of(&self, cell: &str, estimator: &str) -> Option<&TimeSpent> {
         self.cells.get(cell)?.get(estimator)
     }
 }
 
-impl Cost {
+impl TimeSpent {
     /// CPU seconds per pass; nothing where no pass was timed.
     pub fn cpu_seconds_per_pass(&self) -> Option<f64> {
         (self.passes > 0).then(|| self.cpu_seconds / self.passes as f64)
@@ -87,12 +87,12 @@ mod tests {
     #[test]
     fn blocks_add_up() {
         let mut timing = Timing::default();
-        let block = Cost { cpu_seconds: 0.5, wall_seconds: 0.75, passes: 4, paths: 100 };
+        let block = TimeSpent { cpu_seconds: 0.5, wall_seconds: 0.75, passes: 4, paths: 100 };
         timing.add("a", "mis", block);
         timing.add("a", "mis", block);
         let cost = timing.of("a", "mis").expect("a cost");
         assert_eq!((cost.cpu_seconds_per_pass(), cost.paths_per_second()), (Some(0.125), Some(200.0)));
         assert!(timing.of("a", "snee").is_none());
-        assert!(Cost::default().cpu_seconds_per_pass().is_none());
+        assert!(TimeSpent::default().cpu_seconds_per_pass().is_none());
     }
 }

@@ -119,9 +119,9 @@ fn regions(job: &Passes) -> Vec<ObservedRegion> {
     job.layout.regions().iter().map(region).collect()
 }
 
-fn cost(finished: &Finished) -> timing::Cost {
+fn cost(finished: &Finished) -> timing::TimeSpent {
     let total = finished.total();
-    timing::Cost {
+    timing::TimeSpent {
         cpu_seconds: total.cpu_seconds,
         wall_seconds: finished.tally.wall_seconds,
         passes: finished.passes,

@@ -20,7 +20,7 @@ use crate::results::json::{canonical, hash_bytes};
 use crate::results::npy::Array;
 use crate::results::sampler::SamplerRun;
 use crate::results::store::RecordFolder;
-use crate::results::timing::Cost;
+use crate::results::timing::TimeSpent;
 use crate::stats::moments::{ImageMoments, Moments};
 
 /// The header of a state, before its numbers.
@@ -54,7 +54,7 @@ struct Counted {
     run: SamplerRun,
     /// Path and shape of every array.
     arrays: Vec<(String, Vec<usize>)>,
-    cost: Cost,
+    cost: TimeSpent,
 }
 
 /// The folder of the states in an experiment's results folder.

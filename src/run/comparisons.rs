@@ -4,9 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
-use crate::experiment::schema::{
-    Agree, ClaimEntry, CostMeasure, Differs, Duel, Equals, Expect, SamplerClaim,
-};
+use crate::experiment::schema::{Agree, ClaimEntry, Differs, Equals, Expect, Faster, SamplerClaim};
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::record::{
     self, Against, Band, Claim, ClaimKind, Comparison, ExpectedOutcome, Observable, Quantity,
@@ -93,42 +91,11 @@ fn statement(
     Claim { label, kind, expects, each }
 }
 
-/// Fields that `agree` and `differs` share.
-struct Pairs<'a> {
-    estimators: &'a [String],
-    across: Option<&'a String>,
-    observable: &'a Option<String>,
-    class: &'a Option<String>,
-    band: &'a Option<String>,
-    only: &'a BTreeMap<String, String>,
-    detect: Option<f64>,
-}
-
-impl<'a> From<&'a Agree> for Pairs<'a> {
-    fn from(words: &'a Agree) -> Pairs<'a> {
-        Pairs {
-            estimators: &words.estimators,
-            across: words.across.as_ref(),
-            observable: &words.observable,
-            class: &words.class,
-            band: &words.band,
-            only: &words.only,
-            detect: Some(words.detect),
-        }
-    }
-}
-
-impl<'a> From<&'a Differs> for Pairs<'a> {
-    fn from(words: &'a Differs) -> Pairs<'a> {
-        Pairs {
-            estimators: &words.estimators,
-            across: words.across.as_ref(),
-            observable: &words.observable,
-            class: &words.class,
-            band: &words.band,
-            only: &words.only,
-            detect: None,
-        }
+impl From<&Agree> for Differs {
+    /// The same pairs; what may go unseen is left out.
+    fn from(words: &Agree) -> Differs {
+        let Agree { estimators, across, observable, class, band, only, .. } = words.clone();
+        Differs { estimators, across, observable, class, band, only }
     }
 }
 
@@ -147,8 +114,8 @@ impl Scope<'_> {
             return self.duel(index, &duel);
         }
         match (&claim.agree, &claim.differs) {
-            (Some(agree), _) => self.pairs(index, &Pairs::from(agree)),
-            (_, Some(differs)) => self.pairs(index, &Pairs::from(differs)),
+            (Some(agree), _) => self.pairs(index, &Differs::from(agree), Some(agree.detect)),
+            (_, Some(differs)) => self.pairs(index, differs, None),
             _ => Ok(Vec::new()),
         }
     }
@@ -190,20 +157,16 @@ impl Scope<'_> {
         Ok(comparisons)
     }
 
-    fn duel(&self, claim: usize, duel: &Duel) -> Result<Vec<Comparison>> {
-        let cost = match duel.cost {
-            CostMeasure::Counters => record::CostMeasure::Counters,
-            CostMeasure::Cpu => record::CostMeasure::Cpu,
-        };
+    fn duel(&self, claim: usize, duel: &Faster) -> Result<Vec<Comparison>> {
         let mut comparisons = Vec::new();
-        for cell in self.cells(duel.only) {
+        for cell in self.cells(&duel.only) {
             let observable = self.varying(claim, cell, duel)?;
             for band in 0..self.bands.len() {
-                let baseline = quantity(cell, duel.baseline, &observable, band);
+                let baseline = quantity(cell, &duel.baseline, &observable, band);
                 comparisons.push(Comparison {
                     claim,
-                    quantity: quantity(cell, duel.candidate, &observable, band),
-                    against: Against::Efficiency { baseline, exceeds: duel.exceeds, cost },
+                    quantity: quantity(cell, &duel.candidate, &observable, band),
+                    against: Against::Efficiency { baseline, exceeds: duel.ratio, cost: duel.cost },
                     detect: duel.detect,
                 });
             }
@@ -212,9 +175,9 @@ impl Scope<'_> {
     }
 
     /// The observable whose variance a claim of efficiency is about: one of the sensor's, or its pixels.
-    fn varying(&self, claim: usize, cell: usize, duel: &Duel) -> Result<Observable> {
+    fn varying(&self, claim: usize, cell: usize, duel: &Faster) -> Result<Observable> {
         if duel.observable.as_deref() != Some(record::PIXELS) {
-            return self.observable(claim, cell, duel.observable, duel.class);
+            return self.observable(claim, cell, &duel.observable, &duel.class);
         }
         let place = || {
             format!(
@@ -239,24 +202,25 @@ impl Scope<'_> {
         }
     }
 
-    fn pairs(&self, claim: usize, words: &Pairs) -> Result<Vec<Comparison>> {
+    /// What `agree` and `differs` compare.
+    fn pairs(&self, claim: usize, words: &Differs, detect: Option<f64>) -> Result<Vec<Comparison>> {
         let mut comparisons = Vec::new();
         let mut push = |a: (usize, &str), b: (usize, &str), paired: bool| -> Result<()> {
-            for observable in self.observables(claim, a.0, words.observable, words.class)? {
-                for band in self.bands_of(words.band) {
+            for observable in self.observables(claim, a.0, &words.observable, &words.class)? {
+                for band in self.bands_of(&words.band) {
                     let other = quantity(b.0, b.1, &observable, band);
                     comparisons.push(Comparison {
                         claim,
                         quantity: quantity(a.0, a.1, &observable, band),
                         against: Against::Quantity { other, paired },
-                        detect: words.detect,
+                        detect,
                     });
                 }
             }
             Ok(())
         };
-        let cells = self.cells(words.only);
-        match words.across {
+        let cells = self.cells(&words.only);
+        match &words.across {
             None => {
                 for &cell in &cells {
                     for (i, first) in words.estimators.iter().enumerate() {
@@ -276,7 +240,7 @@ impl Scope<'_> {
                         .push(cell);
                 }
                 for group in groups.values() {
-                    for name in words.estimators {
+                    for name in &words.estimators {
                         for &other in &group[1..] {
                             push((group[0], name), (other, name), self.is_paired(group[0], other))?;
                         }

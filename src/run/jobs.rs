@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::estimators::Layout;
 use crate::experiment::build::{self, Builder};
 use crate::experiment::registry::Registry;
-use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure, SamplerEntry};
+use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure, Faster, SamplerEntry};
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::json::{canonical, hash_bytes, hash_json};
 use crate::results::provenance;
@@ -252,29 +252,20 @@ pub fn build_all(experiment: &Experiment, registry: &Registry) -> Result<()> {
 
 /// Arms that claims compare by CPU time: estimators that run side by side, and baselines that run twice,
 /// because the same estimator against itself shows what the machine adds.
-struct Duels<'a> {
-    /// Cells chosen, candidate, baseline.
-    duels: Vec<(&'a BTreeMap<String, String>, &'a str, &'a str)>,
-}
+struct Duels(Vec<Faster>);
 
-impl<'a> Duels<'a> {
-    fn new(experiment: &'a Experiment) -> Duels<'a> {
+impl Duels {
+    fn new(experiment: &Experiment) -> Duels {
         let duels = experiment.file.claim.iter().filter_map(ClaimEntry::duel);
-        let by_time = duels.filter(|duel| duel.cost == CostMeasure::Cpu);
-        Duels { duels: by_time.map(|duel| (duel.only, duel.candidate, duel.baseline)).collect() }
+        Duels(duels.filter(|duel| duel.cost == CostMeasure::Cpu).collect())
     }
 
     /// The runs of an estimator in a cell.
     fn of(&self, cell: &CellSpec, name: &str) -> Vec<Arm> {
-        let here = || {
-            self.duels
-                .iter()
-                .filter(|(only, ..)| comparisons::is_in(cell, only))
-                .map(|(_, a, b)| (*a, *b))
-        };
-        let is_timed = here().any(|(candidate, baseline)| candidate == name || baseline == name);
+        let here = || self.0.iter().filter(|duel| comparisons::is_in(cell, &duel.only));
+        let is_timed = here().any(|duel| duel.candidate == name || duel.baseline == name);
         let mut arms = vec![Arm { name: name.into(), is_control: false, is_timed }];
-        if here().any(|(_, baseline)| baseline == name) {
+        if here().any(|duel| duel.baseline == name) {
             arms.push(Arm { name: format!("{name}{CONTROL}"), is_control: true, is_timed });
         }
         arms

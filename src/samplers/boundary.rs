@@ -485,22 +485,11 @@ impl Sampler for RoughSampler {
             chart.bounded(slopes)[axis]
         };
         let across = slope.clone();
-        let reflected = Contrast {
-            name: "reflected",
-            of: Box::new(move |piece, _| f64::from(u8::from(events[piece] == Event::Reflect))),
-            expected: None,
-        };
-        let along_and_across = vec![
-            Contrast {
-                name: "slope along the view",
-                of: Box::new(move |k, at| slope(k, at, 0)),
-                expected: None,
-            },
-            Contrast {
-                name: "slope across the view",
-                of: Box::new(move |k, at| across(k, at, 1)),
-                expected: Some(0.0),
-            },
+        let is_reflected = move |piece: usize, _| f64::from(u8::from(events[piece] == Event::Reflect));
+        let reflected = Contrast::by_piece("reflected", None, is_reflected);
+        let along_and_across = [
+            Contrast::by_piece("slope along the view", None, move |k, at| slope(k, at, 0)),
+            Contrast::by_piece("slope across the view", Some(0.0), move |k, at| across(k, at, 1)),
         ];
         let reflected = (!self.is_forced).then_some(reflected);
         reflected.into_iter().chain(along_and_across).collect()

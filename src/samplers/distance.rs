@@ -188,7 +188,7 @@ pub const EQUIANGULAR: SamplerKind = sampler_kind!(
     EquiangularOptions => |o| {
         let chart = AngleChart::new(o.foot_mm, o.distance_mm, end(o.t_max_mm));
         let code = some(Equiangular::new(o.foot_mm, o.distance_mm, end(o.t_max_mm)))?;
-        Ok(Charted::new(EquiangularTechnique(code), chart))
+        Ok(Charted::new(code, chart))
     }
 );
 
@@ -211,17 +211,14 @@ struct EquiangularOptions {
     t_max_mm: Option<f64>,
 }
 
-/// Equiangular distances.
-struct EquiangularTechnique(Equiangular);
-
-impl Technique<AngleChart> for EquiangularTechnique {
+impl Technique<AngleChart> for Equiangular {
     fn sample(&self, stream: &mut Stream) -> (f64, Option<f64>) {
-        let t = self.0.sample(stream.draw());
+        let t = self.sample(stream.draw());
         (t, Some(self.pdf(t)))
     }
 
     fn pdf(&self, t: f64) -> f64 {
-        self.0.pdf_distance(t)
+        self.pdf_distance(t)
     }
 
     fn contrasts(&self, chart: &AngleChart) -> Vec<Contrast> {
@@ -245,7 +242,7 @@ pub const MIXTURE: SamplerKind = sampler_kind!(
         let equiangular = some(Equiangular::new(o.foot_mm, o.distance_mm, t_max))?;
         let (sigma_t, share_exponential) = (o.sigma_t_per_mm, o.share_exponential);
         let code = DistanceMixture { sigma_t, t_max, equiangular, share_exponential };
-        Ok(Charted::new(MixtureTechnique(code), AngleChart::new(o.foot_mm, o.distance_mm, t_max)))
+        Ok(Charted::new(code, AngleChart::new(o.foot_mm, o.distance_mm, t_max)))
     }
 );
 
@@ -270,20 +267,18 @@ struct MixtureOptions {
 }
 
 /// Truncated exponential and equiangular distances, by one number, charted by the angle at the point.
-struct MixtureTechnique(DistanceMixture);
-
-impl Technique<AngleChart> for MixtureTechnique {
+impl Technique<AngleChart> for DistanceMixture {
     fn sample(&self, stream: &mut Stream) -> (f64, Option<f64>) {
-        let t = self.0.sample(stream.draw());
+        let t = self.sample(stream.draw());
         (t, Some(self.pdf(t)))
     }
 
     fn pdf(&self, t: f64) -> f64 {
-        self.0.pdf_distance(t)
+        self.pdf_distance(t)
     }
 
     fn contrasts(&self, chart: &AngleChart) -> Vec<Contrast> {
-        let (chart, sigma_t) = (*chart, self.0.sigma_t);
+        let (chart, sigma_t) = (*chart, self.sigma_t);
         let transmitted = move |[x, _]: [f64; 2]| chart.at(x).map_or(0.0, |(t, _)| exp(-sigma_t * t));
         vec![Contrast::of("transmittance", None, transmitted)]
     }

@@ -244,12 +244,8 @@ impl Sampler for NormalSampler {
         // Everything is even across the view; without a view the normals lean nowhere.
         let expected = self.view.is_none().then_some(0.0);
         vec![
-            Contrast { name: "slope along the view", of: Box::new(move |_, at| slope(at, 0)), expected },
-            Contrast {
-                name: "slope across the view",
-                of: Box::new(move |_, at| slope(at, 1)),
-                expected: Some(0.0),
-            },
+            Contrast::of("slope along the view", expected, move |at| slope(at, 0)),
+            Contrast::of("slope across the view", Some(0.0), move |at| slope(at, 1)),
         ]
     }
 }

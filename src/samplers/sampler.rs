@@ -26,11 +26,6 @@ pub trait Sampler: Send + Sync {
         Null::Never
     }
 
-    /// Whether every draw takes as many random numbers as any other.
-    fn takes_as_many(&self) -> bool {
-        true
-    }
-
     /// Directed contrasts: cheap means in which the likely defects show (mean cosine, ...).
     fn contrasts(&self) -> Vec<Contrast> {
         Vec::new()
@@ -115,13 +110,22 @@ pub struct Contrast {
 }
 
 impl Contrast {
-    /// A function of the chart coordinates of the only piece.
+    /// A function of the chart coordinates, the same in all pieces.
     pub fn of(
         name: &'static str,
         expected: Option<f64>,
         of: impl Fn([f64; 2]) -> f64 + Send + Sync + 'static,
     ) -> Contrast {
-        Contrast { name, of: Box::new(move |_, at| of(at)), expected }
+        Contrast::by_piece(name, expected, move |_, at| of(at))
+    }
+
+    /// A function of piece and chart coordinates.
+    pub fn by_piece(
+        name: &'static str,
+        expected: Option<f64>,
+        of: impl Fn(usize, [f64; 2]) -> f64 + Send + Sync + 'static,
+    ) -> Contrast {
+        Contrast { name, of: Box::new(of), expected }
     }
 
     /// The cosine of an azimuth that is the second coordinate, in turns, and uniform.

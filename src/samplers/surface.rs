@@ -86,6 +86,14 @@ fn pieces(name: String) -> Piece {
     Piece::plane(name, [Coordinate::over(0.0, 1.0), Coordinate::over(0.0, 1.0)])
 }
 
+/// The centroid: weight 1/3 of a, of b and of c.
+fn weights() -> Vec<Contrast> {
+    vec![
+        Contrast::of("mean weight of b", Some(1.0 / 3.0), |[s, v]| s * (1.0 - v)),
+        Contrast::of("mean weight of c", Some(1.0 / 3.0), |[s, v]| s * v),
+    ]
+}
+
 /// The area of a triangle by the lengths of its sides (Heron, in Kahan's stable order).
 fn area(Triangle([a, b, c]): &Triangle) -> f64 {
     let mut sides = [(*a - *b).length(), (*b - *c).length(), (*c - *a).length()];
@@ -124,11 +132,7 @@ impl Sampler for TriangleSampler {
     }
 
     fn contrasts(&self) -> Vec<Contrast> {
-        // The centroid: weight 1/3 of a, of b and of c.
-        vec![
-            Contrast::of("mean weight of b", Some(1.0 / 3.0), |[s, v]| s * (1.0 - v)),
-            Contrast::of("mean weight of c", Some(1.0 / 3.0), |[s, v]| s * v),
-        ]
+        weights()
     }
 }
 
@@ -172,14 +176,6 @@ impl Sampler for MeshSampler {
     }
 
     fn contrasts(&self) -> Vec<Contrast> {
-        let of = |f: fn([f64; 2]) -> f64| Box::new(move |_: usize, at: [f64; 2]| f(at));
-        vec![
-            Contrast {
-                name: "mean weight of b",
-                of: of(|[s, v]| s * (1.0 - v)),
-                expected: Some(1.0 / 3.0),
-            },
-            Contrast { name: "mean weight of c", of: of(|[s, v]| s * v), expected: Some(1.0 / 3.0) },
-        ]
+        weights()
     }
 }

@@ -235,11 +235,6 @@ impl Sampler for ThinningSampler {
         self.masses.iter().enumerate().map(|(k, &mass)| Discrete { name: name(k), mass }).collect()
     }
 
-    /// A query takes as many numbers as it has candidates.
-    fn takes_as_many(&self) -> bool {
-        false
-    }
-
     fn null(&self) -> Null {
         match self.view {
             QueryView::Distance => {

@@ -26,10 +26,10 @@ use super::moments::Moments;
 use super::tails::{binomial_two_sided, binomial_upper, normal_two_sided};
 
 /// Uniform and other numbers, from a name.
-struct Draws(ChaCha8Rng);
+struct NamedRng(ChaCha8Rng);
 
-impl Draws {
-    fn of(name: &str) -> Draws {
+impl NamedRng {
+    fn of(name: &str) -> NamedRng {
         // FNV-1a with four starts.
         let hash = |start: u64| {
             name.bytes().fold(0xcbf2_9ce4_8422_2325 ^ start, |h, b| {
@@ -40,7 +40,7 @@ impl Draws {
         for (start, word) in seed.chunks_mut(8).enumerate() {
             word.copy_from_slice(&hash(start as u64).to_le_bytes());
         }
-        Draws(ChaCha8Rng::from_seed(seed))
+        NamedRng(ChaCha8Rng::from_seed(seed))
     }
 
     /// Uniform in (0, 1), never an end.
@@ -63,14 +63,14 @@ impl Draws {
         ((x * count as f64) as usize).min(count - 1)
     }
 
-    fn moments(&mut self, n: usize, mut value: impl FnMut(&mut Draws) -> f64) -> Moments {
+    fn moments(&mut self, n: usize, mut value: impl FnMut(&mut NamedRng) -> f64) -> Moments {
         let mut moments = Moments::default();
         (0..n).for_each(|_| moments.push(value(self)));
         moments
     }
 }
 
-/// Masses of the bins of [`Draws::bin`].
+/// Masses of the bins of [`NamedRng::bin`].
 fn masses(count: usize) -> Vec<f64> {
     let cdf = |x: f64| (x + 0.5 * x * x) / 1.5;
     let n = count as f64;
@@ -91,7 +91,7 @@ struct Kind {
     name: &'static str,
     null: &'static str,
     promise: Promise,
-    p_value: fn(&mut Draws) -> f64,
+    p_value: fn(&mut NamedRng) -> f64,
 }
 
 const KINDS: [Kind; 10] = [
@@ -100,7 +100,7 @@ const KINDS: [Kind; 10] = [
         null: "64 batches of 64 exponential values, mean 1",
         promise: Promise::Uniform,
         p_value: |d| {
-            let batches: Vec<Moments> = (0..64).map(|_| d.moments(64, Draws::exponential)).collect();
+            let batches: Vec<Moments> = (0..64).map(|_| d.moments(64, NamedRng::exponential)).collect();
             Estimate::of_batches(&batches).minus(&Estimate::known(1.0, 0.0)).test_zero().p_value
         },
     },
@@ -109,7 +109,7 @@ const KINDS: [Kind; 10] = [
         null: "64 batches of 64 exponential values; 64 of 64 uniform ones of the same mean",
         promise: Promise::Uniform,
         p_value: |d| {
-            let a: Vec<Moments> = (0..64).map(|_| d.moments(64, Draws::exponential)).collect();
+            let a: Vec<Moments> = (0..64).map(|_| d.moments(64, NamedRng::exponential)).collect();
             let b: Vec<Moments> = (0..64).map(|_| d.moments(64, |d| 2.0 * d.uniform())).collect();
             Estimate::of_batches(&a).minus(&Estimate::of_batches(&b)).test_zero().p_value
         },
@@ -195,10 +195,10 @@ const KINDS: [Kind; 10] = [
         null: "two arms of 64 blocks of 256 exponential values, with costs of 10 % spread",
         promise: Promise::Uniform,
         p_value: |d| {
-            let arm = |d: &mut Draws| -> Vec<JackknifeBlock> {
+            let arm = |d: &mut NamedRng| -> Vec<JackknifeBlock> {
                 (0..64)
                     .map(|_| {
-                        let moments = d.moments(256, Draws::exponential);
+                        let moments = d.moments(256, NamedRng::exponential);
                         JackknifeBlock { moments, cost: 256.0 * (1.0 + 0.1 * d.normal()).max(0.1) }
                     })
                     .collect()
@@ -212,7 +212,7 @@ const KINDS: [Kind; 10] = [
 /// The weight e^(sigma d), d ~ Exp(lambda), if the flight was accepted (with probability e^(-sigma d)),
 /// else
 /// 0. Its mean is 1.
-fn reweighted(d: &mut Draws, lambda_over_sigma: f64) -> f64 {
+fn reweighted(d: &mut NamedRng, lambda_over_sigma: f64) -> f64 {
     let tau = d.exponential() / lambda_over_sigma;
     if d.uniform() < (-tau).exp() { tau.exp() } else { 0.0 }
 }
@@ -254,7 +254,7 @@ impl Calibration {
 }
 
 fn null_p_values(kind: &Kind, runs: u64) -> Vec<f64> {
-    let mut draws = Draws::of(kind.name);
+    let mut draws = NamedRng::of(kind.name);
     (0..runs).map(|_| (kind.p_value)(&mut draws)).collect()
 }
 
@@ -297,8 +297,8 @@ fn planted_p_values_are_caught() {
         caught(kind.name, halved, Promise::Uniform);
     }
     // The normal's tail for Student's, over 4 batches: P(|t| > 2.58) is 8 % at 3 degrees of freedom.
-    let mut draws = Draws::of("a z-test of four batches");
-    let z_test = |d: &mut Draws| {
+    let mut draws = NamedRng::of("a z-test of four batches");
+    let z_test = |d: &mut NamedRng| {
         let batches: Vec<Moments> = (0..4).map(|_| Moments::of(d.normal())).collect();
         normal_two_sided(Estimate::of_batches(&batches).test_zero().statistic)
     };
@@ -312,13 +312,13 @@ fn planted_p_values_are_caught() {
 }
 
 /// The p-value of a z-test of the mean of 4000 weights.
-fn heavy_tail(d: &mut Draws, lambda_over_sigma: f64) -> f64 {
+fn heavy_tail(d: &mut NamedRng, lambda_over_sigma: f64) -> f64 {
     let all = d.moments(4000, |d| reweighted(d, lambda_over_sigma));
     normal_two_sided((all.mean - 1.0) / all.std_error())
 }
 
 fn heavy_tails(lambda_over_sigma: f64, runs: u64) -> Calibration {
-    let mut draws = Draws::of(&format!("weights of tail {lambda_over_sigma}"));
+    let mut draws = NamedRng::of(&format!("weights of tail {lambda_over_sigma}"));
     let p_values = (0..runs).map(|_| heavy_tail(&mut draws, lambda_over_sigma)).collect();
     Calibration::of(p_values, Promise::Conservative)
 }
@@ -339,13 +339,18 @@ fn a_z_test_does_not_survive_heavy_tails() {
 struct Distribution {
     name: &'static str,
     kurtosis: &'static str,
-    a: fn(&mut Draws) -> f64,
-    b: fn(&mut Draws) -> f64,
+    a: fn(&mut NamedRng) -> f64,
+    b: fn(&mut NamedRng) -> f64,
 }
 
 const SHAPES: [Distribution; 6] = [
-    Distribution { name: "normal", kurtosis: "3", a: Draws::normal, b: Draws::normal },
-    Distribution { name: "exponential", kurtosis: "9", a: Draws::exponential, b: Draws::exponential },
+    Distribution { name: "normal", kurtosis: "3", a: NamedRng::normal, b: NamedRng::normal },
+    Distribution {
+        name: "exponential",
+        kurtosis: "9",
+        a: NamedRng::exponential,
+        b: NamedRng::exponential,
+    },
     Distribution {
         name: "lognormal 1",
         kurtosis: "114",
@@ -386,10 +391,10 @@ struct Coverage {
 }
 
 fn coverage(shape: &Distribution, runs: u64) -> Coverage {
-    let mut draws = Draws::of(&format!("coverage of {}", shape.name));
+    let mut draws = NamedRng::of(&format!("coverage of {}", shape.name));
     let (mut c, mut widths) =
         (Coverage { runs, at_95: 0, at_999: 0, width: 0.0, resolved: 0, by_f: 0 }, vec![]);
-    let arm = |d: &mut Draws, value: fn(&mut Draws) -> f64| -> Vec<JackknifeBlock> {
+    let arm = |d: &mut NamedRng, value: fn(&mut NamedRng) -> f64| -> Vec<JackknifeBlock> {
         (0..64).map(|_| JackknifeBlock { moments: d.moments(256, value), cost: 256.0 }).collect()
     };
     for _ in 0..runs {

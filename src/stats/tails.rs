@@ -13,20 +13,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::math::{self, exp, ln, ln_1p};
 
-/// P(Z > z) for a standard normal Z.
-pub fn normal_upper(z: f64) -> f64 {
-    0.5 * math::erfc(z * FRAC_1_SQRT_2)
-}
-
 /// P(|Z| > |z|) for a standard normal Z.
 pub fn normal_two_sided(z: f64) -> f64 {
     math::erfc(z.abs() * FRAC_1_SQRT_2)
-}
-
-/// P(T > t) for Student's T; the normal at infinitely many degrees of freedom.
-pub fn student_upper(t: f64, dof: f64) -> f64 {
-    let half = 0.5 * student_two_sided(t, dof);
-    if t < 0.0 { 1.0 - half } else { half }
 }
 
 /// P(|T| > |t|) for Student's T; the normal at infinitely many degrees of freedom.
@@ -294,6 +283,17 @@ mod tests {
 
     fn close(a: f64, b: f64, relative: f64) {
         assert!((a - b).abs() <= relative * b.abs(), "{a:e} is not {b:e}");
+    }
+
+    /// P(Z > z) for a standard normal Z.
+    fn normal_upper(z: f64) -> f64 {
+        0.5 * math::erfc(z * FRAC_1_SQRT_2)
+    }
+
+    /// P(T > t) for Student's T; the normal at infinitely many degrees of freedom.
+    fn student_upper(t: f64, dof: f64) -> f64 {
+        let half = 0.5 * student_two_sided(t, dof);
+        if t < 0.0 { 1.0 - half } else { half }
     }
 
     /// The tail of a row of the table.

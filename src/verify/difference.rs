@@ -52,7 +52,7 @@ pub struct Compared {
     pub work: Vec<WorkChange>,
 }
 
-/// Change of work and variance, second record over first.
+/// Work and its worth, second record over first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkChange {
     /// Cell label.

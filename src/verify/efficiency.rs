@@ -32,7 +32,7 @@
 
 use super::evidence::{CONFIDENCE, EfficiencyTest, Evidence, kurtosis_words};
 use super::family::Finding;
-use super::means::{Held, evidence_of_means};
+use super::means::{MeanTest, evidence_of_means};
 use super::verdict::{TestKind, Verdict};
 use super::weights;
 use crate::results::record::{CostMeasure, EstimatorRun, Quantity};
@@ -216,7 +216,7 @@ pub(super) fn finding(
 fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<EfficiencyTest, String> {
     let EfficiencyClaim { candidate, baseline, bound, cost } = *claim;
     let means = evidence_of_means(stored, &mean_of(stored, candidate), &mean_of(stored, baseline));
-    let Held { evidence, value, expected, .. } = means;
+    let MeanTest { evidence, value, expected, .. } = means;
     let difference = match &evidence {
         Evidence::Difference { difference, .. } => difference,
         Evidence::Nothing(reason) => return Err(format!("no mean test: {reason}")),

@@ -131,8 +131,8 @@ pub(super) enum Reference<'a> {
 
 /// Result of comparing a mean with its reference.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Held {
-    /// Evidence of the comparison.
+pub(super) struct MeanTest {
+    /// The evidence.
     pub evidence: Evidence,
     /// The test, where one was possible.
     pub test: Option<TestKind>,
@@ -147,12 +147,17 @@ pub(super) struct Held {
 }
 
 /// Whether two means of a record are equal.
-pub(super) fn evidence_of_means(stored: &Stored, a: &Quantity, b: &Quantity) -> Held {
+pub(super) fn evidence_of_means(stored: &Stored, a: &Quantity, b: &Quantity) -> MeanTest {
     hold(stored, a, Reference::Mean { quantity: b, paired: false }, Asked::EQUAL)
 }
 
-/// Compares a mean with its reference.
-pub(super) fn hold(stored: &Stored, quantity: &Quantity, reference: Reference, asked: Asked) -> Held {
+/// Holds a mean against its reference.
+pub(super) fn hold(
+    stored: &Stored,
+    quantity: &Quantity,
+    reference: Reference,
+    asked: Asked,
+) -> MeanTest {
     let a = QuantityMean::of(stored, quantity);
     let (b, is_paired, stated) = match reference {
         Reference::Value(value) => (None, false, Some(value)),
@@ -160,7 +165,7 @@ pub(super) fn hold(stored: &Stored, quantity: &Quantity, reference: Reference, a
     };
     let expected = stated.or_else(|| b.as_ref().map(|b| b.mean));
     let stated_error = stated.map_or(0.0, |value| value.std_error);
-    let mut held = Held {
+    let mut held = MeanTest {
         evidence: Evidence::Nothing("the record does not hold this quantity".into()),
         test: None,
         deviation: None,
@@ -207,7 +212,7 @@ pub(super) fn hold(stored: &Stored, quantity: &Quantity, reference: Reference, a
 
 /// No sampling error. Equal to rounding passes; a value published with an error is then tested against
 /// that error alone, unless nothing was ever scored.
-fn hold_exact(held: &mut Held, difference: f64, scale: f64, stated_error: f64, value: f64) {
+fn hold_exact(held: &mut MeanTest, difference: f64, scale: f64, stated_error: f64, value: f64) {
     let holds = difference.abs() <= ROUNDING * scale;
     if !holds && stated_error > 0.0 && value != 0.0 {
         held.test = Some(TestKind::StatedError);

@@ -77,7 +77,7 @@ fn log_change(a: [f64; 3], b: [f64; 3]) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::results::sample::{self, PASSES};
-    use crate::results::timing::{Batches, Cost, Timing};
+    use crate::results::timing::{Batches, TimeSpent, Timing};
 
     /// The sample with times: `snee` takes `slower` times as long as `mis`, with some noise.
     fn timed(slower: f64, seed: u64) -> Stored {
@@ -88,7 +88,7 @@ mod tests {
             let seconds = |i: u64| factor * 0.01 * (1.0 + 0.05 * sample::uniform(seed + i));
             let cpu_seconds: Vec<f64> = (0..batches).map(seconds).collect();
             let all: f64 = cpu_seconds.iter().sum();
-            let cost = Cost { cpu_seconds: all, wall_seconds: all, passes: PASSES, paths: 1 };
+            let cost = TimeSpent { cpu_seconds: all, wall_seconds: all, passes: PASSES, paths: 1 };
             timing.add("smooth", name, cost);
             let settled = vec![true; cpu_seconds.len()];
             timing.set_batches("smooth", name, Batches { processes: 1, cpu_seconds, settled });

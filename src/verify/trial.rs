@@ -2,7 +2,7 @@
 
 use super::efficiency::{self, EfficiencyClaim};
 use super::family::Finding;
-use super::means::{Asked, Held, Reference, hold};
+use super::means::{Asked, MeanTest, Reference, hold};
 use super::verdict::Verdict;
 use crate::results::record::{
     Against, Claim, Comparison, ExpectedOutcome, Observable, Quantity, Record,
@@ -81,7 +81,7 @@ fn of_mean(
     reference: Reference,
 ) -> Finding {
     let held = hold(stored, quantity, reference, Asked::by(claim));
-    let Held { evidence, test, deviation, value, expected, one_look } = held;
+    let MeanTest { evidence, test, deviation, value, expected, one_look } = held;
     let mut verdict = named(&stored.record, claim, quantity, other);
     (verdict.test, verdict.statistic) = (test, deviation);
     if let Some(value) = value {

@@ -196,10 +196,6 @@ impl Sampler for Acceptance {
         }
     }
 
-    fn takes_as_many(&self) -> bool {
-        matches!(self.view, View::Distance | View::Tail)
-    }
-
     fn null(&self) -> Null {
         match self.view {
             View::Distance | View::Tail => {

@@ -34,7 +34,7 @@ pub fn judge(row: &Planted, outcome: &Outcome) -> Result<String, String> {
 #[derive(Default)]
 struct Tally {
     runs: u64,
-    /// Plays that were as they must be.
+    /// Trials that were as they must be.
     good: u64,
     /// Times that each test saw it; 0 where it looked and saw nothing.
     seen: BTreeMap<String, u64>,

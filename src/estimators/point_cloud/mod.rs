@@ -25,9 +25,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::cloud::Cloud;
-use super::bssrdf_single::{adds_single, score_single};
+use super::bssrdf_single::score_single;
 use super::emergence::{BssrdfScene, Emergence, Gather, PathStreams};
-use super::illumination::Illumination;
 use super::{
     Anomaly, BandUse, Bodies, Cost, Estimator, EstimatorKind, HeavyTail, Scores, Serves, TransportClass,
     read_options,
@@ -35,7 +34,7 @@ use super::{
 use crate::error::{Error, Result};
 use crate::geometry::{BodySampler, FaceChoice};
 use crate::optics::bssrdf::{Entry, Model};
-use crate::sampling::stream::PassKey;
+use crate::sampling::stream::{PassKey, Stream};
 use crate::sampling::thinning::{Accepted, ThinningForm, ThinningRule, ThinningWork, scan};
 use crate::scene::Scene;
 
@@ -114,8 +113,6 @@ pub struct PointCloud {
     options: PointCloudOptions,
     /// Per group of the bssrdf: which bands accept by which rule.
     rules: Vec<(Vec<usize>, ThinningRule)>,
-    illumination: Illumination,
-    single: bool,
 }
 
 impl PointCloud {
@@ -139,11 +136,9 @@ impl PointCloud {
         else {
             return Err(Error::input("point_cloud needs a finite body"));
         };
-        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight)?;
+        let bssrdf = BssrdfScene::new(scene, &options.model, options.straight, options.single)?;
         let rules = rules(&bssrdf, options.acceptance, 2.0 * bounds.radius);
-        let illumination = Illumination::new(&bssrdf.scene);
-        let single = adds_single(&bssrdf, options.single);
-        Ok(PointCloud { bssrdf, sampler, options, rules, illumination, single })
+        Ok(PointCloud { bssrdf, sampler, options, rules })
     }
 }
 
@@ -205,13 +200,7 @@ impl Estimator for PointCloud {
         scores.count_many(Cost::CloudPoints, cloud.len() as u64);
         scores.count_many(Cost::ShadowRays, cloud.shadow_rays);
         scores.anomalies[Anomaly::WrongSide as usize] += cloud.wrong_side;
-        for group in self.bssrdf.groups_among(bands) {
-            for index in 0..self.bssrdf.scene.sensor.rays_per_pass() {
-                let streams = PathStreams::new(&self.bssrdf, key, index, &group);
-                let mut sum = CloudSum { estimator: self, cloud: &cloud, streams };
-                self.bssrdf.trace(&group, index, key, scores, &mut sum);
-            }
-        }
+        self.bssrdf.pass(bands, key, scores, |_| CloudSum { estimator: self, cloud: &cloud });
     }
 
     fn band_use(&self) -> BandUse {
@@ -219,7 +208,7 @@ impl Estimator for PointCloud {
     }
 
     fn model(&self) -> Option<String> {
-        Some(self.options.model.to_string())
+        Some(self.bssrdf.model.clone())
     }
 
     /// Under p = e^(-m d) an accepted term of a band with effective transport s has weights like e^((m -
@@ -262,36 +251,34 @@ impl Estimator for PointCloud {
 struct CloudSum<'a> {
     estimator: &'a PointCloud,
     cloud: &'a Cloud,
-    streams: PathStreams,
 }
 
 impl Gather for CloudSum<'_> {
-    fn gather(&mut self, emergence: &Emergence<'_>, scores: &mut Scores) {
-        let PointCloud { bssrdf, options, illumination, single, rules, .. } = self.estimator;
+    fn gather(&mut self, emergence: &Emergence<'_>, streams: &mut PathStreams, scores: &mut Scores) {
+        let PointCloud { bssrdf, rules, .. } = self.estimator;
         for (bands, rule) in rules {
             let is_here = |band: &usize| emergence.bands.contains(band);
             let bands: Vec<usize> = bands.iter().copied().filter(is_here).collect();
             if !bands.is_empty() {
-                self.sum(&bands, rule, emergence, options.search, scores);
+                self.sum(&bands, rule, emergence, &mut streams.entries, scores);
             }
         }
-        if *single {
-            score_single(bssrdf, illumination, emergence, &mut self.streams.single, scores);
-        }
+        score_single(bssrdf, emergence, &mut streams.single, scores);
     }
 }
 
 impl CloudSum<'_> {
     /// The sum over accepted points in bands that accept together.
     fn sum(
-        &mut self,
+        &self,
         bands: &[usize],
         rule: &ThinningRule,
         emergence: &Emergence<'_>,
-        search: Search,
+        stream: &mut Stream,
         scores: &mut Scores,
     ) {
-        let bssrdf = &self.estimator.bssrdf;
+        let PointCloud { bssrdf, options, .. } = self.estimator;
+        let search = options.search;
         let (cloud, models, at) = (self.cloud, &bssrdf.models, emergence.exit.point);
         let lights = bssrdf.scene.lights.len();
         let mut sums = vec![0.0; bands.len() * lights];
@@ -305,7 +292,6 @@ impl CloudSum<'_> {
                 *sum += kernel * cloud.flux(place, band) * accepted.weight;
             }
         };
-        let stream = &mut self.streams.entries;
         match search {
             Search::Hierarchy => cloud.tree.thin(at, rule, stream, &mut work, add),
             Search::Scan => scan(cloud.tree.axes(), 0..cloud.len(), at, rule, stream, &mut work, add),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{At, ExperimentParts};
 use crate::experiment::schema::{
-    Budget, CONTROL, ClaimEntry, CostMeasure, Duel, Equals, Expect, SamplerClaim,
+    Budget, CONTROL, ClaimEntry, CostMeasure, Equals, Expect, Faster, SamplerClaim,
 };
 use crate::experiment::suggest;
 use crate::experiment::sweep::SweepAxis;
@@ -50,7 +50,7 @@ pub fn claim(at: At, claim: &ClaimEntry, known: &Known) {
         pairs(at.to("agree"), names, across.as_deref(), only, known);
     }
     if let Some(words) = &claim.faster {
-        duel(at.to("faster"), &words.into(), known);
+        duel(at.to("faster"), words, known);
     }
     if let Some(words) = &claim.not_slower {
         duel(at.to("not_slower"), &words.into(), known);
@@ -91,9 +91,9 @@ fn samplers(at: At, claim: &SamplerClaim, known: &Known) {
 }
 
 /// A candidate and a baseline; what is compared by CPU time runs side by side, pass for pass.
-fn duel(at: At, duel: &Duel, known: &Known) {
-    estimator(at.to("candidate"), duel.candidate, known);
-    estimator(at.to("baseline"), duel.baseline, known);
+fn duel(at: At, duel: &Faster, known: &Known) {
+    estimator(at.to("candidate"), &duel.candidate, known);
+    estimator(at.to("baseline"), &duel.baseline, known);
     if duel.candidate == duel.baseline {
         at.to("candidate").report_help(
             format!("`{}` is candidate and baseline", duel.candidate),
@@ -115,7 +115,7 @@ fn duel(at: At, duel: &Duel, known: &Known) {
         }
     }
     if let Some(axes) = known.axes {
-        filter(at, duel.only, axes);
+        filter(at, &duel.only, axes);
     }
 }
 

@@ -2,8 +2,54 @@
 
 use super::*;
 use crate::experiment::schema_json::json_schema;
+use crate::experiment::validate::SchemaWalk;
 use crate::experiment::validate::grammar::Grammar;
-use crate::experiment::validate::{SchemaWalk, unsupported_keywords};
+
+/// The keywords of JSON Schema that the walk understands, and those that carry no rule for it: `pattern`
+/// is of names, of which the rules say more than a pattern can.
+const KEYWORDS: [&str; 24] = [
+    "$defs",
+    "$ref",
+    "$schema",
+    "additionalProperties",
+    "anyOf",
+    "const",
+    "default",
+    "description",
+    "enum",
+    "exclusiveMaximum",
+    "exclusiveMinimum",
+    "format",
+    "items",
+    "maxItems",
+    "maximum",
+    "minItems",
+    "minLength",
+    "minimum",
+    "oneOf",
+    "pattern",
+    "properties",
+    "required",
+    "title",
+    "type",
+];
+
+/// The keywords of a schema that the walk would silently ignore: none in a schema that is enforced.
+fn unsupported_keywords(schema: &serde_json::Value) -> Vec<String> {
+    let Some(object) = schema.as_object() else { return Vec::new() };
+    let mut unsupported: Vec<String> =
+        object.keys().filter(|key| !KEYWORDS.contains(&key.as_str())).cloned().collect();
+    for (key, value) in object {
+        let inner: Vec<&serde_json::Value> = match key.as_str() {
+            "properties" | "$defs" => value.as_object().into_iter().flat_map(|o| o.values()).collect(),
+            "anyOf" | "oneOf" => value.as_array().into_iter().flatten().collect(),
+            "items" | "additionalProperties" => vec![value],
+            _ => Vec::new(),
+        };
+        unsupported.extend(inner.into_iter().flat_map(unsupported_keywords));
+    }
+    unsupported
+}
 
 #[test]
 fn unknown_keys_are_named_with_what_was_meant() {

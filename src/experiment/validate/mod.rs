@@ -14,35 +14,6 @@ pub mod grammar;
 
 use grammar::{Grammar, SchemaForm, Variant};
 
-/// The keywords of JSON Schema that the walk understands, and those that carry no rule for it: `pattern`
-/// is of names, which the rules check more closely than a pattern can.
-const KEYWORDS: [&str; 24] = [
-    "$defs",
-    "$ref",
-    "$schema",
-    "additionalProperties",
-    "anyOf",
-    "const",
-    "default",
-    "description",
-    "enum",
-    "exclusiveMaximum",
-    "exclusiveMinimum",
-    "format",
-    "items",
-    "maxItems",
-    "maximum",
-    "minItems",
-    "minLength",
-    "minimum",
-    "oneOf",
-    "pattern",
-    "properties",
-    "required",
-    "title",
-    "type",
-];
-
 /// The findings of a walk.
 pub struct SchemaWalk<'a> {
     grammar: &'a Grammar,
@@ -316,23 +287,6 @@ impl<'a> SchemaWalk<'a> {
     fn unknown_variant(&mut self, place: &Place, name: &str, names: &[&str]) {
         self.report(place, format!("unknown kind `{name}`"), Some(suggest::help(name, names, "kinds")));
     }
-}
-
-/// The keywords of a schema that the walk would silently ignore: none in a schema that is enforced.
-pub fn unsupported_keywords(schema: &Json) -> Vec<String> {
-    let Some(object) = schema.as_object() else { return Vec::new() };
-    let mut unsupported: Vec<String> =
-        object.keys().filter(|key| !KEYWORDS.contains(&key.as_str())).cloned().collect();
-    for (key, value) in object {
-        let inner: Vec<&Json> = match key.as_str() {
-            "properties" | "$defs" => value.as_object().into_iter().flat_map(|o| o.values()).collect(),
-            "anyOf" | "oneOf" => value.as_array().into_iter().flatten().collect(),
-            "items" | "additionalProperties" => vec![value],
-            _ => Vec::new(),
-        };
-        unsupported.extend(inner.into_iter().flat_map(unsupported_keywords));
-    }
-    unsupported
 }
 
 /// The largest number of an integer type narrower than the 64 bits of the file's integers.

@@ -106,11 +106,6 @@ impl Better {
         self.total
     }
 
-    /// The dipole of the real and the virtual source.
-    pub fn shape(&self) -> Dipole {
-        self.shape
-    }
-
     /// s = sqrt(sigma_a / D), 1/mm.
     pub fn sigma_tr(&self) -> f64 {
         self.shape.sigma_tr

@@ -58,9 +58,4 @@ impl Classical {
     pub fn shape(&self) -> Dipole {
         self.shape
     }
-
-    /// Effective transport coefficient s, 1/mm.
-    pub fn sigma_tr(&self) -> f64 {
-        self.shape.sigma_tr
-    }
 }

@@ -52,8 +52,8 @@ const PARALLEL: f64 = 1e-12;
 
 /// The directional dipole.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Directional {
-    /// Diffusion coefficient D, mm.
+pub struct DirectionalDipole {
+    /// D, mm.
     diffusion: f64,
     /// Effective transport coefficient s, 1/mm.
     sigma_tr: f64,
@@ -86,13 +86,13 @@ pub struct DirectionalTerms {
     pub mu0: f64,
 }
 
-impl Directional {
+impl DirectionalDipole {
     /// For a medium that scatters: its reduced coefficients and its own, unreduced sigma_t, 1/mm.
-    pub fn new(reduced: &Reduced, sigma_t: f64, moments: &FresnelMoments) -> Directional {
+    pub fn new(reduced: &Reduced, sigma_t: f64, moments: &FresnelMoments) -> DirectionalDipole {
         let diffusion = 1.0 / (3.0 * reduced.sigma_t);
         let extrapolation = EXTRAPOLATION * diffusion / reduced.albedo.sqrt();
         let scale = 1.0 / (moments.passed() * 4.0 * PI * PI);
-        Directional {
+        DirectionalDipole {
             diffusion,
             sigma_tr: reduced.sigma_tr(),
             extrapolation,

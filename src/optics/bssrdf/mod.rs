@@ -44,7 +44,7 @@ mod tests;
 
 pub use better::Better;
 pub use classical::Classical;
-pub use directional::{Directional, DirectionalTerms};
+pub use directional::{DirectionalDipole, DirectionalTerms};
 pub use ends::{Entry, Exit};
 pub use fit::{FitError, GaussianFit, MOST_TERMS, fit};
 pub use gaussians::{Gaussians, SKIN, Term};
@@ -159,7 +159,7 @@ enum Kernel {
     /// `scale` times R(|xo - xi|).
     Radial { profile: RadialProfile, scale: f64 },
     /// Of more than the distance.
-    Directional(Directional),
+    Directional(DirectionalDipole),
 }
 
 /// R(r), the exitance at distance r from a beam of power 1 that has entered a half-space; 1/mm^2.
@@ -211,7 +211,8 @@ impl Model {
                 Ok(Bssrdf { sigma_tr, leaves_out_single: true, ..bssrdf(kernel) })
             }
             Model::Directional { moments } => {
-                let directional = Directional::new(&reduced, medium.sigma_t, &moments.of_flux(eta));
+                let directional =
+                    DirectionalDipole::new(&reduced, medium.sigma_t, &moments.of_flux(eta));
                 let sigma_s = medium.sigma_t * medium.albedo;
                 let straight_sigma_t =
                     reduced.sigma_a + sigma_s * (1.0 - medium.phase.g * medium.phase.g);

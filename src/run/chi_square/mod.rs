@@ -12,7 +12,7 @@ use super::interrupt::Interrupt;
 use crate::results::npy::Array;
 use crate::results::sampler::{ContrastRun, Delta, NullMass, SamplerRun, bins_path};
 use crate::results::store::Arrays;
-use crate::results::timing::Cost;
+use crate::results::timing::TimeSpent;
 use crate::samplers::{Draw, Null, Sampler};
 use crate::sampling::stream::{Purpose, StreamKey};
 use crate::stats::moments::Moments;
@@ -28,7 +28,7 @@ pub struct Sampled {
     /// Its arrays, by the names that `run` gives.
     pub arrays: Arrays,
     /// Time spent on it.
-    pub cost: Cost,
+    pub cost: TimeSpent,
 }
 
 /// A built sampler with its streams.
@@ -116,7 +116,7 @@ impl Draws {
         let (run, arrays) =
             Assembly { job: self, partition: &partition, masses: &masses, counts: &counts, total }
                 .record(&counting, contrasts, &quadrature, exhausted);
-        let cost = Cost {
+        let cost = TimeSpent {
             cpu_seconds,
             wall_seconds: wall.elapsed().as_secs_f64(),
             passes: self.samples,

@@ -138,12 +138,6 @@ impl ThinningRule {
         self.form.probability(d)
     }
 
-    /// Weight of an accepted point at distance d: 1/p(d).
-    #[inline]
-    pub fn weight(&self, d: f64) -> f64 {
-        1.0 / self.probability(d)
-    }
-
     /// Whether p varies by more than a factor between two distances, with `most` at the nearer.
     #[inline]
     fn varies(&self, factor: f64, [near, far]: [f64; 2], most: f64) -> bool {

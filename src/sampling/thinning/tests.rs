@@ -75,12 +75,14 @@ const BANDS: [f64; 12] = [
 ];
 
 #[test]
-fn probability_times_weight_is_one() {
+fn accepted_points_weigh_one_over_their_probability() {
     let bands = BANDS.map(|sigma| ("a band", ThinningRule::new(ThinningForm::Exponential { sigma })));
     for (name, rule) in rules().into_iter().chain(bands) {
         for k in 0..2000 {
             let d = 0.05 * f64::from(k);
-            let one = rule.probability(d) * rule.weight(d);
+            let u = 0.5 * rule.probability(d);
+            let (distance, weight) = decide(&rule, u, d * d).expect("half of its probability");
+            let one = rule.probability(distance) * weight;
             assert!((one - 1.0).abs() <= 4.0 * f64::EPSILON, "{name} at {d}: {one}");
         }
     }

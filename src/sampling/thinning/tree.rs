@@ -102,6 +102,7 @@ impl PointTree {
     }
 
     /// Memory behind it, bytes.
+    #[cfg(test)]
     pub fn heap_bytes(&self) -> usize {
         let axes: usize = self.axes.iter().map(|axis| size_of_val(&**axis)).sum();
         axes + size_of_val(&*self.order) + size_of_val(&*self.nodes)

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{RegionShares, Screen, SensorKind, SensorRay, SensorRegion};
+use super::{RegionShares, Screen, SensorMethods, SensorRay, SensorRegion, by_its_screen};
 use crate::geometry::{BoundingSphere, Ray};
 use crate::math::{DVec3, Frame};
 use crate::sampling::warp::square_to_cosine_hemisphere;
@@ -19,7 +19,7 @@ pub struct Accepting {
     /// Squared sine of the cap's half angle.
     sin2: f64,
     /// Sphere around the body: rays start before it.
-    bounds: BoundingSphere,
+    pub(super) bounds: BoundingSphere,
 }
 
 impl Accepting {
@@ -29,11 +29,6 @@ impl Accepting {
     pub fn new(screen: Screen, center: DVec3, height: f64, bounds: BoundingSphere) -> Accepting {
         let sin2 = height * (2.0 - height);
         Accepting { screen, center, frame: Frame::about(screen.view), sin2, bounds }
-    }
-
-    /// Sphere around the body.
-    pub fn bounds(&self) -> BoundingSphere {
-        self.bounds
     }
 
     /// The pixel whose square the line of `out` crosses, if the cap holds its reversed direction.
@@ -58,14 +53,8 @@ impl Accepting {
     }
 }
 
-impl SensorKind for Accepting {
-    fn pixels(&self) -> Option<(usize, usize)> {
-        Some(self.screen.size())
-    }
-
-    fn rays_per_pass(&self) -> usize {
-        self.screen.count()
-    }
+impl SensorMethods for Accepting {
+    by_its_screen!();
 
     /// A point uniform in the pixel, a direction with density proportional to its cosine in the cap. The
     /// ray starts two radii before the body's middle: outside the body and before all of it, wherever
@@ -89,14 +78,5 @@ impl SensorKind for Accepting {
     #[inline]
     fn receive(&self, out: &Ray) -> Option<(usize, f64)> {
         self.pixel(out).map(|pixel| (pixel, 1.0 / self.extent()))
-    }
-
-    fn regions(&self) -> Vec<SensorRegion> {
-        self.screen.regions()
-    }
-
-    #[inline]
-    fn regions_of(&self, slot: usize) -> RegionShares {
-        self.screen.regions_of(slot)
     }
 }

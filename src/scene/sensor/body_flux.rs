@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{RegionShares, SensorKind, SensorRay, SensorRegion, bin};
+use super::{RegionShares, SensorMethods, SensorRay, SensorRegion, bin};
 use crate::geometry::{BoundingSphere, Ray};
 use crate::math::{DVec3, Frame, sin_cos_turns};
 
@@ -19,7 +19,7 @@ pub struct BodyFlux {
     pub paths: usize,
 }
 
-impl SensorKind for BodyFlux {
+impl SensorMethods for BodyFlux {
     fn rays_per_pass(&self) -> usize {
         self.bins * self.paths
     }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{RegionShares, SensorKind, SensorRay, SensorRegion, bin};
+use super::{RegionShares, SensorMethods, SensorRay, SensorRegion, bin};
 use crate::geometry::Ray;
 use crate::math::{DVec3, Frame};
 use crate::sampling::warp::square_to_cosine_hemisphere;
@@ -31,7 +31,7 @@ pub struct FluxFace {
     pub frame: Frame,
 }
 
-impl SensorKind for FaceFlux {
+impl SensorMethods for FaceFlux {
     fn rays_per_pass(&self) -> usize {
         self.faces.len() * self.bins * self.paths
     }

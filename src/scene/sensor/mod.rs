@@ -1,7 +1,7 @@
 //! Sensors: what a pass measures, as rays with weights. A pass traces every ray of the sensor once;
 //! ray i belongs to one slot (a pixel, or a bin of a flux), and slots add up to regions.
 //!
-//! One file a kind of sensor, which implements [`SensorKind`]; [`Sensor`] passes every call on to its
+//! One file a kind of sensor, which implements [`SensorMethods`]; [`Sensor`] passes every call on to its
 //! kind.
 
 mod accepting;
@@ -49,7 +49,7 @@ pub enum Sensor {
     BodyFlux(BodyFlux),
 }
 
-/// Calls a method of [`SensorKind`] on whichever kind a sensor is.
+/// Calls a method of [`SensorMethods`] on whichever kind a sensor is.
 macro_rules! call {
     ($sensor:ident.$method:ident($($argument:expr),*)) => {
         match $sensor {
@@ -65,15 +65,41 @@ macro_rules! call {
     };
 }
 
-/// What a kind of sensor declares; the methods of [`Sensor`] document each.
-trait SensorKind {
+/// What sensors say whose slots are the pixels of their screen.
+macro_rules! by_its_screen {
+    () => {
+        fn pixels(&self) -> Option<(usize, usize)> {
+            Some(self.screen.size())
+        }
+
+        fn rays_per_pass(&self) -> usize {
+            self.screen.count()
+        }
+
+        fn regions(&self) -> Vec<SensorRegion> {
+            self.screen.regions()
+        }
+
+        #[inline]
+        fn regions_of(&self, slot: usize) -> RegionShares {
+            self.screen.regions_of(slot)
+        }
+    };
+}
+use by_its_screen;
+
+/// What a kind of sensor says of itself; the methods of [`Sensor`] tell what each means.
+trait SensorMethods {
     fn rays_per_pass(&self) -> usize;
 
     fn ray(&self, index: usize, u: [f64; 4]) -> SensorRay;
 
     fn regions(&self) -> Vec<SensorRegion>;
 
-    fn regions_of(&self, slot: usize) -> RegionShares;
+    #[inline]
+    fn regions_of(&self, _slot: usize) -> RegionShares {
+        RegionShares::one(0, 1.0)
+    }
 
     fn pixels(&self) -> Option<(usize, usize)> {
         None

@@ -1,6 +1,6 @@
 //! Parallel rays through the pixels of a screen.
 
-use super::{RegionShares, Screen, SensorKind, SensorRay, SensorRegion};
+use super::{RegionShares, Screen, SensorMethods, SensorRay, SensorRegion, by_its_screen};
 use crate::geometry::Ray;
 use crate::math::DVec3;
 
@@ -13,27 +13,12 @@ pub struct Orthographic {
     pub center: DVec3,
 }
 
-impl SensorKind for Orthographic {
-    fn pixels(&self) -> Option<(usize, usize)> {
-        Some(self.screen.size())
-    }
-
-    fn rays_per_pass(&self) -> usize {
-        self.screen.count()
-    }
+impl SensorMethods for Orthographic {
+    by_its_screen!();
 
     #[inline]
     fn ray(&self, index: usize, u: [f64; 4]) -> SensorRay {
         let origin = self.center + self.screen.offset(index, u);
         SensorRay { ray: Ray { origin, dir: self.screen.view }, weight: 1.0, slot: index }
-    }
-
-    fn regions(&self) -> Vec<SensorRegion> {
-        self.screen.regions()
-    }
-
-    #[inline]
-    fn regions_of(&self, slot: usize) -> RegionShares {
-        self.screen.regions_of(slot)
     }
 }

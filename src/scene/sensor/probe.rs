@@ -1,6 +1,6 @@
 //! One ray.
 
-use super::{RegionShares, SensorKind, SensorRay, SensorRegion};
+use super::{SensorMethods, SensorRay, SensorRegion};
 use crate::geometry::{Ray, Side};
 use crate::math::DVec3;
 
@@ -13,7 +13,7 @@ pub struct Probe {
     pub paths: usize,
 }
 
-impl SensorKind for Probe {
+impl SensorMethods for Probe {
     fn position(&self) -> Option<(DVec3, Side)> {
         Some((self.ray.origin, Side::Outside))
     }
@@ -29,10 +29,5 @@ impl SensorKind for Probe {
 
     fn regions(&self) -> Vec<SensorRegion> {
         vec![SensorRegion::split("probe")]
-    }
-
-    #[inline]
-    fn regions_of(&self, _: usize) -> RegionShares {
-        RegionShares::one(0, 1.0)
     }
 }

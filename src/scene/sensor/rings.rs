@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{RegionShares, SensorKind, SensorRay, SensorRegion};
+use super::{RegionShares, SensorMethods, SensorRay, SensorRegion};
 use crate::geometry::Ray;
 use crate::math::{DVec3, Frame};
 use crate::sampling::warp::square_to_cosine_hemisphere;
@@ -35,12 +35,12 @@ impl Rings {
     }
 }
 
-impl SensorKind for Rings {
+impl SensorMethods for Rings {
     fn rays_per_pass(&self) -> usize {
         self.paths
     }
 
-    /// Those of a face's flux in one bin; their slot waits for [`SensorKind::slot_of`].
+    /// Those of a face's flux in one bin; their slot waits for [`SensorMethods::slot_of`].
     #[inline]
     fn ray(&self, _: usize, u: [f64; 4]) -> SensorRay {
         let out = Frame::about(DVec3::Z).to_world(square_to_cosine_hemisphere([u[0], u[1]]));

@@ -161,7 +161,7 @@ fn rays_of_caps_start_before_the_body() {
     for height in [1e-4, 0.9] {
         let sensor = accepting(height);
         let Sensor::Accepting(accepting) = &sensor else { unreachable!() };
-        let bounds = accepting.bounds();
+        let bounds = accepting.bounds;
         for index in 0..sensor.rays_per_pass() {
             for v in [0.0, 0.5, 0.999] {
                 let SensorRay { ray, weight, .. } = sensor.ray(index, [0.3, 0.7, v, 0.9]);
@@ -184,7 +184,7 @@ fn uniform_light_is_received_as_radiance_one() {
         (receiving().swap_remove(1), 2.0 * PI * 0.4 * PI * 4.0, 0.001),
     ] {
         let bounds = match &sensor {
-            Sensor::Accepting(accepting) => accepting.bounds(),
+            Sensor::Accepting(accepting) => accepting.bounds,
             Sensor::BodyFlux(flux) => flux.bounds,
             _ => unreachable!(),
         };

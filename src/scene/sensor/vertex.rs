@@ -1,6 +1,6 @@
 //! A medium vertex.
 
-use super::{RegionShares, SensorKind, SensorRay, SensorRegion};
+use super::{SensorMethods, SensorRay, SensorRegion};
 use crate::geometry::{Ray, Side};
 use crate::math::DVec3;
 
@@ -13,7 +13,7 @@ pub struct Vertex {
     pub paths: usize,
 }
 
-impl SensorKind for Vertex {
+impl SensorMethods for Vertex {
     fn position(&self) -> Option<(DVec3, Side)> {
         Some((self.ray.origin, Side::Inside))
     }
@@ -29,10 +29,5 @@ impl SensorKind for Vertex {
 
     fn regions(&self) -> Vec<SensorRegion> {
         vec![SensorRegion::split("vertex")]
-    }
-
-    #[inline]
-    fn regions_of(&self, _: usize) -> RegionShares {
-        RegionShares::one(0, 1.0)
     }
 }

@@ -26,7 +26,7 @@ const SHARE: f64 = 0.05;
 /// The ratio of costs at equal error: how much longer the other renderer takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ratio {
-    /// Name of the band.
+    /// Band name.
     pub band: String,
     /// (variance of a pixel's mean x seconds) of the images over that of the record, pixels averaged.
     pub ratio: f64,

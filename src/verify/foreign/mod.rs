@@ -62,7 +62,7 @@ pub struct Question<'a> {
 /// One band's pixels for a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PixelMap {
-    /// Name of the band.
+    /// Band name.
     pub band: String,
     /// Scores: differences in units of their error, as normal values.
     pub z: Vec<f64>,

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use super::super::{
-    Better, Classical, Directional, Entry, Exit, FresnelMoments, RadialProfile, Reduced,
+    Better, Classical, DirectionalDipole, Entry, Exit, FresnelMoments, RadialProfile, Reduced,
 };
 use super::single;
 use super::{OracleRow, OracleTable};
@@ -71,7 +71,7 @@ fn every_total_of_the_directional_dipole() {
     for row in table.rows() {
         let (eta, _, reduced) = isotropic(&row);
         let moments = FresnelMoments::deon_irving(eta);
-        let directional = Directional::new(&reduced, 1.0, &moments);
+        let directional = DirectionalDipole::new(&reduced, 1.0, &moments);
         let entry = Entry { point: DVec3::ZERO, normal: DVec3::Z, dir: -DVec3::Z };
         let exit = |r: f64| Exit { point: DVec3::new(r, 0.0, 0.0), normal: DVec3::Z };
         let far = 60.0 / directional.sigma_tr() + 60.0;

@@ -1,6 +1,6 @@
 //! The directional dipole between every pair of ends of a table, and its degenerate ends.
 
-use super::super::{Directional, DirectionalTerms, Entry, Exit, FresnelMoments, Reduced};
+use super::super::{DirectionalDipole, DirectionalTerms, Entry, Exit, FresnelMoments, Reduced};
 use super::{OracleRow, OracleTable, half_unit};
 use crate::math::{DVec3, Frame};
 use crate::optics::fresnel::fresnel;
@@ -24,14 +24,14 @@ fn refract(w: DVec3, normal: DVec3, eta: f64) -> (DVec3, f64) {
     ((normal * cos - w) / eta - normal * surface.cos_t, 1.0 - surface.reflectance)
 }
 
-fn model(row: &OracleRow) -> Directional {
+fn model(row: &OracleRow) -> DirectionalDipole {
     let (sigma_a, sigma_s, g) = (row.number("sigma_a"), row.number("sigma_s"), row.number("g"));
     let reduced = Reduced::new(sigma_a, sigma_s * (1.0 - g));
-    Directional::new(&reduced, sigma_a + sigma_s, &FresnelMoments::deon_irving(row.number("eta")))
+    DirectionalDipole::new(&reduced, sigma_a + sigma_s, &FresnelMoments::deon_irving(row.number("eta")))
 }
 
 /// The columns that the ends give.
-fn columns(model: &Directional, ends: &Ends, eta: f64) -> [(&'static str, f64); 10] {
+fn columns(model: &DirectionalDipole, ends: &Ends, eta: f64) -> [(&'static str, f64); 10] {
     let [xi, ni, wi, xo, no, wo] = vectors(ends);
     let [(dir, t12), (back, t21)] = [refract(wi, ni, eta), refract(wo, no, eta)];
     let entry = Entry { point: xi, normal: ni, dir };
@@ -90,9 +90,9 @@ fn every_value_of_the_table() {
     assert!(negative >= 8 && not_reciprocal > 20, "{negative} {not_reciprocal}");
 }
 
-fn typical() -> Directional {
+fn typical() -> DirectionalDipole {
     let reduced = Reduced::new(0.032, 0.74);
-    Directional::new(&reduced, reduced.sigma_t, &FresnelMoments::exact(1.3))
+    DirectionalDipole::new(&reduced, reduced.sigma_t, &FresnelMoments::exact(1.3))
 }
 
 /// A turn that is about no axis in particular.
@@ -156,7 +156,7 @@ fn ordinary_ends_turn_with_the_scene() {
 fn the_kernel_is_the_exitance_of_the_rays_fluence() {
     let reduced = Reduced::new(0.032, 0.74);
     let moments = FresnelMoments::exact(1.3);
-    let model = Directional::new(&reduced, reduced.sigma_t, &moments);
+    let model = DirectionalDipole::new(&reduced, reduced.sigma_t, &moments);
     let entry = Entry { point: DVec3::ZERO, normal: DVec3::Z, dir: DVec3::new(0.48, -0.36, -0.8) };
     let d = 1.0 / (3.0 * reduced.sigma_t);
     let s = model.sigma_tr();
