@@ -7,7 +7,7 @@ use crate::experiment::schema::{
     Budget, CONTROL, ClaimEntry, CostMeasure, Equals, Expect, Faster, SamplerClaim,
 };
 use crate::experiment::suggest;
-use crate::experiment::sweep::SweepAxis;
+use crate::experiment::sweep_point::SweepAxis;
 
 /// The names that claims may use.
 pub struct Known<'a> {
