@@ -39,14 +39,14 @@ const DOORS: [(&str, &str); 21] = [
     ("csv", "results experiment"),
     ("schemars", "sampling optics geometry samplers estimators results experiment"),
     ("strsim", "experiment"),
-    ("toml", "experiment"),
+    ("toml", "optics samplers estimators experiment"),
     ("indicatif", "run"),
     ("rustix", "run"),
     ("signal_hook", "run"),
     ("clap", "cli"),
     ("clap_complete", "cli"),
     ("serde", "sampling optics geometry samplers estimators stats results verify report experiment run"),
-    ("serde_json", "samplers estimators stats results verify report experiment run"),
+    ("serde_json", "optics samplers estimators stats results verify report experiment run cli"),
 ];
 
 /// Is a word one of a list?

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::schema::ClaimEntry;
 pub use crate::results::record::CostMeasure;
 
 /// What follows the name of an estimator that is played a second time as a control.
@@ -91,13 +90,5 @@ impl From<&NotSlower> for Faster {
         let NotSlower { candidate, baseline, margin, cost, observable, class, detect, only } =
             words.clone();
         Faster { candidate, baseline, ratio: 1.0 / margin, cost, observable, class, detect, only }
-    }
-}
-
-impl ClaimEntry {
-    /// The comparison of efficiencies that the claim makes, if it makes one.
-    pub fn duel(&self) -> Option<Faster> {
-        let not_slower = || self.not_slower.as_ref().map(Faster::from);
-        self.faster.clone().or_else(not_slower)
     }
 }

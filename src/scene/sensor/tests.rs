@@ -1,3 +1,5 @@
+//! Sensors in closed form: what rays find and what light that leaves scores.
+
 use std::f64::consts::PI;
 
 use super::*;
