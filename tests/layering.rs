@@ -39,7 +39,7 @@ const DOORS: [(&str, &str); 21] = [
     ("csv", "results experiment"),
     ("schemars", "sampling optics geometry samplers estimators results experiment"),
     ("strsim", "experiment"),
-    ("toml", "experiment"),
+    ("toml", "optics samplers estimators experiment"),
     ("indicatif", "run"),
     ("rustix", "run"),
     ("signal_hook", "run"),

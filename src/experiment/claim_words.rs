@@ -41,6 +41,14 @@ pub struct ClaimEntry {
     pub sampler: Option<SamplerClaim>,
 }
 
+impl ClaimEntry {
+    /// The comparison of efficiencies that the claim makes, if it makes one.
+    pub fn duel(&self) -> Option<Faster> {
+        let not_slower = || self.not_slower.as_ref().map(Faster::from);
+        self.faster.clone().or_else(not_slower)
+    }
+}
+
 /// Samplers draw from the densities that they claim: counts by bin, consecutive draws, directed
 /// contrasts, discrete outcomes, and the identities between draws and densities.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
