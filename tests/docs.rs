@@ -230,6 +230,19 @@ fn pieces(prose: &str) -> Vec<(usize, &str)> {
     pieces
 }
 
+/// The anchors of a page's headings.
+fn anchors(page: &str) -> impl Iterator<Item = String> + '_ {
+    let headings = page.lines().filter(|line| line.starts_with('#'));
+    headings.map(|line| {
+        let kept = line
+            .trim_start_matches('#')
+            .trim()
+            .chars()
+            .filter(|c| c.is_alphanumeric() || " -".contains(*c));
+        kept.map(|c| if c == ' ' { '-' } else { c.to_ascii_lowercase() }).collect()
+    })
+}
+
 /// Relative links that point nowhere.
 fn dead_links(path: &str, page: &str) -> (usize, Vec<String>) {
     let folder = package().join(path).parent().expect("a folder").to_path_buf();
@@ -239,8 +252,10 @@ fn dead_links(path: &str, page: &str) -> (usize, Vec<String>) {
         without_code.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(to, _)| to);
     let relative: Vec<&str> = targets.filter(|to| !to.contains("://")).collect();
     let dead = relative.iter().filter(|to| {
-        let file = to.split('#').next().unwrap_or_default();
-        !folder.join(file).is_file()
+        let (file, anchor) = to.split_once('#').unwrap_or((to, ""));
+        let is_there =
+            folder.join(file).is_file() || file.is_empty() && anchors(page).any(|a| a == anchor);
+        !is_there
     });
     (relative.len(), dead.map(|to| format!("{path}: {to}")).collect())
 }

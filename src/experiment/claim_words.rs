@@ -182,11 +182,3 @@ pub struct Agree {
     #[serde(default, rename = "where", skip_serializing_if = "BTreeMap::is_empty")]
     pub only: BTreeMap<String, String>,
 }
-
-impl ClaimEntry {
-    /// The comparison of efficiencies that the claim makes, if it makes one.
-    pub fn duel(&self) -> Option<Faster> {
-        let not_slower = || self.not_slower.as_ref().map(Faster::from);
-        self.faster.clone().or_else(not_slower)
-    }
-}
