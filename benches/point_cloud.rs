@@ -9,18 +9,24 @@
 //! smallest and the largest.
 
 use std::hint::black_box;
+use std::time::Duration;
 
 use scatterproof::math::{DVec3, sin_cos_turns};
 use scatterproof::optics::bssrdf::{Bssrdf, Entry, Exit, Model, MomentKind, Outgoing};
 use scatterproof::optics::materials;
 use scatterproof::optics::medium::Medium;
-use scatterproof::run::clock::thread_cpu_time;
 use scatterproof::sampling::stream::{Purpose, Stream, StreamKey};
 use scatterproof::sampling::thinning::{
     Accepted, PointTree, ThinningForm, ThinningRule, ThinningWork, scan,
 };
 
 const REPEATS: usize = 7;
+
+/// CPU time that the calling thread has used so far.
+fn thread_cpu_time() -> Duration {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    Duration::new(now.tv_sec.unsigned_abs(), now.tv_nsec as u32)
+}
 
 fn main() {
     if std::env::args().any(|arg| arg == "--test") {

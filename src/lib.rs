@@ -62,6 +62,8 @@
 //! | bin | a set of samples whose count a chi-square test compares with its expected mass |
 //! | gate | a check that a change must pass in continuous integration, and nothing else |
 
+// What is `pub` is for estimators of your own and for readers of records; the compiler finds the rest unused.
+#![deny(unreachable_pub)]
 // Tests compare portable functions with std's; what ships is linted without them.
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
@@ -103,13 +105,13 @@ pub mod results;
 pub mod verify;
 
 /// Tables and images for people.
-pub mod report;
+mod report;
 
 /// Experiment files: schema, validation, build.
 pub mod experiment;
 
 /// Blocks, threads, checkpoints, ordered merge.
-pub mod run;
+mod run;
 
 /// The command line, one file per subcommand.
 pub mod cli;

@@ -4,11 +4,10 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
-use scatterproof::report;
 use scatterproof::results::json::hash_hex;
 use scatterproof::results::manifest::{MANIFEST, Manifest};
-use scatterproof::results::store::RecordFolder;
 
 /// Folders of published results, by setting.
 const SETTINGS: [&str; 2] = ["short", "full"];
@@ -89,7 +88,14 @@ fn stale(folder: &Path) -> Vec<String> {
             fs::write(path, bytes).expect("a file");
         }
     }
-    report::write(&RecordFolder::new(&copy)).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let report = Command::new(env!("CARGO_BIN_EXE_scatterproof")).arg("report").arg(&copy).output();
+    let report = report.expect("the program starts");
+    assert!(
+        report.status.success(),
+        "{}: {}",
+        folder.display(),
+        String::from_utf8_lossy(&report.stderr)
+    );
     let (told, made) = (manifest(&all[MANIFEST]), manifest(&files(&copy)[MANIFEST]));
     let names =
         told.views.keys().chain(made.views.keys().filter(|name| !told.views.contains_key(*name)));

@@ -12,7 +12,7 @@ use crate::run::build_all;
 ///
 /// Without `--setting`, every setting of a file is validated too.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub(super) struct Args {
     /// Experiment files.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
@@ -25,7 +25,7 @@ pub struct Args {
 ///
 /// # Errors
 /// The findings of all files together.
-pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
+pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
     let mut findings = Vec::new();
     for path in &args.files {
         let options = args.reading.options();

@@ -26,7 +26,7 @@ use crate::verify::verdict::{TestKind, Verdict};
 /// --max-slowdown; 2 bad usage; 3 nothing can be compared, or the first observable of an estimator
 /// cannot be judged.
 #[derive(clap::Args, Debug)]
-pub struct Args {
+pub(super) struct Args {
     /// The reference: a results folder, such as a baseline kept in git.
     #[arg(value_name = "BEFORE")]
     before: PathBuf,
@@ -56,7 +56,7 @@ pub struct Args {
 ///
 /// # Errors
 /// No record, a damaged one, nothing in common, I/O.
-pub fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
+pub(super) fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
     let [before, after] = [&args.before, &args.after].map(|path| RecordFolder::new(path).read());
     let (before, after) = (before?, after?);
     let terms = Terms { level: args.level, detect: args.detect, max_slowdown: args.max_slowdown };

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 /// Print a shell completion script, for example `scatterproof completions bash >
 /// ~/.bash_completion.d/scatterproof`.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub(super) struct Args {
     /// Shell that the script is for.
     pub shell: Shell,
 }
@@ -19,7 +19,12 @@ pub struct Args {
 ///
 /// # Errors
 /// The output cannot be written.
-pub fn run(args: &Args, mut command: clap::Command, name: &str, out: &mut dyn Write) -> Result<()> {
+pub(super) fn run(
+    args: &Args,
+    mut command: clap::Command,
+    name: &str,
+    out: &mut dyn Write,
+) -> Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, name, &mut script);
     out.write_all(&script).map_err(Error::io(Path::new("stdout"), "print"))

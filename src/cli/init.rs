@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 
 /// A commented experiment with a known result: without absorption all light leaves the body.
-pub const EXAMPLE: &str = r#"# One file is one experiment. Keys carry units; `scatterproof schema` prints
+pub(super) const EXAMPLE: &str = r#"# One file is one experiment. Keys carry units; `scatterproof schema` prints
 # everything that a file may contain, `scatterproof check FILE` reports what is wrong with it.
 
 name = "furnace"                # also its folder under results/
@@ -59,7 +59,7 @@ budget.passes = 8
 
 /// Write a commented example experiment.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub(super) struct Args {
     /// The file to write; an existing file is never overwritten.
     #[arg(default_value = "experiment.toml", value_name = "FILE")]
     pub path: PathBuf,
@@ -69,7 +69,7 @@ pub struct Args {
 ///
 /// # Errors
 /// The file exists, or it cannot be written.
-pub fn run(args: &Args, out: &mut dyn Write) -> Result<()> {
+pub(super) fn run(args: &Args, out: &mut dyn Write) -> Result<()> {
     let path = &args.path;
     let mut file = match OpenOptions::new().write(true).create_new(true).open(path) {
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {

@@ -37,7 +37,7 @@ const RELATIVE_LIMIT: f64 = 0.1;
 /// bias was found; 2 bad input; 3 such a bias could have gone unseen (underpowered), or the test would
 /// be meaningless (invalid).
 #[derive(clap::Args, Debug)]
-pub struct Args {
+pub(super) struct Args {
     /// The images, two or more.
     #[arg(required = true, value_name = "IMAGES")]
     images: Vec<PathBuf>,
@@ -86,7 +86,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Bad input, no record, I/O. A bias is no error: it is the exit code.
-pub fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
+pub(super) fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
     let folder = RecordFolder::new(&args.reference);
     let stored = folder.read()?;
     let cell = cell(&stored, args.cell.as_deref())?;

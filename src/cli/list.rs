@@ -14,14 +14,14 @@ use crate::optics::{dispersion, materials};
 
 /// List what an experiment file may use: estimators, materials, shapes and more.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub(super) struct Args {
     /// The topic; default: all topics.
     pub topic: Option<Topic>,
 }
 
 /// Topics that can be listed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Topic {
+pub(super) enum Topic {
     /// Kinds of `[[estimator]]` and their options.
     Estimators,
     /// Kinds of `[[sampler]]` and their options, in experiments on samplers.
@@ -52,7 +52,7 @@ pub enum Topic {
 ///
 /// # Errors
 /// The output cannot be written.
-pub fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
+pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
     let text = match args.topic {
         Some(topic) => lines(topic, registry),
         None => {

@@ -1,16 +1,20 @@
 //! The command line: one file a subcommand, no logic of their own. Door for `clap`.
 
-pub mod check;
-pub mod compare;
-pub mod completions;
-pub mod init;
-pub mod judge;
-pub mod list;
-pub mod plan;
-pub mod report;
-pub mod run;
-pub mod schema;
-pub mod verify;
+mod check;
+mod compare;
+mod completions;
+mod init;
+mod judge;
+mod list;
+mod plan;
+mod report;
+mod run;
+mod schema;
+mod verify;
+
+/// Experiments on samplers, from the experiment to verdicts.
+#[cfg(test)]
+mod samplers_tests;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

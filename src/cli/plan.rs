@@ -15,7 +15,7 @@ use crate::run::{self, Plan, estimate_seconds};
 
 /// Show what would run: cells, estimated time and memory, and where each value comes from.
 #[derive(clap::Args, Debug)]
-pub struct Args {
+pub(super) struct Args {
     /// An experiment file.
     #[arg(value_name = "FILE")]
     file: PathBuf,
@@ -33,7 +33,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Bad input.
-pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
+pub(super) fn run(args: &Args, registry: &Registry) -> Result<u8> {
     let experiment = load(&args.file, &args.reading.options(), registry)?;
     let plan = run::plan(&experiment, registry)?;
     let threads = args.threads.unwrap_or_else(|| run::Options::new("").threads);

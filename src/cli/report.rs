@@ -8,7 +8,7 @@ use crate::results::store::RecordFolder;
 
 /// Make tables, images and pages again from records alone.
 #[derive(clap::Args, Debug)]
-pub struct Args {
+pub(super) struct Args {
     /// Results folders.
     #[arg(required = true, value_name = "DIR")]
     folders: Vec<PathBuf>,
@@ -18,7 +18,7 @@ pub struct Args {
 ///
 /// # Errors
 /// No record, a damaged one, I/O.
-pub fn run(args: &Args) -> Result<u8> {
+pub(super) fn run(args: &Args) -> Result<u8> {
     for folder in &args.folders {
         report::write(&RecordFolder::new(folder))?;
         println!("{}", folder.join("report.html").display());

@@ -15,7 +15,7 @@ use crate::run::tev::Address;
 ///
 /// An interrupted run resumes where it stopped; a complete run is not repeated.
 #[derive(clap::Args, Debug)]
-pub struct Args {
+pub(super) struct Args {
     /// Experiment files.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
@@ -37,7 +37,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Bad input in any file (found before the first runs), I/O, interruption.
-pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
+pub(super) fn run(args: &Args, registry: &Registry) -> Result<u8> {
     let interrupt = listen()?;
     let mut options = args.working.options();
     options.passes_of = args.passes_of.clone();

@@ -9,13 +9,13 @@ use crate::experiment::schema_json::editor_schema;
 
 /// Print the JSON Schema of experiment files, for completion and checks in editors.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub(super) struct Args {}
 
 /// Prints the schema with the registered estimators and samplers.
 ///
 /// # Errors
 /// The output cannot be written.
-pub fn run(_: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
+pub(super) fn run(_: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
     writeln!(out, "{:#}", editor_schema(registry)).map_err(Error::io(Path::new("stdout"), "print"))
 }
 

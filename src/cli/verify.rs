@@ -25,7 +25,7 @@ use crate::verify::verdict::{self, TestKind, Verdict};
 ///
 /// Exit codes: 0 every claim is green; 1 a claim failed; 3 a claim is underpowered or invalid.
 #[derive(clap::Args, Debug)]
-pub struct Args {
+pub(super) struct Args {
     /// Experiment files, folders of them, or results folders (judged as they are).
     #[arg(value_name = "FILE or DIR", default_value = "experiments/verify")]
     paths: Vec<PathBuf>,
@@ -82,7 +82,7 @@ struct Court<'a> {
 ///
 /// # Errors
 /// Bad input, I/O, interruption. A claim that does not hold is no error: it is the exit code.
-pub fn run(args: &Args, registry: &Registry) -> Result<u8> {
+pub(super) fn run(args: &Args, registry: &Registry) -> Result<u8> {
     let mut court = Court {
         registry,
         reading: args.reading.options(),

@@ -75,7 +75,7 @@ impl WalkBands for OneBand {
 }
 
 /// The most bands that can share a walk.
-pub const MAX_SHARED: usize = 32;
+pub(super) const MAX_SHARED: usize = 32;
 
 /// A walk that all bands share.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +89,7 @@ pub(super) struct SharedBands {
 
 impl SharedBands {
     /// At the sensor; at most [`MAX_SHARED`] media.
-    pub fn new(media: &[Medium], hero: usize) -> SharedBands {
+    pub(super) fn new(media: &[Medium], hero: usize) -> SharedBands {
         SharedBands {
             hero,
             count: media.len(),

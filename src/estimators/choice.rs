@@ -4,7 +4,7 @@ use crate::sampling::discrete::choose_share;
 use crate::scene::Scene;
 
 /// Probability of choosing each light, per band; all 0 where no light shines.
-pub fn light_shares(scene: &Scene) -> Vec<Vec<f64>> {
+pub(super) fn light_shares(scene: &Scene) -> Vec<Vec<f64>> {
     (0..scene.bands())
         .map(|band| {
             let strengths: Vec<f64> = scene.lights.iter().map(|l| l.strength(band)).collect();
@@ -17,6 +17,6 @@ pub fn light_shares(scene: &Scene) -> Vec<Vec<f64>> {
 
 /// The light that `u` selects and the probability of that choice, from one band's shares.
 #[inline]
-pub fn choose_light(shares: &[f64], u: f64) -> Option<(usize, f64)> {
+pub(super) fn choose_light(shares: &[f64], u: f64) -> Option<(usize, f64)> {
     choose_share(shares.iter().copied(), u)
 }

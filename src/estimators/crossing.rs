@@ -5,7 +5,7 @@ use crate::optics::boundary::Boundary;
 
 /// The opposite side of a boundary.
 #[inline]
-pub fn other(side: Side) -> Side {
+pub(super) fn other(side: Side) -> Side {
     match side {
         Side::Outside => Side::Inside,
         Side::Inside => Side::Outside,
@@ -14,7 +14,7 @@ pub fn other(side: Side) -> Side {
 
 /// Undoes radiance's factor (n_o / n_i)^2 of a refraction from `side` (of wo) to `next` (of wi).
 #[inline]
-pub fn radiance_scale(side: Side, next: Side, boundary: &Boundary) -> f64 {
+pub(super) fn radiance_scale(side: Side, next: Side, boundary: &Boundary) -> f64 {
     let eta = match boundary {
         Boundary::Smooth { eta } | Boundary::Rough { eta, .. } => *eta,
         Boundary::Matched => 1.0,

@@ -65,7 +65,7 @@ pub(super) struct Emergence<'a> {
 impl Emergence<'_> {
     /// The throughput of one of its bands.
     #[inline]
-    pub fn throughput_of(&self, band: usize) -> f64 {
+    pub(super) fn throughput_of(&self, band: usize) -> f64 {
         let place = self.bands.iter().position(|&own| own == band);
         place.map_or(0.0, |place| self.throughput[place])
     }
@@ -112,7 +112,7 @@ impl BssrdfScene {
     ///
     /// # Errors
     /// A medium that the model does not fit.
-    pub fn new(
+    pub(super) fn new(
         scene: Arc<Scene>,
         model: &Model,
         straight: bool,
@@ -153,7 +153,7 @@ impl BssrdfScene {
 
     /// A light for all bands, and the probability of that choice.
     #[inline]
-    pub fn choose_light(&self, u: f64) -> Option<(usize, f64)> {
+    pub(super) fn choose_light(&self, u: f64) -> Option<(usize, f64)> {
         choose_light(&self.choice, u)
     }
 
@@ -176,7 +176,7 @@ impl BssrdfScene {
     /// so.
     ///
     /// Bands whose light samples are the same direction share its shadow ray.
-    pub fn enter(
+    pub(super) fn enter(
         &self,
         emergence: &Emergence<'_>,
         hit: &Hit,
@@ -205,7 +205,7 @@ impl BssrdfScene {
     }
 
     /// What camera paths cannot find.
-    pub fn notes(&self) -> Vec<String> {
+    pub(super) fn notes(&self) -> Vec<String> {
         let parallel = self.scene.lights.iter().filter(|light| light.is_directional());
         parallel
             .filter(|_| self.eta.iter().any(|&eta| eta != 1.0))
@@ -222,7 +222,7 @@ impl BssrdfScene {
 
     /// Traces the camera paths of a pass: all of the sensor's for each group of bands, with what
     /// `gather_in` makes for that group.
-    pub fn pass<G: Gather>(
+    pub(super) fn pass<G: Gather>(
         &self,
         bands: &[usize],
         key: &PassKey,

@@ -26,14 +26,14 @@ pub(super) struct Arrival {
 }
 
 impl Illumination {
-    pub fn new(scene: &Scene) -> Illumination {
+    pub(super) fn new(scene: &Scene) -> Illumination {
         Illumination { shares: light_shares(scene) }
     }
 
     /// One light in proportion to its strength (`u[0]`), a direction from it; `None` where no light
     /// shines.
     #[inline]
-    pub fn draw(&self, scene: &Scene, band: usize, u: [f64; 3]) -> Option<Arrival> {
+    pub(super) fn draw(&self, scene: &Scene, band: usize, u: [f64; 3]) -> Option<Arrival> {
         let (light, choice) = choose_light(&self.shares[band], u[0])?;
         let sample = scene.lights[light].sample(band, [u[1], u[2]]);
         let value = sample.radiance / (choice * sample.pdf.unwrap_or(1.0));
@@ -58,7 +58,7 @@ impl Entrance {
     /// For light from `wi`, with the cosine and the transmittance of the shading normal. `None` from
     /// below, or where the light is above one of the two normals and below the other, which is counted.
     #[inline]
-    pub fn at(hit: &Hit, wi: DVec3, eta: f64, scores: &mut Scores) -> Option<Entrance> {
+    pub(super) fn at(hit: &Hit, wi: DVec3, eta: f64, scores: &mut Scores) -> Option<Entrance> {
         let frame = Frame::about(hit.shading_normal);
         let local = frame.to_local(wi);
         let [geometric, shading] = [wi.dot(hit.normal) > 0.0, local.z > 0.0];
@@ -79,7 +79,13 @@ impl Entrance {
 
     /// The same where nothing is between the point and the light.
     #[inline]
-    pub fn lit(scene: &Scene, hit: &Hit, wi: DVec3, eta: f64, scores: &mut Scores) -> Option<Entrance> {
+    pub(super) fn lit(
+        scene: &Scene,
+        hit: &Hit,
+        wi: DVec3,
+        eta: f64,
+        scores: &mut Scores,
+    ) -> Option<Entrance> {
         let entrance = Entrance::at(hit, wi, eta, scores)?;
         scores.count(Cost::ShadowRays);
         let shadow_ray = Ray { origin: hit.point, dir: wi };

@@ -56,7 +56,7 @@ pub(super) struct Field {
 
 impl Field {
     /// Prepares a scene for tracing with this roulette.
-    pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Field {
+    pub(super) fn new(scene: Arc<Scene>, roulette: Roulette) -> Field {
         let choice = light_shares(&scene);
         Field { bounds: scene.shape.bounds(), roulette, choice, scene }
     }
@@ -208,7 +208,7 @@ pub(super) struct CameraWalk<'a, R, B> {
 
 impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Traces a path; returns how many numbers its walk drew.
-    pub fn trace(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
+    pub(super) fn trace(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
         let walk = CameraWalk::start(path, scores, rivals, bands);
         walk.scores.count(Cost::Rays);
         match walk.scene.shape.intersect(&walk.ray, Side::Outside, None, f64::INFINITY) {
@@ -220,7 +220,12 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Traces the last two segments in the medium alone: the sensor's ray is the arrival at x_i, the
     /// next flight must end in the medium, the one after it at the boundary, and what leaves there must
     /// meet a light.
-    pub fn trace_two_bounces(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> Option<()> {
+    pub(super) fn trace_two_bounces(
+        path: Path<'a>,
+        scores: &'a mut Scores,
+        rivals: R,
+        bands: B,
+    ) -> Option<()> {
         let mut walk = CameraWalk::start(path, scores, rivals, bands);
         walk.history.scatter();
         R::call(&mut walk);
@@ -498,20 +503,20 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// The same for a path that has left the walk, with what the bands made of it since. Where it ends
     /// is not known here: sensors that ask are not served by techniques that score so.
     #[inline]
-    pub fn score_with(&mut self, bands: &B, class: TransportClass, light: usize, value: f64) {
+    pub(super) fn score_with(&mut self, bands: &B, class: TransportClass, light: usize, value: f64) {
         let place = ScorePlace { slot: self.slot, band: self.band, class, light };
         bands.score(self.scores, place, value);
     }
 
     /// With which probability light sampling chooses a light.
     #[inline]
-    pub fn choice(&self, light: usize) -> f64 {
+    pub(super) fn choice(&self, light: usize) -> f64 {
         self.choice[light]
     }
 
     /// The exit of a path that arrives along `dir`; `None` (and counted) where shading and geometric
     /// normal disagree about the side.
-    pub fn exit_at(&mut self, hit: Hit, dir: DVec3) -> Option<WalkExit> {
+    pub(super) fn exit_at(&mut self, hit: Hit, dir: DVec3) -> Option<WalkExit> {
         let frame = Frame::about(hit.shading_normal);
         let wo = frame.to_local(-dir);
         if wo.z >= 0.0 {
@@ -522,7 +527,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     }
 
     /// Whether a direction leads outside at an exit; counted where the normals disagree.
-    pub fn leads_outside(&mut self, exit: &WalkExit, dir: DVec3) -> bool {
+    pub(super) fn leads_outside(&mut self, exit: &WalkExit, dir: DVec3) -> bool {
         let [geometric, shading] = [exit.hit.normal, exit.frame.n].map(|normal| dir.dot(normal) > 0.0);
         if geometric != shading {
             self.scores.note(Anomaly::WrongSide);

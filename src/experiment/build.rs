@@ -20,7 +20,7 @@ use crate::results::record::Band;
 use crate::scene::{Emission, LatLong, Light, Scene};
 
 /// Builds the scenes of an experiment; equal shapes and maps are built once and shared.
-pub struct Builder<'a> {
+pub(crate) struct Builder<'a> {
     experiment: &'a Experiment,
     bands: Vec<Band>,
     shapes: BTreeMap<String, Arc<Shape>>,
@@ -29,18 +29,18 @@ pub struct Builder<'a> {
 
 impl<'a> Builder<'a> {
     /// A builder of the experiment's scenes.
-    pub fn new(experiment: &'a Experiment) -> Builder<'a> {
+    pub(crate) fn new(experiment: &'a Experiment) -> Builder<'a> {
         let bands = experiment.file.bands.as_ref().map(bands).unwrap_or_default();
         Builder { experiment, bands, shapes: BTreeMap::new(), maps: BTreeMap::new() }
     }
 
     /// The bands, with the colours they show as.
-    pub fn bands(&self) -> &[Band] {
+    pub(crate) fn bands(&self) -> &[Band] {
         &self.bands
     }
 
     /// Bytes that the shapes and maps built so far hold.
-    pub fn memory_bytes(&self) -> usize {
+    pub(crate) fn memory_bytes(&self) -> usize {
         let shapes: usize = self.shapes.values().map(|shape| shape.memory_bytes()).sum();
         shapes + self.maps.values().map(|map| map.memory_bytes()).sum::<usize>()
     }
@@ -49,7 +49,7 @@ impl<'a> Builder<'a> {
     ///
     /// # Errors
     /// A mesh or map that cannot be used, a sensor inside the body, a vertex outside.
-    pub fn scene(&mut self, cell: &CellSpec) -> Result<Scene> {
+    pub(crate) fn scene(&mut self, cell: &CellSpec) -> Result<Scene> {
         let shape = self.shape(&cell.object.shape)?;
         let boundary = self.boundary(&cell.object.boundary)?;
         let medium = cell.object.medium.per_band(&self.experiment.file.band_list());
@@ -177,7 +177,7 @@ impl<'a> Builder<'a> {
 
 /// Hashes of the files that an experiment reads, hex, by the path it gives them: a mesh that changed
 /// makes another experiment. Files that cannot be read are left to the loader's error.
-pub fn inputs(experiment: &Experiment) -> BTreeMap<String, String> {
+pub(crate) fn inputs(experiment: &Experiment) -> BTreeMap<String, String> {
     let mesh = |cell: &CellSpec| match &cell.object.shape {
         ShapeEntry::Mesh { path, .. } => Some(path.clone()),
         _ => None,
@@ -196,7 +196,7 @@ pub fn inputs(experiment: &Experiment) -> BTreeMap<String, String> {
 }
 
 /// The bands of an experiment and the colours they show as.
-pub fn bands(words: &schema::BandsEntry) -> Vec<Band> {
+pub(crate) fn bands(words: &schema::BandsEntry) -> Vec<Band> {
     let band = |(band, display_rgb): (resolve::BandInterval, [f64; 3])| Band {
         name: band.name,
         range_nm: band.range_nm,

@@ -41,7 +41,7 @@ impl Direction {
 }
 
 /// The unit vector along `v`; not finite for length 0. Scaled first, so that no square overflows.
-pub fn unit(v: [f64; 3]) -> DVec3 {
+pub(super) fn unit(v: [f64; 3]) -> DVec3 {
     let v = DVec3::from_array(v);
     let v = v / v.abs().max_element();
     v / v.dot(v).sqrt()

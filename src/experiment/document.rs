@@ -161,7 +161,7 @@ impl Node {
 ///
 /// # Errors
 /// Every syntax error, each with its place.
-pub fn parse(name: &str, text: &str) -> Result<Node, Vec<Diagnostic>> {
+pub(crate) fn parse(name: &str, text: &str) -> Result<Node, Vec<Diagnostic>> {
     let reader = Reader { name: name.into(), text: text.into(), offset: 0, source: InputKind::File };
     let (table, errors) = DeTable::parse_recoverable(text);
     let mut findings: Vec<Diagnostic> = errors.iter().map(|e| reader.syntax_error(e)).collect();
@@ -175,7 +175,7 @@ pub fn parse(name: &str, text: &str) -> Result<Node, Vec<Diagnostic>> {
 ///
 /// # Errors
 /// Every syntax error, each with its place in the argument.
-pub fn parse_set(argument: &str) -> Result<(String, Node), Vec<Diagnostic>> {
+pub(crate) fn parse_set(argument: &str) -> Result<(String, Node), Vec<Diagnostic>> {
     let reader =
         Reader { name: "--set".into(), text: argument.into(), offset: 0, source: InputKind::Set };
     let Some((key, value)) = argument.split_once('=') else {

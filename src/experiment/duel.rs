@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use crate::results::record::CostMeasure;
+pub(crate) use crate::results::record::CostMeasure;
 
 /// Suffix to the name of an estimator that is run a second time as a control.
-pub const CONTROL: &str = " (control)";
+pub(crate) const CONTROL: &str = " (control)";
 
 /// In every cell and band, the candidate reaches an error at less cost than the baseline, by more than
 /// `ratio`: variance times cost of the baseline over that of the candidate exceeds it. The claim must be

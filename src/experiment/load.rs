@@ -20,7 +20,7 @@ use crate::error::{Diagnostic, Error, Place, Result};
 ///
 /// # Errors
 /// Everything that is wrong with it, at once.
-pub fn load_text(
+pub(crate) fn load_text(
     path: &Path,
     text: &str,
     options: &LoadOptions,

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 
 /// From entries to scenes.
-pub mod build;
+pub(crate) mod build;
 
 /// Claims as they are written.
 mod claim_words;
@@ -17,13 +17,13 @@ mod claim_words;
 mod direction;
 
 /// A TOML text as a tree with places.
-pub mod document;
+pub(crate) mod document;
 
 /// Claims of efficiency.
 mod duel;
 
 /// From a text to an experiment.
-pub mod load;
+pub(crate) mod load;
 
 /// Every value and where it comes from.
 mod origins;
@@ -32,13 +32,13 @@ mod origins;
 mod overrides;
 
 /// Pictures that a file may ask for.
-pub mod picture;
+pub(crate) mod picture;
 
 /// The kinds of estimators and samplers that a file may name.
 pub mod registry;
 
 /// What entries mean: bands, coefficients per band.
-pub mod resolve;
+pub(crate) mod resolve;
 
 /// Canonical content of cells and experiments.
 mod resolved;
@@ -47,19 +47,19 @@ mod resolved;
 mod rules;
 
 /// What a file may contain.
-pub mod schema;
+pub(crate) mod schema;
 
 /// The JSON Schema of a file.
-pub mod schema_json;
+pub(crate) mod schema_json;
 
 /// Sensors as they are written.
 mod sensor;
 
 /// Suggestions of similar names ("did you mean").
-pub mod suggest;
+pub(crate) mod suggest;
 
 /// Axes, points and cells.
-pub mod sweep;
+pub(crate) mod sweep;
 
 /// Rows from a CSV file.
 mod sweep_csv;
@@ -68,13 +68,13 @@ mod sweep_csv;
 mod sweep_point;
 
 /// The walk along the schema.
-pub mod validate;
+pub(crate) mod validate;
 
 #[cfg(test)]
 pub(crate) mod tests;
 
 pub use registry::Registry;
-pub use sweep::resolve_path;
+pub(crate) use sweep::resolve_path;
 
 use schema::{ExperimentFile, LightEntry, Object, SensorEntry};
 

@@ -8,7 +8,7 @@ use super::schema::ExperimentFile;
 
 /// The dotted key, value and origin of every leaf of `root`, and of the defaults that `file`, which
 /// was read from it, has beside them. A list without tables is one leaf.
-pub fn list(root: &Node, file: &ExperimentFile) -> Vec<(String, String, String)> {
+pub(super) fn list(root: &Node, file: &ExperimentFile) -> Vec<(String, String, String)> {
     let file = ExperimentFile { sweep: Vec::new(), ..file.clone() };
     let mut leaves = Vec::new();
     given(root, String::new(), &mut leaves);

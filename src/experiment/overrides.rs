@@ -12,7 +12,7 @@ use crate::error::Diagnostic;
 ///
 /// # Errors
 /// A key that leads through a value that is no table, or past the end of an array.
-pub fn set(root: &mut Node, key: &str, value: Node, grammar: &Grammar) -> Result<(), Diagnostic> {
+pub(super) fn set(root: &mut Node, key: &str, value: Node, grammar: &Grammar) -> Result<(), Diagnostic> {
     let words: Vec<&str> = key.split('.').map(str::trim).collect();
     let refuse = |rule: String| Diagnostic {
         rule,
@@ -41,7 +41,7 @@ pub fn set(root: &mut Node, key: &str, value: Node, grammar: &Grammar) -> Result
 ///
 /// # Errors
 /// A name that the file does not hold; the finding lists those that it does.
-pub fn setting(root: &Node, name: &str) -> Result<Vec<(String, Node)>, Diagnostic> {
+pub(super) fn setting(root: &Node, name: &str) -> Result<Vec<(String, Node)>, Diagnostic> {
     let settings = match root.get("setting").map(|node| &node.value) {
         Some(Value::Table(settings)) => settings,
         _ => &BTreeMap::new(),
@@ -73,7 +73,7 @@ fn flatten(node: &Node, key: String, name: &str, entries: &mut Vec<(String, Node
 }
 
 /// Gives a value and all within it another source.
-pub fn relabel(node: &mut Node, source: &InputKind) {
+pub(super) fn relabel(node: &mut Node, source: &InputKind) {
     node.origin.source = source.clone();
     match &mut node.value {
         Value::Array(items) => items.iter_mut().for_each(|item| relabel(item, source)),
@@ -83,13 +83,13 @@ pub fn relabel(node: &mut Node, source: &InputKind) {
 }
 
 /// Whether one dotted key is the other or leads to it.
-pub fn overlap(a: &str, b: &str) -> bool {
+pub(super) fn overlap(a: &str, b: &str) -> bool {
     let mut words = a.split('.').zip(b.split('.'));
     words.all(|(a, b)| a == b)
 }
 
 /// Whether `key` is `outer` or below it.
-pub fn is_within(key: &str, outer: &str) -> bool {
+pub(super) fn is_within(key: &str, outer: &str) -> bool {
     overlap(key, outer) && key.split('.').count() >= outer.split('.').count()
 }
 

@@ -60,7 +60,7 @@ pub struct SplitEntry {
 }
 
 /// The pictures that a file asks for, as the results folder keeps them.
-pub fn wanted(entries: &[PictureEntry]) -> Vec<Wanted> {
+pub(crate) fn wanted(entries: &[PictureEntry]) -> Vec<Wanted> {
     entries.iter().filter_map(PictureEntry::wanted).collect()
 }
 

@@ -119,7 +119,7 @@ fn dispersed(formula: &Dispersion, band: &BandInterval) -> Result<f64, String> {
 }
 
 /// The names that `eta = { material = NAME }` takes.
-pub fn eta_materials() -> Vec<&'static str> {
+pub(crate) fn eta_materials() -> Vec<&'static str> {
     materials::names().into_iter().chain(dispersion::GLASSES.iter().map(|glass| glass.name)).collect()
 }
 

@@ -34,7 +34,7 @@ impl Experiment {
 }
 
 /// The sweep with every row written out; columns of CSV files that set nothing are in `columns`.
-pub fn sweep(axes: &[SweepAxis]) -> Vec<Sweep> {
+pub(super) fn sweep(axes: &[SweepAxis]) -> Vec<Sweep> {
     axes.iter().map(axis).collect()
 }
 
@@ -60,7 +60,7 @@ fn row(point: &AxisPoint) -> SweepRow {
 }
 
 /// A value of the schema as JSON; its types cannot fail to serialise.
-pub fn json<T: Serialize>(value: &T) -> Json {
+pub(super) fn json<T: Serialize>(value: &T) -> Json {
     serde_json::to_value(value).unwrap_or_else(|error| panic!("schema type without JSON: {error}"))
 }
 

@@ -10,13 +10,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-pub use super::claim_words::{Agree, ClaimEntry, Differs, Equals, Expect, Reproduces, SamplerClaim};
-pub use super::direction::{Direction, Polar};
-pub use super::duel::{CONTROL, CostMeasure, Faster, NotSlower};
+pub(crate) use super::claim_words::{Agree, ClaimEntry, Differs, Equals, Expect, SamplerClaim};
+pub(crate) use super::direction::Direction;
+pub(crate) use super::duel::{CONTROL, CostMeasure, Faster};
 use super::picture::PictureEntry;
-pub use super::sensor::SensorEntry;
-pub use crate::optics::microfacet::MicrofacetKind;
-pub use crate::optics::skin::SkinFractions;
+pub(crate) use super::sensor::SensorEntry;
+pub(crate) use crate::optics::microfacet::MicrofacetKind;
+pub(crate) use crate::optics::skin::SkinFractions;
 
 /// One experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

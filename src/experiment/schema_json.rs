@@ -9,7 +9,7 @@ use super::schema::ExperimentFile;
 
 /// The JSON Schema (2020-12) of an experiment file whose estimators and samplers are those of
 /// `registry`, as validation walks it.
-pub fn json_schema(registry: &Registry) -> Json {
+pub(crate) fn json_schema(registry: &Registry) -> Json {
     let mut schema = schemars::schema_for!(ExperimentFile).to_value();
     schema["title"] = json!("scatterproof experiment");
     let estimators = registry.estimators.iter().map(|entry| (entry.kind, entry.doc, entry.options()));
@@ -21,7 +21,7 @@ pub fn json_schema(registry: &Registry) -> Json {
 
 /// The same for editors, which keys belong together included: a scene with estimators, or samplers, or
 /// both.
-pub fn editor_schema(registry: &Registry) -> Json {
+pub(crate) fn editor_schema(registry: &Registry) -> Json {
     let mut schema = json_schema(registry);
     let parts = [&SCENE_KEYS[..], &SAMPLER_KEYS];
     schema["anyOf"] = json!(parts.map(|keys| json!({ "required": keys })));

@@ -6,7 +6,7 @@ use strsim::normalized_damerau_levenshtein;
 const NEAR: f64 = 0.6;
 
 /// The known name nearest to `name`, if one is near.
-pub fn nearest<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
     let name = name.to_lowercase();
     let likeness = |candidate: &str| normalized_damerau_levenshtein(&name, &candidate.to_lowercase());
     let best = known.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)))?;
@@ -14,7 +14,7 @@ pub fn nearest<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
 }
 
 /// The help for an unknown name: the nearest known one, else all of them, introduced by `what`.
-pub fn help(name: &str, known: &[&str], what: &str) -> String {
+pub(crate) fn help(name: &str, known: &[&str], what: &str) -> String {
     match nearest(name, known) {
         Some(near) => format!("did you mean `{near}`?"),
         None if known.is_empty() => format!("there are no {what} here"),
@@ -23,12 +23,12 @@ pub fn help(name: &str, known: &[&str], what: &str) -> String {
 }
 
 /// `` `a`, `b` ``.
-pub fn quoted(names: &[&str]) -> String {
+pub(crate) fn quoted(names: &[&str]) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
 /// `a, b or c` for the joining word `or`.
-pub fn join(names: &[&str], word: &str) -> String {
+pub(crate) fn join(names: &[&str], word: &str) -> String {
     match names.split_last() {
         Some((end, rest)) if !rest.is_empty() => format!("{} {word} {end}", rest.join(", ")),
         _ => names.concat(),

@@ -8,20 +8,20 @@ use super::overrides::{is_within, overlap, relabel};
 use super::rules::{CELL_KEYS, Findings};
 use super::suggest;
 use super::sweep_csv;
-pub use super::sweep_point::{AxisPoint, RowField, SweepAxis};
+pub(crate) use super::sweep_point::{AxisPoint, RowField, SweepAxis};
 use crate::error::Place;
 
 /// More cells than this are taken for a mistake.
 const MOST_CELLS: usize = 100_000;
 
 /// The path of a file that an experiment file names, relative to the folder of that file.
-pub fn resolve_path(experiment: &Path, named: &str) -> PathBuf {
+pub(crate) fn resolve_path(experiment: &Path, named: &str) -> PathBuf {
     experiment.parent().unwrap_or(Path::new("")).join(named)
 }
 
 /// Reads the axes of a document; none where something is wrong, the findings state what.
 /// `overridden` are the keys that a setting or `--set` has set, which a sweep must not set again.
-pub fn axes(
+pub(crate) fn axes(
     root: &Node,
     experiment: &Path,
     overridden: &[(String, Place)],
@@ -42,7 +42,7 @@ pub fn axes(
 }
 
 /// The points of every cell, the first axis slowest. Without axes there is one cell.
-pub fn cells(axes: &[SweepAxis]) -> Vec<Vec<&AxisPoint>> {
+pub(crate) fn cells(axes: &[SweepAxis]) -> Vec<Vec<&AxisPoint>> {
     axes.iter().fold(vec![Vec::new()], |cells, axis| {
         let extend = |cell: Vec<_>| axis.points.iter().map(move |point| [&cell[..], &[point]].concat());
         cells.into_iter().flat_map(extend).collect()

@@ -15,7 +15,7 @@ use crate::error::Place;
 
 /// Reads the rows that the `csv` entry of a sweep names; `path` is that of the CSV file. None where
 /// something is wrong with it; the findings state what.
-pub fn points(entry: &Node, path: &Path, findings: &Findings) -> Option<Vec<AxisPoint>> {
+pub(super) fn points(entry: &Node, path: &Path, findings: &Findings) -> Option<Vec<AxisPoint>> {
     let path_node = entry.get("path")?;
     let text = match std::fs::read_to_string(path) {
         Ok(text) => text,

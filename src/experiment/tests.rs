@@ -36,7 +36,7 @@ enum StubStrategy {
 }
 
 /// The registry of the tests: `path` and `snee`.
-pub fn registry() -> Registry {
+pub(crate) fn registry() -> Registry {
     let entry = |kind, doc| {
         let options_schema = || schemars::schema_for!(StubOptions);
         let build = |_: &_, _| Err(crate::error::Error::input("never built"));
@@ -47,7 +47,7 @@ pub fn registry() -> Registry {
 }
 
 /// The parts of a good experiment; every test replaces one.
-pub const GOOD: &str = r#"name = "good"
+pub(crate) const GOOD: &str = r#"name = "good"
 seed = 1
 bands = { rgb = {} }
 object.shape.sphere = { radius_mm = 1.0 }
@@ -62,12 +62,12 @@ name = "mis"
 path = {}
 "#;
 
-pub fn try_load(text: &str, sets: &[&str]) -> Result<Experiment, Error> {
+pub(crate) fn try_load(text: &str, sets: &[&str]) -> Result<Experiment, Error> {
     let sets = sets.iter().map(|s| s.to_string()).collect();
     load_text(Path::new("x.toml"), text, &LoadOptions { sets, setting: None }, &registry())
 }
 
-pub fn good(text: &str) -> Experiment {
+pub(crate) fn good(text: &str) -> Experiment {
     try_load(text, &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 

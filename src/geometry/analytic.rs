@@ -20,13 +20,13 @@ fn to_plane(plane: f64, o: f64, d: f64) -> f64 {
 }
 
 /// Crossing of the half-space z < 0.
-pub fn half_space(ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
+pub(super) fn half_space(ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
     horizontal_plane(0.0, 1.0, 0, ray, side, from)
 }
 
 /// Crossing of the slab -thickness < z < 0: each side of it is left through one plane only, chosen
 /// by the sign of `dir.z`.
-pub fn slab(thickness: f64, ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
+pub(super) fn slab(thickness: f64, ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
     let upwards = ray.dir.z > 0.0;
     match (side, upwards) {
         (Side::Inside, true) | (Side::Outside, false) => horizontal_plane(0.0, 1.0, 0, ray, side, from),
@@ -58,7 +58,7 @@ fn horizontal_plane(
 ///
 /// Per axis the ray is within the two planes for t in [near, far]; it is in the box for t in
 /// [max near, min far]. Inside, the crossing is the smallest `far`; outside, the largest `near`.
-pub fn cuboid(half: DVec3, ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
+pub(super) fn cuboid(half: DVec3, ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
     let (mut enter, mut leave) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
     for axis in 0..3 {
         let (h, o, d) = (half[axis], ray.origin[axis], ray.dir[axis]);
@@ -105,7 +105,7 @@ pub fn cuboid(half: DVec3, ray: &Ray, side: Side, from: Option<FaceId>) -> Optio
 /// - of the two roots the one whose terms add is computed, the other one is c divided by it.
 ///
 /// From a point on the surface c = 0, and the roots are 0 (where the ray starts) and -2 b.
-pub fn sphere(radius: f64, ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
+pub(super) fn sphere(radius: f64, ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
     let b = ray.origin.dot(ray.dir);
     let t = match (side, from) {
         (Side::Inside, Some(_)) => at_once_if_behind(-2.0 * b),

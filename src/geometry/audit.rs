@@ -5,11 +5,11 @@ use super::{Hit, Ray, Shape, Side};
 use crate::math::DVec3;
 
 /// A source of uniform numbers in [0, 1).
-pub type Uniforms<'a> = &'a mut dyn FnMut() -> f64;
+pub(crate) type Uniforms<'a> = &'a mut dyn FnMut() -> f64;
 
 /// Counts of [`audit_aim`]: rays from inside that must meet the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AimAudit {
+pub(crate) struct AimAudit {
     /// Rays from inside.
     pub rays: u64,
     /// Rays that met no surface, though the body is bounded.
@@ -18,7 +18,7 @@ pub struct AimAudit {
 
 /// Counts of [`audit_walk`]: flights of random walks inside a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct WalkAudit {
+pub(crate) struct WalkAudit {
     /// Flights of the walk.
     pub segments: u64,
     /// Flights that ended on the surface.
@@ -32,14 +32,14 @@ pub struct WalkAudit {
 }
 
 /// Every so many segments the walk checks by a second ray that it is still inside.
-pub const PROBE: u64 = 16;
+pub(crate) const PROBE: u64 = 16;
 
 /// Aims rays from random points inside a bounded shape: a third each in random directions, at
 /// points on edges, and at vertices (without a mesh, all in random directions).
 ///
 /// # Panics
 /// If the shape is unbounded.
-pub fn audit_aim(shape: &Shape, rays: u64, u: Uniforms) -> AimAudit {
+pub(crate) fn audit_aim(shape: &Shape, rays: u64, u: Uniforms) -> AimAudit {
     let mut audit = AimAudit { rays, lost: 0 };
     for i in 0..rays {
         let origin = interior_point(shape, u);
@@ -62,7 +62,7 @@ pub fn audit_aim(shape: &Shape, rays: u64, u: Uniforms) -> AimAudit {
 /// volume, in random directions, by flights from 1e-9 of the body's size to unbounded ones.
 ///
 /// In an unbounded shape a flight that meets nothing is lost only if it heads for a face.
-pub fn audit_walk(shape: &Shape, segments: u64, u: Uniforms) -> WalkAudit {
+pub(crate) fn audit_walk(shape: &Shape, segments: u64, u: Uniforms) -> WalkAudit {
     let mut audit = WalkAudit { segments, ..WalkAudit::default() };
     let size = shape.bounds().map_or(1.0, |bounds| bounds.radius);
     let mut ray = Ray { origin: interior_point(shape, u), dir: direction(u) };
@@ -96,7 +96,7 @@ pub fn audit_walk(shape: &Shape, segments: u64, u: Uniforms) -> WalkAudit {
 }
 
 /// A point inside, by rejection from the bounding sphere; near the origin of an unbounded shape.
-pub fn interior_point(shape: &Shape, u: Uniforms) -> DVec3 {
+pub(crate) fn interior_point(shape: &Shape, u: Uniforms) -> DVec3 {
     match (*shape).bounds() {
         Some(bounds) => loop {
             let cube = DVec3::new(u(), u(), u()) * 2.0 - 1.0;
@@ -113,7 +113,7 @@ pub fn interior_point(shape: &Shape, u: Uniforms) -> DVec3 {
 }
 
 /// A uniform direction: a point of the unit ball, by rejection, put onto its sphere.
-pub fn direction(u: Uniforms) -> DVec3 {
+pub(crate) fn direction(u: Uniforms) -> DVec3 {
     loop {
         let cube = DVec3::new(u(), u(), u()) * 2.0 - 1.0;
         let length2 = cube.length_squared();
@@ -124,7 +124,7 @@ pub fn direction(u: Uniforms) -> DVec3 {
 }
 
 /// A uniform direction with `dir . normal < 0`.
-pub fn inward(normal: DVec3, u: Uniforms) -> DVec3 {
+pub(crate) fn inward(normal: DVec3, u: Uniforms) -> DVec3 {
     loop {
         let dir = direction(u);
         if dir.dot(normal) < 0.0 {

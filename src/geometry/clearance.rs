@@ -19,7 +19,7 @@ const FAR: u32 = u32::MAX / 2;
 
 /// Grid of lower bounds of the distance to the surface.
 #[derive(Clone, Debug)]
-pub struct Clearance {
+pub(super) struct Clearance {
     /// Least corner, units of the frame.
     corner: DVec3,
     voxels: [usize; 3],
@@ -29,7 +29,7 @@ pub struct Clearance {
 
 impl Clearance {
     /// The grid of a mesh with the box (`min`, `max`), mm, around its triangles.
-    pub fn new<'a>(
+    pub(super) fn new<'a>(
         frame: &MeshFrame,
         (min, max): (DVec3, DVec3),
         triangles: impl Iterator<Item = &'a [DVec3; 3]>,
@@ -55,7 +55,7 @@ impl Clearance {
     }
 
     /// A lower bound of the distance to the surface, units of the frame; 0 outside the grid.
-    pub fn at(&self, point: DVec3) -> f64 {
+    pub(super) fn at(&self, point: DVec3) -> f64 {
         let voxel = (point - self.corner) * (1.0 / VOXEL);
         if voxel.min_element() < 0.0 {
             return 0.0;
@@ -66,7 +66,7 @@ impl Clearance {
     }
 
     /// Memory behind the grid, bytes.
-    pub fn heap_bytes(&self) -> usize {
+    pub(super) fn heap_bytes(&self) -> usize {
         size_of_val(&*self.bounds)
     }
 

@@ -5,16 +5,16 @@ use crate::math::DVec3;
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the tests' own source of uniform numbers in [0, 1).
 #[derive(Clone)]
-pub struct Uniform(u64);
+pub(crate) struct Uniform(u64);
 
 impl Uniform {
     /// Seeded by a test's name (FNV-1a).
-    pub fn named(name: &str) -> Uniform {
+    pub(crate) fn named(name: &str) -> Uniform {
         let step = |h: u64, b: u8| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3);
         Uniform(name.bytes().fold(0xcbf2_9ce4_8422_2325, step))
     }
 
-    pub fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -24,17 +24,17 @@ impl Uniform {
 }
 
 /// A uniform direction, by rejection from the ball.
-pub fn direction(u: &mut Uniform) -> DVec3 {
+pub(crate) fn direction(u: &mut Uniform) -> DVec3 {
     super::audit::direction(&mut || u.next())
 }
 
 /// A uniform direction with `dir . normal < 0`.
-pub fn inward(normal: DVec3, u: &mut Uniform) -> DVec3 {
+pub(crate) fn inward(normal: DVec3, u: &mut Uniform) -> DVec3 {
     super::audit::inward(normal, &mut || u.next())
 }
 
 /// The bodies of the watertightness tests, by name.
-pub fn bodies() -> Vec<(&'static str, Shape)> {
+pub(crate) fn bodies() -> Vec<(&'static str, Shape)> {
     let bodies = [
         ("icosphere", procedural::icosphere(1.0, 4, false)),
         ("bumpy sphere", procedural::bumpy_sphere(3.0, 5, 0.2, 9.0, true)),
@@ -48,7 +48,7 @@ pub fn bodies() -> Vec<(&'static str, Shape)> {
 
 /// An irregular body like a scanned animal: a sphere pulled into lobes, its vertices shaken, far
 /// from the origin, with triangles of very different sizes.
-pub fn creature() -> Mesh {
+pub(crate) fn creature() -> Mesh {
     let ball = procedural::icosphere(1.0, 4, false).expect("sphere");
     let mut u = Uniform(99); // a shape, not a sample
     let lobes: Vec<DVec3> = (0..5).map(|_| direction(&mut u)).collect();

@@ -14,7 +14,7 @@ const NAMED: usize = 3;
 /// # Errors
 /// Findings with counts and the first few positions. Later checks need what earlier ones assure, so
 /// they run in stages: data, then edges and vertices, then orientation of whole components.
-pub fn check(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<()> {
+pub(super) fn check(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<()> {
     let mesh = TriangleSoup { vertices, triangles };
     report(mesh.data())?;
     let edges = mesh.edges();

@@ -45,7 +45,7 @@ use crate::math::{DVec3, Vec3};
 const BEHIND: f64 = 0.015625;
 
 /// Growth of every box on every side, units of the frame.
-pub const PAD: f64 = 0.0078125;
+pub(super) const PAD: f64 = 0.0078125;
 
 /// Levels that a traversal can hold: obvhs keeps a stack of 32 and overwrites its last entry, and
 /// so forgets a part of the mesh, when there are more.
@@ -53,7 +53,7 @@ const MAX_DEPTH: usize = 32;
 
 /// Map from mm to the units of the mesh's tree.
 #[derive(Clone, Copy, Debug)]
-pub struct MeshFrame {
+pub(super) struct MeshFrame {
     center: DVec3,
     /// Units per mm, a power of two.
     pub scale: f64,
@@ -63,7 +63,7 @@ pub struct MeshFrame {
 
 impl MeshFrame {
     /// The frame of an axis-aligned box, mm. Its longest side must be a normal number.
-    pub fn new(min: DVec3, max: DVec3) -> MeshFrame {
+    pub(super) fn new(min: DVec3, max: DVec3) -> MeshFrame {
         let size = max - min;
         let exponent = (size.max_element().to_bits() >> 52) as i64 - 1023;
         let scale = f64::from_bits(((1023 + 10 - exponent) as u64) << 52);
@@ -71,7 +71,7 @@ impl MeshFrame {
     }
 
     /// A point in units of the frame.
-    pub fn place(&self, point: DVec3) -> DVec3 {
+    pub(super) fn place(&self, point: DVec3) -> DVec3 {
         (point - self.center) * self.scale
     }
 
@@ -126,7 +126,7 @@ fn round_up(x: f64) -> f32 {
 
 /// The tree over the boxes of a mesh's triangles.
 #[derive(Clone, Debug)]
-pub struct BoxTree {
+pub(super) struct BoxTree {
     /// The units that the tree lives in.
     pub frame: MeshFrame,
     bvh: CwBvh,
@@ -137,7 +137,7 @@ impl BoxTree {
     ///
     /// # Errors
     /// If it gets too deep to be traversed.
-    pub fn new(frame: MeshFrame, boxes: impl Iterator<Item = (DVec3, DVec3)>) -> Result<BoxTree> {
+    pub(super) fn new(frame: MeshFrame, boxes: impl Iterator<Item = (DVec3, DVec3)>) -> Result<BoxTree> {
         let corner = |point: DVec3, pad: f64| (frame.place(point) + pad).as_vec3().into();
         let boxes: Vec<Aabb> =
             boxes.map(|(min, max)| Aabb::new(corner(min, -PAD), corner(max, PAD))).collect();
@@ -151,13 +151,13 @@ impl BoxTree {
     }
 
     /// Slot -> box: the order in which a visit finds neighbours close in memory.
-    pub fn order(&self) -> &[u32] {
+    pub(super) fn order(&self) -> &[u32] {
         &self.bvh.primitive_indices
     }
 
     /// Calls `visit` for every slot whose box the ray may meet within `t_max`, nearer nodes first.
     /// It returns the `t` beyond which nothing is of interest any more.
-    pub fn closest(&self, ray: &Ray, t_max: f64, mut visit: impl FnMut(usize) -> f64) {
+    pub(super) fn closest(&self, ray: &Ray, t_max: f64, mut visit: impl FnMut(usize) -> f64) {
         let Some((cull_ray, skip)) = self.frame.cull_ray(ray, t_max) else { return };
         self.bvh.ray_traverse(cull_ray, &mut RayHit::none(), |_, slot| {
             round_up(self.frame.scale * visit(slot) - skip)
@@ -165,14 +165,14 @@ impl BoxTree {
     }
 
     /// Whether `visit` returns true for any slot whose box the ray may meet; it is not asked again.
-    pub fn any(&self, ray: &Ray, mut visit: impl FnMut(usize) -> bool) -> bool {
+    pub(super) fn any(&self, ray: &Ray, mut visit: impl FnMut(usize) -> bool) -> bool {
         let Some((cull_ray, _)) = self.frame.cull_ray(ray, f64::INFINITY) else { return false };
         // Not `ray_traverse_anyhit`, which visits all boxes on the ray.
         !self.bvh.ray_traverse_miss(cull_ray, |_, slot| if visit(slot) { 0.0 } else { f32::INFINITY })
     }
 
     /// Memory behind the tree, bytes.
-    pub fn heap_bytes(&self) -> usize {
+    pub(super) fn heap_bytes(&self) -> usize {
         size_of_val(&*self.bvh.nodes) + size_of_val(&*self.bvh.primitive_indices)
     }
 }

@@ -21,7 +21,7 @@ use super::{Ray, Side};
 use crate::math::{DVec3, fma};
 
 /// A ray prepared for many triangles.
-pub struct Sheared {
+pub(super) struct Sheared {
     origin: DVec3,
     /// The axes that become x, y, z: z is the ray's dominant one; x and y are swapped where the ray
     /// runs against it, so that orientation is kept.
@@ -35,7 +35,7 @@ pub struct Sheared {
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy)]
-pub struct Crossing {
+pub(super) struct Crossing {
     /// Distance, mm.
     pub t: f64,
     /// Barycentric coordinates, of sum 1.
@@ -44,7 +44,7 @@ pub struct Crossing {
 
 impl Sheared {
     /// Prepares a ray that travels on `side`.
-    pub fn new(ray: &Ray, side: Side) -> Sheared {
+    pub(super) fn new(ray: &Ray, side: Side) -> Sheared {
         let size = ray.dir.abs();
         let z = match () {
             _ if size.x >= size.y && size.x >= size.z => 0,
@@ -62,7 +62,7 @@ impl Sheared {
     /// The crossing with t > 0, if the orientation is the wanted one; at the smallest t > 0 where the
     /// origin lies beyond the triangle's plane by `slack` or less.
     #[inline]
-    pub fn meet(&self, triangle: &[DVec3; 3], slack: f64) -> Option<Crossing> {
+    pub(super) fn meet(&self, triangle: &[DVec3; 3], slack: f64) -> Option<Crossing> {
         let [a, b, c] = triangle.map(|vertex| self.project(vertex));
         let u = edge(b, c) * self.orientation;
         let v = edge(c, a) * self.orientation;
@@ -115,13 +115,13 @@ fn edge_remainder(p: [f64; 3], q: [f64; 3], first: f64, second: f64) -> f64 {
 }
 
 /// The unit normal of a triangle whose corners turn counter-clockwise seen from its tip.
-pub fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
+pub(super) fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a).normalize()
 }
 
 /// Whether a point of a triangle's plane is within `margin` of one of its edges (or of their lines).
 #[inline]
-pub fn is_on_edge([a, b, c]: &[DVec3; 3], point: DVec3, margin: f64) -> bool {
+pub(super) fn is_on_edge([a, b, c]: &[DVec3; 3], point: DVec3, margin: f64) -> bool {
     let near = |p: DVec3, q: DVec3| {
         let edge = q - p;
         edge.cross(point - p).length_squared() <= margin * margin * edge.length_squared()
@@ -131,7 +131,7 @@ pub fn is_on_edge([a, b, c]: &[DVec3; 3], point: DVec3, margin: f64) -> bool {
 
 /// Barycentric coordinates of the point of a triangle that is nearest to `point`: of its plane where
 /// that is inside, else of the nearest edge.
-pub fn nearest(corners: &[DVec3; 3], point: DVec3) -> [f64; 3] {
+pub(super) fn nearest(corners: &[DVec3; 3], point: DVec3) -> [f64; 3] {
     let [a, b, c] = *corners;
     let n = (b - a).cross(c - a);
     let part = |p: DVec3, q: DVec3| (q - p).cross(point - p).dot(n) / n.length_squared();

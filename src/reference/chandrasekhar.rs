@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use crate::math::{Integral, cos, exp, integrate, ln_1p, sin};
 
 /// H at albedo `w` in [0, 1) and cosine `mu` in (0, 1], with its error.
-pub fn h(w: f64, mu: f64) -> Integral {
+pub(crate) fn h(w: f64, mu: f64) -> Integral {
     let integrand = |t: f64| {
         let (sin, cos) = (sin(t), cos(t));
         // t cot t is 1 - t^2/3 near 0, and 0 at pi/2.
@@ -28,7 +28,7 @@ pub fn h(w: f64, mu: f64) -> Integral {
 
 /// Bidirectional reflectance f_r (1/sr) between the cosines `mu0` of incidence and `mu` of exit:
 /// w / (4 pi (mu + mu0)) H(mu) H(mu0), with its error.
-pub fn brdf(w: f64, mu0: f64, mu: f64) -> Integral {
+pub(crate) fn brdf(w: f64, mu0: f64, mu: f64) -> Integral {
     let (a, b) = (h(w, mu0), h(w, mu));
     let factor = w / (4.0 * PI * (mu + mu0));
     Integral {

@@ -1,4 +1,4 @@
 //! Oracles: a value and its stated error, from closed forms and quadrature. They never use estimators.
 
 /// Semi-infinite, index-matched, isotropically scattering media.
-pub mod chandrasekhar;
+pub(crate) mod chandrasekhar;

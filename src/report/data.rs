@@ -11,7 +11,7 @@ use crate::verify::model_errors::ModelError;
 use crate::verify::verdict::Verdict;
 
 /// Everything that a report is made from.
-pub struct ReportData {
+pub(crate) struct ReportData {
     /// The record, with its timing where it was measured.
     pub stored: Stored,
     /// Build and machine, where they were noted.

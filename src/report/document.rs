@@ -4,7 +4,7 @@ use super::table::Table;
 
 /// One page of a report.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Document {
+pub(crate) struct Document {
     /// Title of the page.
     pub title: String,
     /// Its blocks, from the top.
@@ -13,7 +13,7 @@ pub struct Document {
 
 /// A part of a page.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PageBlock {
+pub(crate) enum PageBlock {
     /// A heading of level 2 or 3.
     Heading(u8, String),
     /// A paragraph of plain text.
@@ -36,7 +36,7 @@ pub enum PageBlock {
 
 /// A table that can be used outside the page.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TableBlock {
+pub(crate) struct TableBlock {
     /// Unique on its page; the stem of its files under `tables/`: lower-case words joined by `-`.
     pub name: String,
     /// What it shows and how to read it, in one or two sentences.
@@ -47,14 +47,14 @@ pub struct TableBlock {
 
 impl TableBlock {
     /// A named table with its caption.
-    pub fn new(name: impl Into<String>, caption: impl Into<String>, table: Table) -> TableBlock {
+    pub(crate) fn new(name: impl Into<String>, caption: impl Into<String>, table: Table) -> TableBlock {
         TableBlock { name: name.into(), caption: caption.into(), table }
     }
 }
 
 /// The file of a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PictureFile {
+pub(crate) enum PictureFile {
     /// Bytes of a PNG file.
     Png(Vec<u8>),
     /// Text of an SVG file.
@@ -63,7 +63,7 @@ pub enum PictureFile {
 
 /// One picture with its caption.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FigureBlock {
+pub(crate) struct FigureBlock {
     /// Path relative to the page.
     pub path: String,
     /// File that is shown.
@@ -76,7 +76,7 @@ pub struct FigureBlock {
 
 /// The pictures of one cell, in a viewer that compares them.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ViewerBlock {
+pub(crate) struct ViewerBlock {
     /// The cell's label; empty without a sweep.
     pub cell: String,
     /// One tone-mapped PNG per estimator; none where the page shows them above.
@@ -87,7 +87,7 @@ pub struct ViewerBlock {
 
 impl Document {
     /// Every table that has columns, in the order of the page.
-    pub fn tables(&self) -> Vec<&TableBlock> {
+    pub(crate) fn tables(&self) -> Vec<&TableBlock> {
         fn inside<'a>(blocks: &'a [PageBlock], tables: &mut Vec<&'a TableBlock>) {
             for block in blocks {
                 match block {
@@ -103,14 +103,14 @@ impl Document {
     }
 
     /// The page as Markdown; pictures are separate files.
-    pub fn to_markdown(&self) -> String {
+    pub(crate) fn to_markdown(&self) -> String {
         let blocks: String = self.blocks.iter().map(|block| format!("\n{}", markdown(block))).collect();
         format!("# {}\n{blocks}", self.title)
     }
 }
 
 /// A text as a file name or an anchor: ASCII letters and digits in lower case, else `-`.
-pub fn slug(text: &str) -> String {
+pub(crate) fn slug(text: &str) -> String {
     let letters =
         text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
     letters.collect()

@@ -14,7 +14,7 @@ const SCRIPT: &str = include_str!("page.js");
 const CARRIED_ROWS: usize = 200;
 
 /// The page as one file.
-pub fn to_html(page: &Document) -> String {
+pub(crate) fn to_html(page: &Document) -> String {
     let title = escape(&page.title);
     let body: String = page.blocks.iter().map(block).collect();
     let contents = contents(page);

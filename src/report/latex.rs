@@ -15,7 +15,7 @@ const PREAMBLE: &str =
 ";
 
 /// The page as a LaTeX document: the blocks that are not folded, without floats.
-pub fn to_document(page: &Document) -> String {
+pub(crate) fn to_document(page: &Document) -> String {
     let body: String = page.blocks.iter().map(block).collect();
     let title = escaped(&page.title);
     format!("{PREAMBLE}\\begin{{center}}\\Large {title}\\end{{center}}\n{body}\\end{{document}}\n")
@@ -58,7 +58,7 @@ const FLOATS: usize = 40;
 
 /// A table with its caption. Needs `\usepackage{booktabs}`, and `\usepackage{longtable}` where there
 /// are more than 40 rows.
-pub fn to_latex(table: &Table, name: &str, caption: &str) -> String {
+pub(crate) fn to_latex(table: &Table, name: &str, caption: &str) -> String {
     if table.rows.len() > FLOATS {
         return long(table, name, caption);
     }
@@ -112,7 +112,7 @@ fn parts(table: &Table, name: &str, caption: &str) -> Option<TabularParts> {
 }
 
 /// Text as LaTeX prints it; numbers with an exponent or a sign as mathematics.
-pub fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let mut latex = String::new();
     let mut rest = text;
     let mut before = ' ';

@@ -16,43 +16,43 @@ use crate::verify::verdict::{self, Verdict};
 /// Base64, for data URIs.
 mod base64;
 /// Input of the views.
-pub mod data;
+pub(crate) mod data;
 /// A page as blocks, in Markdown.
-pub mod document;
+pub(crate) mod document;
 /// The same page as HTML.
-pub mod html;
+pub(crate) mod html;
 /// Tables for papers.
-pub mod latex;
+pub(crate) mod latex;
 /// Text as HTML shows it.
 mod markup;
 /// Numbers with their uncertainty.
-pub mod number;
+pub(crate) mod number;
 /// The content of the page.
 mod page;
 /// The pictures of runs.
-pub mod pictures;
+pub(crate) mod pictures;
 /// Plots as SVG.
-pub mod plot;
+pub(crate) mod plot;
 /// The plots of a record.
-pub mod plots;
+pub(crate) mod plots;
 /// Split pictures: two estimators in one picture.
-pub mod split;
+pub(crate) mod split;
 /// Tables that papers quote: a row per cell and band.
-pub mod summary;
+pub(crate) mod summary;
 /// Aligned text, Markdown and CSV.
-pub mod table;
+pub(crate) mod table;
 /// Tables of claims, verdicts, measurements, efficiencies and model errors.
-pub mod tables;
+pub(crate) mod tables;
 /// Tables for the terminal.
-pub mod terminal;
+pub(crate) mod terminal;
 /// Viewers that compare pictures.
-pub mod viewer;
+pub(crate) mod viewer;
 
 /// Makes every view of a results folder: `measurements.csv`, `comparisons.csv`, `verdicts.csv`,
 /// `summary.json`, `model_errors.csv` where there are models, `images/`, `plots/`, `tables/`,
 /// `report.md`, `report.tex` and `report.html`. The record is judged by itself, together with the
 /// second look that a verification may have left beside it.
-pub fn write(folder: &RecordFolder) -> Result<ReportData> {
+pub(crate) fn write(folder: &RecordFolder) -> Result<ReportData> {
     let stored = folder.read()?;
     let retest = folder.retest_of(&stored)?;
     let looks = if retest.is_some() { Looks::Two } else { Looks::ALONE };
@@ -61,7 +61,7 @@ pub fn write(folder: &RecordFolder) -> Result<ReportData> {
 }
 
 /// The same with given verdicts on this record, from a family of several records.
-pub fn write_judged(
+pub(crate) fn write_judged(
     folder: &RecordFolder,
     stored: Stored,
     verdicts: Vec<Verdict>,

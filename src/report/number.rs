@@ -3,7 +3,7 @@
 /// `1.234(5)`: the digits in brackets are one standard error in units of the last digit shown. The
 /// error has one digit, or two where the first is 1. `1.234(5)e-7` where plain digits would not show
 /// it; `1.234 ± 0` for an exact value, `1.234 ± ?` where no error is known.
-pub fn with_error(value: f64, std_error: f64) -> String {
+pub(crate) fn with_error(value: f64, std_error: f64) -> String {
     if !value.is_finite() {
         return value.to_string();
     }
@@ -37,7 +37,7 @@ fn error_digits(std_error: f64) -> (String, i32) {
 }
 
 /// A number to `digits` significant digits, plain or with an exponent; empty for NaN.
-pub fn significant(x: f64, digits: usize) -> String {
+pub(crate) fn significant(x: f64, digits: usize) -> String {
     if x.is_nan() {
         return String::new();
     }
@@ -52,7 +52,7 @@ pub fn significant(x: f64, digits: usize) -> String {
 }
 
 /// A fraction as per cent; empty for NaN.
-pub fn per_cent(x: f64) -> String {
+pub(crate) fn per_cent(x: f64) -> String {
     if x.is_nan() { String::new() } else { format!("{} %", significant(100.0 * x, 2)) }
 }
 

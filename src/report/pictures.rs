@@ -9,7 +9,7 @@ use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::{RecordFolder, Stored};
 
 /// A picture of one run.
-pub struct RunPicture {
+pub(crate) struct RunPicture {
     /// Cell label.
     pub cell: String,
     /// The PNG file, named by the estimator, with its exposure and the pixels that could not be shown.

@@ -27,7 +27,7 @@ const GAP: usize = 6;
 
 /// A grid of split pictures in the report.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SplitFigure {
+pub(crate) struct SplitFigure {
     /// Path relative to the results folder, without extension.
     pub stem: String,
     /// Estimators, and the labels of the axes that are neither rows nor columns.

@@ -11,7 +11,7 @@ use crate::verify::model_errors::ModelError;
 
 /// The rows by one measure of cost that represent a pair of estimators: all classes together, and pixels
 /// rather than their mean. Second arms of one estimator are left out.
-pub fn chosen<'a>(
+pub(crate) fn chosen<'a>(
     stored: &Stored,
     rows: &'a [EfficiencyRow],
     cost: CostMeasure,
@@ -32,7 +32,7 @@ pub fn chosen<'a>(
 }
 
 /// The quantity whose variance is compared.
-pub fn metric_words(row: &EfficiencyRow) -> String {
+pub(crate) fn metric_words(row: &EfficiencyRow) -> String {
     if row.metric == PIXELS {
         "a pixel (averaged over the image)".into()
     } else {
@@ -41,7 +41,11 @@ pub fn metric_words(row: &EfficiencyRow) -> String {
 }
 
 /// Efficiencies by one measure of cost; nothing where there is no ratio.
-pub fn efficiency(stored: &Stored, rows: &[EfficiencyRow], cost: CostMeasure) -> Option<TableBlock> {
+pub(crate) fn efficiency(
+    stored: &Stored,
+    rows: &[EfficiencyRow],
+    cost: CostMeasure,
+) -> Option<TableBlock> {
     let rows = chosen(stored, rows, cost);
     let quoted = rows.iter().find(|row| row.quoted().is_some())?;
     let name = |row: &EfficiencyRow| format!("{} / {}", row.candidate, row.baseline);
@@ -84,7 +88,7 @@ fn ratio(row: &EfficiencyRow) -> String {
 }
 
 /// Means of the sensor's first observable, all classes together.
-pub fn means(stored: &Stored, rows: &[Measurement]) -> Option<TableBlock> {
+pub(crate) fn means(stored: &Stored, rows: &[Measurement]) -> Option<TableBlock> {
     let first = |row: &&Measurement| {
         let run = stored.record.cells.iter().find(|cell| cell.label == row.cell)?.runs.first()?;
         let observable = run.observables.first()?;
@@ -106,7 +110,7 @@ pub fn means(stored: &Stored, rows: &[Measurement]) -> Option<TableBlock> {
 }
 
 /// Model errors of all classes together; nothing where there are no models.
-pub fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> {
+pub(crate) fn model_errors(stored: &Stored, rows: &[ModelError]) -> Option<TableBlock> {
     let rows: Vec<&ModelError> = rows.iter().filter(|row| row.observable.class == "all").collect();
     let truth = &rows.first()?.truth;
     let entry = |row: &&ModelError| {

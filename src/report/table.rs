@@ -4,7 +4,7 @@ use crate::results::csv_text;
 
 /// A header and rows of text.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
+pub(crate) struct Table {
     /// Column names.
     pub header: Vec<String>,
     /// Rows, one field per column.
@@ -13,18 +13,18 @@ pub struct Table {
 
 impl Table {
     /// An empty table.
-    pub fn new(header: &[&str]) -> Table {
+    pub(crate) fn new(header: &[&str]) -> Table {
         Table { header: header.iter().map(|name| name.to_string()).collect(), rows: Vec::new() }
     }
 
     /// Appends a row.
-    pub fn push(&mut self, row: Vec<String>) {
+    pub(crate) fn push(&mut self, row: Vec<String>) {
         assert_eq!(row.len(), self.header.len(), "one field per column");
         self.rows.push(row);
     }
 
     /// Without the columns that are empty in every row.
-    pub fn without_empty_columns(mut self) -> Table {
+    pub(crate) fn without_empty_columns(mut self) -> Table {
         for column in (0..self.header.len()).rev() {
             if self.rows.iter().all(|row| row[column].is_empty()) {
                 self.remove_column(column);
@@ -34,14 +34,14 @@ impl Table {
     }
 
     /// Removes a column.
-    pub fn remove_column(&mut self, column: usize) {
+    pub(crate) fn remove_column(&mut self, column: usize) {
         self.header.remove(column);
         self.rows.iter_mut().for_each(|row| drop(row.remove(column)));
     }
 
     /// Aligned plain text: columns two spaces apart, numbers to the right. Empty for a table
     /// without columns.
-    pub fn to_text(&self) -> String {
+    pub(crate) fn to_text(&self) -> String {
         if self.header.is_empty() {
             return String::new();
         }
@@ -52,7 +52,7 @@ impl Table {
     }
 
     /// A Markdown table, aligned so that it also reads as plain text.
-    pub fn to_markdown(&self) -> String {
+    pub(crate) fn to_markdown(&self) -> String {
         let escaped =
             |row: &Vec<String>| row.iter().map(|f| f.replace('|', "\\|").replace('\n', " ")).collect();
         let table =
@@ -68,13 +68,13 @@ impl Table {
     }
 
     /// Comma-separated text.
-    pub fn to_csv(&self) -> String {
+    pub(crate) fn to_csv(&self) -> String {
         let header: Vec<&str> = self.header.iter().map(String::as_str).collect();
         csv_text::to_text(&header, self.rows.iter().cloned())
     }
 
     /// Whether the fields of a column begin like numbers.
-    pub fn is_numeric(&self, column: usize) -> bool {
+    pub(crate) fn is_numeric(&self, column: usize) -> bool {
         let numeric =
             |field: &str| field.trim_start_matches('-').starts_with(|c: char| c.is_ascii_digit());
         let mut fields =

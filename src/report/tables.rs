@@ -9,7 +9,7 @@ use crate::verify::model_errors::ModelError;
 use crate::verify::verdict::Verdict;
 
 /// Verdicts, with the smallest defect that each test would have found.
-pub fn verdict_table(verdicts: &[Verdict]) -> Table {
+pub(crate) fn verdict_table(verdicts: &[Verdict]) -> Table {
     let mut table = Table::new(&[
         "outcome",
         "claim",
@@ -60,7 +60,7 @@ pub fn verdict_table(verdicts: &[Verdict]) -> Table {
 }
 
 /// Claims: the number of comparisons of each claim by outcome.
-pub fn claim_table(verdicts: &[Verdict]) -> Table {
+pub(crate) fn claim_table(verdicts: &[Verdict]) -> Table {
     let mut table = Table::new(&["claim", "comparisons", "pass", "fail", "underpowered", "invalid"]);
     let mut labels: Vec<&str> = Vec::new();
     for v in verdicts {
@@ -80,7 +80,7 @@ pub fn claim_table(verdicts: &[Verdict]) -> Table {
 }
 
 /// Model errors: a row for each model, observable, class and band.
-pub fn model_error_table(rows: &[ModelError]) -> Table {
+pub(crate) fn model_error_table(rows: &[ModelError]) -> Table {
     let mut table = Table::new(&[
         "cell",
         "model of",
@@ -111,7 +111,7 @@ pub fn model_error_table(rows: &[ModelError]) -> Table {
 }
 
 /// Efficiencies: a row for each pair, class and measure of cost.
-pub fn comparison_table(rows: &[EfficiencyRow]) -> Table {
+pub(crate) fn comparison_table(rows: &[EfficiencyRow]) -> Table {
     let mut table = Table::new(&[
         "cell",
         "candidate",
@@ -157,7 +157,7 @@ pub fn comparison_table(rows: &[EfficiencyRow]) -> Table {
 }
 
 /// Measurements: a row for each estimator, observable and class, a column for each band.
-pub fn measurement_table(rows: &[&Measurement], bands: &[String]) -> Table {
+pub(crate) fn measurement_table(rows: &[&Measurement], bands: &[String]) -> Table {
     let mut header = vec!["estimator", "observable", "class"];
     header.extend(bands.iter().map(String::as_str));
     let mut table = Table::new(&header);

@@ -10,7 +10,7 @@ use crate::results::record::CostMeasure;
 use crate::verify::verdict::{TestKind, Verdict};
 
 /// One row per cell and estimator: the sensor's first observable in every band, passes, CPU time, speed.
-pub fn run_table(data: &ReportData) -> Table {
+pub(crate) fn run_table(data: &ReportData) -> Table {
     let record = &data.stored.record;
     let mut header = vec!["cell", "estimator", "observable"];
     header.extend(record.bands.iter().map(|band| band.name.as_str()));
@@ -38,7 +38,7 @@ pub fn run_table(data: &ReportData) -> Table {
 
 /// One row per sampler: the number of its tests and of those that are green, and the smallest defect
 /// that they would have found.
-pub fn sampler_table(data: &ReportData) -> Table {
+pub(crate) fn sampler_table(data: &ReportData) -> Table {
     let record = &data.stored.record;
     let header = ["sampler", "draws", "bins", "tests", "green", "detectable", "CPU s", "draws/s/core"];
     let mut table = Table::new(&header);
@@ -70,13 +70,13 @@ pub fn sampler_table(data: &ReportData) -> Table {
 
 /// One efficiency per pair of estimators: by CPU time where it was measured, else by
 /// counted work.
-pub fn efficiency_table(data: &ReportData) -> Option<TableBlock> {
+pub(crate) fn efficiency_table(data: &ReportData) -> Option<TableBlock> {
     let by = |cost| summary::efficiency(&data.stored, &data.comparisons, cost);
     by(CostMeasure::Cpu).or_else(|| by(CostMeasure::Counters))
 }
 
 /// A text in lines of at most `width` characters, broken at blanks.
-pub fn wrapped(text: &str, width: usize) -> String {
+pub(crate) fn wrapped(text: &str, width: usize) -> String {
     let (mut lines, mut length) = (String::new(), 0);
     for word in text.split_whitespace() {
         let letters = word.chars().count();
@@ -94,7 +94,7 @@ pub fn wrapped(text: &str, width: usize) -> String {
 }
 
 /// Notes of estimators and counts of anomalies, each once, with its cells.
-pub fn notes(data: &ReportData) -> Vec<String> {
+pub(crate) fn notes(data: &ReportData) -> Vec<String> {
     let mut lines: Vec<(String, Vec<String>)> = Vec::new();
     let mut add = |text: String, cell: &str| match lines.iter_mut().find(|(known, _)| *known == text) {
         Some((_, cells)) => cells.push(cell.to_string()),

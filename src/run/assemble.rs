@@ -24,7 +24,7 @@ use crate::results::timing::{self, Timing};
 use crate::scene::sensor::{PixelRectangle, SensorRegion};
 
 /// A record before it is written.
-pub struct Assembled {
+pub(super) struct Assembled {
     /// The record; checksums are filled in when it is written.
     pub record: Record,
     /// Arrays of the record.
@@ -34,17 +34,17 @@ pub struct Assembled {
 }
 
 /// Hash of the resolved experiment without claims and of the files that it reads, hex.
-pub fn experiment_hash(experiment: &Experiment) -> String {
+pub(super) fn experiment_hash(experiment: &Experiment) -> String {
     hash_json(&json!({"resolved": experiment.resolved(), "inputs": inputs(experiment)}))
 }
 
 /// Hashes of the claims, hex.
-pub fn claim_hashes(experiment: &Experiment) -> Vec<String> {
+pub(super) fn claim_hashes(experiment: &Experiment) -> Vec<String> {
     experiment.file.claim.iter().map(hash_json).collect()
 }
 
 /// Assembles the measurements of a plan's jobs into a record.
-pub fn assemble(
+pub(super) fn assemble(
     experiment: &Experiment,
     plan: &Plan,
     completed: Vec<Completed>,

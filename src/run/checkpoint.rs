@@ -68,12 +68,12 @@ fn name(identity: &str) -> String {
 }
 
 /// Path of a job's state in an experiment's results folder.
-pub fn path(root: &Path, identity: &str) -> PathBuf {
+pub(crate) fn path(root: &Path, identity: &str) -> PathBuf {
     folder(root).join(name(identity))
 }
 
 /// Makes the folder of the states, and removes what a killed run left unfinished in the results folder.
-pub fn prepare(root: &Path) -> Result<()> {
+pub(crate) fn prepare(root: &Path) -> Result<()> {
     atomic::create_folder(&folder(root), "create the results folder")?;
     RecordFolder::new(root).remove_unfinished()?;
     atomic::sweep(root)?;
@@ -82,7 +82,7 @@ pub fn prepare(root: &Path) -> Result<()> {
 
 /// The record is complete: a larger budget resumes from no states of jobs other than these. Of those
 /// the claims made before their first pass are kept, because their passes were seen.
-pub fn reduce_others<'a>(root: &Path, identities: impl Iterator<Item = &'a str>) -> Result<()> {
+pub(crate) fn reduce_others<'a>(root: &Path, identities: impl Iterator<Item = &'a str>) -> Result<()> {
     let kept: Vec<String> = identities.map(name).collect();
     let folder = folder(root);
     let entries = fs::read_dir(&folder).map_err(Error::io(&folder, "read the states of the run"))?;
@@ -133,12 +133,12 @@ fn read<T: DeserializeOwned>(path: &Path) -> Option<(Header<T>, Vec<f64>)> {
 
 /// The claims made before the first passes or draws of a job's state, whether or not the job can resume
 /// from it: they were seen.
-pub fn start(path: &Path, identity: &str) -> Option<Start> {
+pub(crate) fn start(path: &Path, identity: &str) -> Option<Start> {
     load::<IgnoredAny>(path, identity).map(|(header, _)| header.start)
 }
 
 /// Writes the state of a job whose passes start at 0.
-pub fn save_passes(path: &Path, identity: &str, start: &Start, block: &Block) -> Result<()> {
+pub(crate) fn save_passes(path: &Path, identity: &str, start: &Start, block: &Block) -> Result<()> {
     let moments = block.moments.nodes();
     let (pixels, spread) = (block.pixels.nodes(), block.spread.nodes());
     let nodes = Nodes {
@@ -154,7 +154,7 @@ pub fn save_passes(path: &Path, identity: &str, start: &Start, block: &Block) ->
 }
 
 /// Reads the state of a job, with moments kept at `keep_level`; `None` where there is none that fits.
-pub fn load_passes(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
+pub(crate) fn load_passes(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
     let (Header { content: nodes, .. }, numbers) = load::<Nodes>(path, identity)?;
     let mut numbers = numbers.into_iter();
     let mut take = |n: usize| take(&mut numbers, n);
@@ -193,7 +193,7 @@ pub fn load_passes(path: &Path, identity: &str, keep_level: u32) -> Option<Block
 }
 
 /// Writes the state of a sampler.
-pub fn save_draws(path: &Path, identity: &str, start: &Start, sampled: &Sampled) -> Result<()> {
+pub(crate) fn save_draws(path: &Path, identity: &str, start: &Start, sampled: &Sampled) -> Result<()> {
     let arrays = sampled.arrays.iter().map(|(name, array)| (name.clone(), array.shape.clone()));
     let counted = Counted { run: sampled.run.clone(), arrays: arrays.collect(), cost: sampled.cost };
     let numbers = sampled.arrays.values().flat_map(|array| array.data.iter().copied());
@@ -201,7 +201,7 @@ pub fn save_draws(path: &Path, identity: &str, start: &Start, sampled: &Sampled)
 }
 
 /// Reads the state of a sampler of so many draws; `None` where there is none that fits.
-pub fn load_draws(path: &Path, identity: &str, samples: u64) -> Option<Sampled> {
+pub(crate) fn load_draws(path: &Path, identity: &str, samples: u64) -> Option<Sampled> {
     let (Header { content: counted, .. }, numbers) = load::<Counted>(path, identity)?;
     let mut numbers = numbers.into_iter();
     let arrays = counted.arrays.into_iter().map(|(name, shape)| {

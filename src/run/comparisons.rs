@@ -20,7 +20,7 @@ const EACH: &str = "each";
 ///
 /// # Errors
 /// A claim that names an observable the sensor does not have; a table's cell that is not a number.
-pub fn expand(
+pub(crate) fn expand(
     experiment: &Experiment,
     bands: &[Band],
     observables: &[Vec<Observable>],
@@ -32,7 +32,7 @@ pub fn expand(
 }
 
 /// The claims on samplers, for each of the samplers that were drawn from.
-pub fn expand_samplers(claims: &[ClaimEntry], drawn: &[SamplerRun]) -> Vec<SamplerComparison> {
+pub(crate) fn expand_samplers(claims: &[ClaimEntry], drawn: &[SamplerRun]) -> Vec<SamplerComparison> {
     let claims = claims.iter().enumerate();
     let claims = claims.filter_map(|(claim, entry)| Some((claim, entry.sampler.as_ref()?)));
     let of_claim = |(claim, words): (usize, &SamplerClaim)| {
@@ -49,7 +49,7 @@ pub fn expand_samplers(claims: &[ClaimEntry], drawn: &[SamplerRun]) -> Vec<Sampl
 }
 
 /// The statements that claims make.
-pub fn statements(claims: &[ClaimEntry]) -> Vec<Claim> {
+pub(crate) fn statements(claims: &[ClaimEntry]) -> Vec<Claim> {
     let of_claim = |(index, entry): (usize, &ClaimEntry)| {
         let each = |word: &Option<String>| word.as_deref() == Some(EACH);
         let (kind, each) = match entry {

@@ -12,11 +12,11 @@ use signal_hook::flag;
 
 /// Whether a stop was requested.
 #[derive(Clone, Debug, Default)]
-pub struct Interrupt(Arc<AtomicBool>);
+pub(crate) struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
     /// Listens to the process's signals from now on.
-    pub fn listen() -> std::io::Result<Interrupt> {
+    pub(crate) fn listen() -> std::io::Result<Interrupt> {
         let interrupt = Interrupt::default();
         for signal in [SIGINT, SIGTERM] {
             // Order matters: the first signal finds the flag down and only raises it.
@@ -28,12 +28,12 @@ impl Interrupt {
     }
 
     /// Has the signal come?
-    pub fn raised(&self) -> bool {
+    pub(crate) fn raised(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 
     /// Raises the flag, as a signal would.
-    pub fn raise(&self) {
+    pub(crate) fn raise(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 }

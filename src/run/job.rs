@@ -14,7 +14,7 @@ use crate::stats::moments::{ImageMoments, Moments};
 use crate::stats::tree::{Counter, Merge};
 
 /// One unit of work.
-pub struct Job {
+pub(crate) struct Job {
     /// Label in messages: cell and estimator, or the sampler.
     pub label: String,
     /// Hash of all that its result depends on except the number of passes, hex: its state is kept under
@@ -25,7 +25,7 @@ pub struct Job {
 }
 
 /// Task of a job.
-pub enum Task {
+pub(crate) enum Task {
     /// Runs passes of an estimator in a cell.
     Estimate(Box<Passes>),
     /// Draws from a sampler.
@@ -34,7 +34,7 @@ pub enum Task {
 
 impl Job {
     /// The passes, where the job is of an estimator.
-    pub fn passes(&self) -> Option<&Passes> {
+    pub(crate) fn passes(&self) -> Option<&Passes> {
         match &self.task {
             Task::Estimate(passes) => Some(passes),
             Task::Draw(_) => None,
@@ -42,7 +42,7 @@ impl Job {
     }
 
     /// The draws, where the job is of a sampler.
-    pub fn draws(&self) -> Option<&Draws> {
+    pub(crate) fn draws(&self) -> Option<&Draws> {
         match &self.task {
             Task::Estimate(_) => None,
             Task::Draw(draws) => Some(draws),
@@ -52,7 +52,7 @@ impl Job {
 
 /// A run of an estimator in a cell.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Arm {
+pub(crate) struct Arm {
     /// Name of the estimator, or of its control.
     pub name: String,
     /// A second arm of the same estimator, on streams of its own.
@@ -62,7 +62,7 @@ pub struct Arm {
 }
 
 /// A built estimator in a cell, with its streams.
-pub struct Passes {
+pub(crate) struct Passes {
     /// Cell index.
     pub cell: usize,
     /// Estimator index in the experiment file.
@@ -84,7 +84,7 @@ pub struct Passes {
 }
 
 /// Bands that one call runs together.
-pub struct Group {
+pub(crate) struct Group {
     /// Indices of the bands.
     pub bands: Vec<usize>,
     /// Key of the run, or of the second look.
@@ -95,7 +95,7 @@ pub struct Group {
 
 /// Moments and counts of a run of passes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Block {
+pub(crate) struct Block {
     /// Moments of `[observable][band]`, kept by batch.
     pub moments: Counter<Vec<Moments>>,
     /// Moments of `[pixel][band]`.
@@ -115,7 +115,7 @@ pub struct Block {
 /// What was fixed before the first pass or draw of a job.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Start {
+pub(crate) struct Start {
     /// Hashes of the claims: later claims are made with the result in sight.
     pub claims: Vec<String>,
     /// Hash of the budget that was turned into passes.
@@ -127,7 +127,7 @@ pub struct Start {
 /// Work and time of some passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Work {
+pub(crate) struct Work {
     /// Work counted, indexed by [`Cost`].
     pub cost: [u64; Cost::ALL.len()],
     /// CPU time of the passes alone, seconds.
@@ -148,7 +148,7 @@ impl Merge for Work {
 /// Counts and time that are not kept by batch and add up in any order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Tally {
+pub(crate) struct Tally {
     /// Anomalies counted, indexed by [`Anomaly`].
     pub anomalies: [u64; Anomaly::ALL.len()],
     /// Wall time, seconds.
@@ -159,7 +159,7 @@ pub struct Tally {
 
 impl Tally {
     /// Adds another run of passes.
-    pub fn add(&mut self, other: &Tally) {
+    pub(crate) fn add(&mut self, other: &Tally) {
         self.anomalies.iter_mut().zip(other.anomalies).for_each(|(a, b)| *a += b);
         self.wall_seconds += other.wall_seconds;
         self.processes += other.processes;
@@ -167,7 +167,7 @@ impl Tally {
 }
 
 /// The groups of bands that an estimator runs together.
-pub fn band_groups(band_use: BandUse, bands: usize) -> Vec<Vec<usize>> {
+pub(crate) fn band_groups(band_use: BandUse, bands: usize) -> Vec<Vec<usize>> {
     match band_use {
         BandUse::EachAlone => (0..bands).map(|band| vec![band]).collect(),
         BandUse::Shared => vec![(0..bands).collect()],
@@ -176,7 +176,7 @@ pub fn band_groups(band_use: BandUse, bands: usize) -> Vec<Vec<usize>> {
 
 /// Half the squared difference of two images of one expectation, averaged over the pixels, by band: its
 /// expectation is the variance of a pixel, averaged over the pixels.
-pub fn spread(a: &[f64], b: &[f64], bands: usize) -> Vec<Moments> {
+pub(crate) fn spread(a: &[f64], b: &[f64], bands: usize) -> Vec<Moments> {
     if a.is_empty() {
         return Vec::new();
     }
@@ -189,13 +189,13 @@ pub fn spread(a: &[f64], b: &[f64], bands: usize) -> Vec<Moments> {
 }
 
 /// The level at which pairs are kept in batches of 2^level passes.
-pub fn pair_level(keep_level: u32) -> u32 {
+pub(crate) fn pair_level(keep_level: u32) -> u32 {
     keep_level.saturating_sub(1)
 }
 
 impl Block {
     /// No passes yet, from pass `start` on.
-    pub fn empty(start: u64, keep_level: u32) -> Block {
+    pub(crate) fn empty(start: u64, keep_level: u32) -> Block {
         Block {
             moments: Counter::new(start, keep_level),
             pixels: Counter::new(start, Counter::<ImageMoments>::MERGE_ALL),
@@ -207,7 +207,7 @@ impl Block {
     }
 
     /// CPU time of the passes alone, seconds.
-    pub fn cpu_seconds(&self) -> f64 {
+    pub(crate) fn cpu_seconds(&self) -> f64 {
         self.work.nodes().iter().map(|node| node.value.cpu_seconds).sum()
     }
 
@@ -221,12 +221,12 @@ impl Block {
     }
 
     /// The pass that comes next.
-    pub fn next_pass(&self) -> u64 {
+    pub(crate) fn next_pass(&self) -> u64 {
         self.moments.next_pass()
     }
 
     /// Marks all passes as timed side by side with their rivals; `keep_level` is the block's own.
-    pub fn settle(&mut self, keep_level: u32) {
+    pub(crate) fn settle(&mut self, keep_level: u32) {
         let mut settled = Counter::new(self.work.start(), keep_level);
         for node in self.work.nodes() {
             settled.push_node(node.level, Work { settled: 1 << node.level, ..node.value });
@@ -235,7 +235,7 @@ impl Block {
     }
 
     /// Appends the passes that follow, at least one.
-    pub fn append(&mut self, later: Block) {
+    pub(crate) fn append(&mut self, later: Block) {
         self.bands = later.bands;
         if let Some(first) = later.pixels.nodes().first() {
             self.pair_with(&first.value.mean);
@@ -250,7 +250,7 @@ impl Block {
 
 /// Measurement of a finished job: its batches, and one image instead of the tree's many.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finished {
+pub(crate) struct Finished {
     /// Number of passes.
     pub passes: u64,
     /// Moments of `[observable][band]` by batch.
@@ -267,14 +267,14 @@ pub struct Finished {
 
 impl Finished {
     /// Work and time of all passes.
-    pub fn total(&self) -> Work {
+    pub(crate) fn total(&self) -> Work {
         self.work.iter().fold(Work::default(), |sum, work| sum.merge(*work))
     }
 }
 
 impl Block {
     /// All passes are done: merges the nodes that the tree still keeps separate.
-    pub fn finish(self) -> Finished {
+    pub(crate) fn finish(self) -> Finished {
         Finished {
             passes: self.next_pass(),
             batches: self.moments.batches(),
@@ -288,18 +288,18 @@ impl Block {
 
 impl Passes {
     /// Number of the group of jobs that are timed side by side, where the job belongs to one.
-    pub fn side_by_side(&self) -> Option<usize> {
+    pub(crate) fn side_by_side(&self) -> Option<usize> {
         self.arm.is_timed.then_some(self.cell)
     }
 
     /// Columns and rows of the image, where the record has one.
-    pub fn image_size(&self) -> Option<(usize, usize)> {
+    pub(crate) fn image_size(&self) -> Option<(usize, usize)> {
         self.layout.image().filter(|_| self.stage == Stage::Main)
     }
 
     /// Runs passes `start..end`; only the run itself keeps an image. `stop` is asked between passes; a
     /// stopped block is dropped whole.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         stage: Stage,
         start: u64,

@@ -25,7 +25,7 @@ use crate::sampling::stream::StreamKey;
 use crate::scene::Scene;
 
 /// Plan of a run.
-pub struct Plan {
+pub(crate) struct Plan {
     /// Bands of the experiment.
     pub bands: Vec<Band>,
     /// One job per cell and arm of an estimator, cells outermost; then one per sampler.
@@ -41,7 +41,7 @@ pub struct Plan {
 
 impl Plan {
     /// Estimate of the run's memory.
-    pub fn memory(&self, threads: usize) -> MemoryEstimate {
+    pub(crate) fn memory(&self, threads: usize) -> MemoryEstimate {
         MemoryEstimate::new(&self.jobs, self.scene_bytes, threads, self.passes)
     }
 }
@@ -54,7 +54,7 @@ const MOST_OBSERVABLES: usize = 4096;
 /// # Errors
 /// Everything that only shows when it is built: meshes, maps, sensors inside bodies, claims on
 /// observables that do not exist, options that a sampler refuses.
-pub fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
+pub(crate) fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
     plan_stage(experiment, registry, Stage::Main)
 }
 
@@ -244,7 +244,7 @@ fn build_sampler<'a>(
 ///
 /// # Errors
 /// What cannot be built.
-pub fn build_all(experiment: &Experiment, registry: &Registry) -> Result<()> {
+pub(crate) fn build_all(experiment: &Experiment, registry: &Registry) -> Result<()> {
     let mut builder = Builder::new(experiment);
     experiment.cells.iter().try_for_each(|cell| builder.scene(cell).map(|_| ()))?;
     experiment.file.sampler.iter().try_for_each(|words| build_sampler(words, registry).map(|_| ()))
@@ -273,7 +273,7 @@ impl Duels {
 }
 
 /// A layout's observables as the record names them.
-pub fn named(layout: &Layout) -> Vec<Observable> {
+pub(super) fn named(layout: &Layout) -> Vec<Observable> {
     let name = |o: &crate::estimators::ObservableName| Observable {
         name: o.name.clone(),
         class: o.class.to_string(),

@@ -6,11 +6,11 @@ use crate::results::json::{canonical, hash_bytes};
 use crate::sampling::stream::StreamKey;
 
 /// Version of what enters a key; raising it changes the random numbers of every experiment.
-pub const KEY_VERSION: u32 = 1;
+pub(crate) const KEY_VERSION: u32 = 1;
 
 /// Stage that a sequence of passes belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
+pub(crate) enum Stage {
     /// The short run that turns a budget into passes.
     Pilot,
     /// Passes of the run.
@@ -21,7 +21,7 @@ pub enum Stage {
 
 impl Stage {
     /// Name in keys and records.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Stage::Pilot => "pilot",
             Stage::Main => "main",
@@ -33,7 +33,7 @@ impl Stage {
 /// Everything that names a sequence of passes. Intentionally absent: claims, budget, threads, block
 /// size, the order of a sweep, an estimator's options (so that options can be compared on one stream).
 #[derive(Clone, Debug)]
-pub struct StreamName<'a> {
+pub(crate) struct StreamName<'a> {
     /// Name of the experiment.
     pub experiment: &'a str,
     /// Its seed, where it has one.
@@ -52,7 +52,7 @@ pub struct StreamName<'a> {
 
 impl StreamName<'_> {
     /// The key of this sequence.
-    pub fn key(&self) -> StreamKey {
+    pub(crate) fn key(&self) -> StreamKey {
         let mut name = json!({
             "version": KEY_VERSION,
             "experiment": self.experiment,

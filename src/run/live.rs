@@ -26,7 +26,7 @@ const LAST_WAIT: Duration = Duration::from_secs(10);
 
 /// Connection to a viewer, for all experiments of one call.
 #[derive(Debug)]
-pub struct Live {
+pub(crate) struct Live {
     address: Address,
     shared: Arc<Shared>,
     pace: Mutex<Pace>,
@@ -63,7 +63,7 @@ impl Live {
     ///
     /// # Errors
     /// No viewer answers; the message is for the user.
-    pub fn connect(address: &Address) -> Result<Live, String> {
+    pub(crate) fn connect(address: &Address) -> Result<Live, String> {
         let connection = Connection::open(address).map_err(|error| {
             let why = reason(&error);
             format!("no tev viewer at {address} ({why}): start tev, or leave --tev out; the run continues without")
@@ -75,7 +75,7 @@ impl Live {
     }
 
     /// Reports once that the viewer has gone.
-    pub fn complaint(&self) -> Option<String> {
+    pub(crate) fn complaint(&self) -> Option<String> {
         let why = self.shared.post().lost.take()?;
         Some(format!("tev at {} takes no more images ({why}): the run continues without", self.address))
     }
@@ -165,7 +165,7 @@ fn reason(error: &io::Error) -> String {
 
 /// The images of one experiment in the live view.
 #[derive(Clone, Copy)]
-pub struct Show<'a> {
+pub(crate) struct Show<'a> {
     /// Viewer that images are sent to.
     pub live: &'a Live,
     /// The experiment's name.
@@ -178,12 +178,12 @@ pub struct Show<'a> {
 
 impl Show<'_> {
     /// Whether any job has an image.
-    pub fn has_images(&self) -> bool {
+    pub(crate) fn has_images(&self) -> bool {
         self.jobs.iter().any(|job| image_size(job).is_some())
     }
 
     /// Offers the image of a job under way.
-    pub fn under_way(&self, job: usize, done: &Block) {
+    pub(crate) fn under_way(&self, job: usize, done: &Block) {
         let Some(size) = image_size(&self.jobs[job]) else { return };
         let mut pace = self.live.pace.lock().unwrap_or_else(PoisonError::into_inner);
         let begun = Instant::now();
@@ -200,14 +200,14 @@ impl Show<'_> {
     }
 
     /// Offers the last image of a finished job; false where its image has to be sent later.
-    pub fn done(&self, job: usize, finished: &Finished) -> bool {
+    pub(crate) fn done(&self, job: usize, finished: &Finished) -> bool {
         image_size(&self.jobs[job])
             .is_none_or(|size| self.live.offer(|| self.frame(job, size, &finished.image)))
     }
 
     /// All jobs are done: sends the images of those that are `owed`. Returns a message where some
     /// were not sent.
-    pub fn close(&self, owed: &[(usize, &Finished)]) -> Option<String> {
+    pub(crate) fn close(&self, owed: &[(usize, &Finished)]) -> Option<String> {
         let until = Instant::now() + LAST_WAIT;
         let mut sent = 0;
         for &(job, finished) in owed {

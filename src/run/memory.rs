@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 
 /// Estimate of a run's largest memory, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MemoryEstimate {
+pub(crate) struct MemoryEstimate {
     /// Meshes and maps, bytes.
     pub shapes: usize,
     /// Moments of observables and images of everything measured, kept until the record is written.
@@ -24,7 +24,12 @@ impl MemoryEstimate {
     /// more waits to be collected. Jobs that are timed side by side are under way together, and two
     /// batches of each may wait for the turn of those before them. What an estimator needs for a pass it
     /// needs on each thread.
-    pub fn new(jobs: &[Job], shapes: usize, threads: usize, passes: Option<u64>) -> MemoryEstimate {
+    pub(crate) fn new(
+        jobs: &[Job],
+        shapes: usize,
+        threads: usize,
+        passes: Option<u64>,
+    ) -> MemoryEstimate {
         let jobs: Vec<&Passes> = jobs.iter().filter_map(Job::passes).collect();
         let image = |job: &Passes| 16 * job.layout.pixels() * job.layout.bands();
         let moments = |job: &Passes| 128 * 40 * job.layout.observables().len() * job.layout.bands();
@@ -41,7 +46,7 @@ impl MemoryEstimate {
     }
 
     /// Total, bytes.
-    pub fn total(&self) -> usize {
+    pub(crate) fn total(&self) -> usize {
         self.shapes + self.results + self.working
     }
 
@@ -49,7 +54,7 @@ impl MemoryEstimate {
     ///
     /// # Errors
     /// More than nine tenths of the memory available.
-    pub fn check(&self, available: Option<usize>) -> Result<()> {
+    pub(crate) fn check(&self, available: Option<usize>) -> Result<()> {
         match available {
             Some(available) if self.total() > available / 10 * 9 => Err(Error::input_help(
                 format!(
@@ -66,7 +71,7 @@ impl MemoryEstimate {
 }
 
 /// Memory that the system can give without swapping, bytes; `None` where it does not report it.
-pub fn available() -> Option<usize> {
+pub(crate) fn available() -> Option<usize> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     let kib: usize = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
@@ -74,7 +79,7 @@ pub fn available() -> Option<usize> {
 }
 
 /// A number of bytes for people.
-pub fn readable(bytes: usize) -> String {
+pub(crate) fn readable(bytes: usize) -> String {
     let units = ["B", "KiB", "MiB", "GiB", "TiB", "PiB"];
     let mut value = bytes as f64;
     let mut unit = 0;

@@ -3,19 +3,19 @@
 //! experiment -> jobs (scene + estimator + streams, or sampler + stream) -> blocks of passes, in any
 //! order, on any threads -> moments in the order of passes -> record, timing, provenance.
 
-pub mod checkpoint;
-pub mod chi_square;
-pub mod clock;
-pub mod comparisons;
-pub mod interrupt;
-pub mod job;
-pub mod keys;
-pub mod live;
-pub mod memory;
-pub mod pilot;
-pub mod progress;
-pub mod tev;
-pub mod workers;
+pub(crate) mod checkpoint;
+pub(crate) mod chi_square;
+pub(crate) mod clock;
+pub(crate) mod comparisons;
+pub(crate) mod interrupt;
+pub(crate) mod job;
+pub(crate) mod keys;
+pub(crate) mod live;
+pub(crate) mod memory;
+pub(crate) mod pilot;
+pub(crate) mod progress;
+pub(crate) mod tev;
+pub(crate) mod workers;
 
 mod assemble;
 mod jobs;
@@ -38,13 +38,13 @@ use live::{Live, Show};
 use progress::Progress;
 use workers::Completed;
 
-pub use jobs::{Plan, build_all, plan};
-pub use pilot::estimate_seconds;
-pub use retest::{Remeasured, retest};
+pub(crate) use jobs::{Plan, build_all, plan};
+pub(crate) use pilot::estimate_seconds;
+pub(crate) use retest::{Remeasured, retest};
 
 /// How to run; nothing here changes a result.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub(crate) struct Options {
     /// Folder that holds a folder per experiment.
     pub out: PathBuf,
     /// Number of threads.
@@ -63,7 +63,7 @@ pub struct Options {
 
 impl Options {
     /// Options that write into `out` and use all cores.
-    pub fn new(out: impl Into<PathBuf>) -> Options {
+    pub(crate) fn new(out: impl Into<PathBuf>) -> Options {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Options {
             out: out.into(),
@@ -76,7 +76,7 @@ impl Options {
     }
 
     /// The folder of an experiment's results.
-    pub fn folder(&self, experiment: &str) -> PathBuf {
+    pub(crate) fn folder(&self, experiment: &str) -> PathBuf {
         self.out.join(experiment)
     }
 }
@@ -86,7 +86,7 @@ impl Options {
 /// # Errors
 /// Bad input found while building; a run that does not fit in memory; I/O; an interruption, after which
 /// the same call resumes where this one stopped.
-pub fn run(
+pub(crate) fn run(
     experiment: &Experiment,
     registry: &Registry,
     options: &Options,
@@ -188,7 +188,7 @@ fn replays(
 
 /// Whether the folder holds a record of exactly this experiment, its claims and pictures included, by
 /// this build.
-pub fn has_record(experiment: &Experiment, out: &Path) -> bool {
+pub(crate) fn has_record(experiment: &Experiment, out: &Path) -> bool {
     let folder = RecordFolder::new(out.join(&experiment.file.name));
     let same_build =
         || matches!(folder.read_provenance(), Ok(Some(p)) if p.build == provenance::build());

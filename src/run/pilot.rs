@@ -11,10 +11,10 @@ use crate::stats::tree::Counter;
 const ALL: u32 = Counter::<Vec<Moments>>::MERGE_ALL;
 
 /// Fewest passes of a run: every batch of its record then holds at least one.
-pub const LEAST_PASSES: u64 = 128;
+pub(crate) const LEAST_PASSES: u64 = 128;
 
 /// The passes that a budget pays for; `None` where `stop` was raised.
-pub fn passes(job: &Passes, budget: &Budget, stop: &dyn Fn() -> bool) -> Option<u64> {
+pub(crate) fn passes(job: &Passes, budget: &Budget, stop: &dyn Fn() -> bool) -> Option<u64> {
     if job.count.is_some() {
         return job.count;
     }
@@ -27,7 +27,7 @@ pub fn passes(job: &Passes, budget: &Budget, stop: &dyn Fn() -> bool) -> Option<
 
 /// Passes that a budget pays for and the CPU seconds they will take, from a short pilot; `None` where
 /// the pilot saw nothing to time.
-pub fn estimate_seconds(job: &Passes, budget: &Budget) -> Option<(u64, f64)> {
+pub(crate) fn estimate_seconds(job: &Passes, budget: &Budget) -> Option<(u64, f64)> {
     let passes = passes(job, budget, &|| false)?;
     let mut tried = 1;
     loop {

@@ -9,13 +9,13 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 const STEPS: u64 = 1000;
 
 /// A bar on standard error, or nothing where that is no terminal.
-pub struct Progress {
+pub(crate) struct Progress {
     bar: ProgressBar,
 }
 
 impl Progress {
     /// For a number of jobs.
-    pub fn new(jobs: usize, quiet: bool) -> Progress {
+    pub(crate) fn new(jobs: usize, quiet: bool) -> Progress {
         let shown = !quiet && std::io::stderr().is_terminal();
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(jobs as u64 * STEPS), target);
@@ -28,18 +28,18 @@ impl Progress {
     }
 
     /// Jobs finished, the fraction of those under way, and what is being done.
-    pub fn update(&self, jobs_done: f64, message: String) {
+    pub(crate) fn update(&self, jobs_done: f64, message: String) {
         self.bar.set_message(message);
         self.bar.set_position((jobs_done * STEPS as f64) as u64);
     }
 
     /// Tells something on standard error, bar or not.
-    pub fn say(&self, what: &str) {
+    pub(crate) fn say(&self, what: &str) {
         self.bar.suspend(|| eprintln!("{what}"));
     }
 
     /// Removes the progress bar.
-    pub fn finish(&self) {
+    pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }

@@ -11,7 +11,7 @@ const BLOCK: u64 = 7;
 
 /// Runs the first `passes` of a finished job again, rounded up to whole batches; nothing where `stop`
 /// was raised. The blocks are run last to first and joined in their order.
-pub fn replay(
+pub(super) fn replay(
     job: &Passes,
     finished: &Finished,
     passes: u64,

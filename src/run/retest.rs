@@ -12,7 +12,7 @@ use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 
 /// Quantities and samplers to measure again.
-pub struct Remeasured<'a> {
+pub(crate) struct Remeasured<'a> {
     /// The record of the first look.
     pub main: &'a Record,
     /// Quantities of estimators; each brings all that its run measures.
@@ -28,7 +28,7 @@ pub struct Remeasured<'a> {
 ///
 /// # Errors
 /// As [`super::run`].
-pub fn retest(
+pub(crate) fn retest(
     experiment: &Experiment,
     registry: &Registry,
     options: &Options,

@@ -25,14 +25,14 @@ const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Where a viewer listens.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Address {
+pub(crate) struct Address {
     host: String,
     port: u16,
 }
 
 impl Address {
     /// Where tev listens unless it is told otherwise.
-    pub const USUAL: &str = "127.0.0.1:14158";
+    pub(crate) const USUAL: &str = "127.0.0.1:14158";
 }
 
 impl FromStr for Address {
@@ -63,7 +63,7 @@ impl fmt::Display for Address {
 
 /// An image as a viewer shows it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TevImage {
+pub(crate) struct TevImage {
     /// Under which it is shown.
     pub name: String,
     /// Pixels per row.
@@ -76,7 +76,7 @@ pub struct TevImage {
 
 impl TevImage {
     /// Has the viewer show an empty image of this name, size and channels; `is_focus` selects it there.
-    pub fn create(&self, is_focus: bool) -> Vec<u8> {
+    pub(crate) fn create(&self, is_focus: bool) -> Vec<u8> {
         let mut packet = Packet::new(CREATE_IMAGE, is_focus, &self.name);
         packet.integers(&[self.width, self.height, self.channels.len()]);
         self.channels.iter().for_each(|(name, _)| packet.text(name));
@@ -84,7 +84,7 @@ impl TevImage {
     }
 
     /// Fills that image, part by part.
-    pub fn updates(&self) -> impl Iterator<Item = Vec<u8>> + '_ {
+    pub(crate) fn updates(&self) -> impl Iterator<Item = Vec<u8>> + '_ {
         let columns = self.width.clamp(1, MOST_VALUES);
         let channels = (MOST_VALUES / columns).min(self.channels.len()).max(1);
         let rows = (MOST_VALUES / (columns * channels)).min(self.height).max(1);
@@ -155,14 +155,14 @@ impl Packet {
 
 /// An open connection to a viewer.
 #[derive(Debug)]
-pub struct Connection(TcpStream);
+pub(crate) struct Connection(TcpStream);
 
 impl Connection {
     /// Connects to a viewer.
     ///
     /// # Errors
     /// No program listens at the address, or none answers.
-    pub fn open(address: &Address) -> io::Result<Connection> {
+    pub(crate) fn open(address: &Address) -> io::Result<Connection> {
         let mut last = io::Error::new(io::ErrorKind::NotFound, "the host has no address");
         for socket in (address.host.as_str(), address.port).to_socket_addrs()? {
             match TcpStream::connect_timeout(&socket, PATIENCE) {
@@ -181,7 +181,7 @@ impl Connection {
     ///
     /// # Errors
     /// The viewer has closed the connection, or has taken nothing for some seconds.
-    pub fn send(&mut self, packet: &[u8]) -> io::Result<()> {
+    pub(crate) fn send(&mut self, packet: &[u8]) -> io::Result<()> {
         self.check()?;
         self.0.write_all(packet).map_err(|error| match error.kind() {
             io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => {
@@ -196,7 +196,7 @@ impl Connection {
     ///
     /// # Errors
     /// It has gone.
-    pub fn check(&self) -> io::Result<()> {
+    pub(crate) fn check(&self) -> io::Result<()> {
         self.0.set_nonblocking(true)?;
         let peeked = self.0.peek(&mut [0]);
         self.0.set_nonblocking(false)?;

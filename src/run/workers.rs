@@ -28,7 +28,7 @@ use crate::results::json::hash_json;
 use crate::stats::tree::batch_level;
 
 /// How a run is carried out; nothing here changes a result.
-pub struct Settings<'a> {
+pub(crate) struct Settings<'a> {
     /// Number of threads.
     pub threads: usize,
     /// Passes per block, where the user sets them.
@@ -48,7 +48,7 @@ pub struct Settings<'a> {
 }
 
 /// Result of a job, and the claims made before its first pass or draw.
-pub struct Completed {
+pub(crate) struct Completed {
     /// What was fixed before the first pass.
     pub start: Start,
     /// Result of the job.
@@ -56,7 +56,7 @@ pub struct Completed {
 }
 
 /// Result of a job.
-pub enum Output {
+pub(crate) enum Output {
     /// Passes of an estimator.
     Passes(Box<Finished>),
     /// Counts of a sampler's draws.
@@ -65,7 +65,7 @@ pub enum Output {
 
 impl Completed {
     /// The measurement, where the job is of an estimator.
-    pub fn passes(&self) -> Option<&Finished> {
+    pub(crate) fn passes(&self) -> Option<&Finished> {
         match &self.output {
             Output::Passes(finished) => Some(finished),
             Output::Draws(_) => None,
@@ -145,7 +145,7 @@ struct Pool<'a> {
 
 /// Runs every job and returns the results in the order of the jobs. Where the run is interrupted, all
 /// states are saved first.
-pub fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed>> {
+pub(crate) fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed>> {
     let queue = Mutex::new(Queue { next_group: 0, active: None });
     let samplers = jobs.iter().filter(|job| job.draws().is_some()).count();
     let pool = Pool { jobs, groups: groups(jobs), samplers, settings, queue };

@@ -5,7 +5,7 @@ use crate::math::ln;
 /// ln of the e-value 1 / (2 sqrt(p)) of a p-value: its expectation under a uniform p is the integral of
 /// 1 / (2 sqrt(p)) over [0, 1], which is 1; under a conservative p it is less.
 /// V. Vovk, R. Wang, "E-values: Calibration, combination and applications" (2021), with exponent 1/2.
-pub fn calibrated(p: f64) -> f64 {
+pub(crate) fn calibrated(p: f64) -> f64 {
     -0.5 * ln(p) - ln(2.0)
 }
 

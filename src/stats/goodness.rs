@@ -24,18 +24,18 @@ use super::tails::{
 };
 
 /// The least expected count of a bin.
-pub const LEAST_EXPECTED: f64 = 25.0;
+pub(crate) const LEAST_EXPECTED: f64 = 25.0;
 
 /// The largest noncentrality from errors of the expectations, in standard deviations of the statistic.
-pub const LARGEST_SHIFT: f64 = 0.02;
+pub(crate) const LARGEST_SHIFT: f64 = 0.02;
 
 /// The largest |skewness| / sqrt(n) at which the mean of n values is tested as a normal: at 0.26, t
 /// tests of skewed values at the level 1e-3 rejected 2.5 times too often.
-pub const LARGEST_SKEW: f64 = 0.1;
+pub(crate) const LARGEST_SKEW: f64 = 0.1;
 
 /// Why a test is void: never a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Refusal {
+pub(crate) enum Refusal {
     /// No samples, or fewer than two bins that can hold any.
     Empty,
     /// A probability or its error is no number in [0, 1].
@@ -105,7 +105,7 @@ impl fmt::Display for Refusal {
 
 /// One bin of a goodness-of-fit test.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bin {
+pub(crate) struct Bin {
     /// Probability of the bin.
     pub mass: f64,
     /// A bound of the error of `mass`; 0 with `mass` 0 for a bin that nothing may enter.
@@ -116,7 +116,7 @@ pub struct Bin {
 
 /// The outcome of a chi-square test.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Goodness {
+pub(crate) struct Goodness {
     /// Pearson's X2; infinite where an impossible bin was entered.
     pub statistic: f64,
     /// Degrees of freedom: the possible bins less one.
@@ -131,7 +131,7 @@ pub struct Goodness {
 
 /// The smallest defect that a chi-square test finds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Detectable {
+pub(crate) struct Detectable {
     /// Its noncentrality, N sum (q_i - p_i)^2 / p_i for true probabilities q_i.
     pub lambda: f64,
     /// r = sqrt(lambda / N): the defect as a relative error of the density by +-r everywhere.
@@ -140,7 +140,7 @@ pub struct Detectable {
 
 impl Goodness {
     /// The defect that is rejected at `level` with probability `power`.
-    pub fn detectable(&self, level: f64, power: f64) -> Detectable {
+    pub(crate) fn detectable(&self, level: f64, power: f64) -> Detectable {
         let lambda = noncentrality(self.dof, level, power);
         Detectable { lambda, relative: (lambda / self.samples as f64).sqrt() }
     }
@@ -151,7 +151,7 @@ impl Goodness {
 /// # Errors
 ///
 /// Every [`Refusal`] except those of means. A sample in an impossible bin is an outcome and comes first.
-pub fn pearson(bins: &[Bin]) -> Result<Goodness, Refusal> {
+pub(crate) fn pearson(bins: &[Bin]) -> Result<Goodness, Refusal> {
     let is_probability = |x: f64| (0.0..=1.0).contains(&x);
     if let Some(bin) = bins.iter().position(|c| !is_probability(c.mass) || !is_probability(c.error)) {
         return Err(Refusal::NotAProbability { bin });
@@ -192,7 +192,7 @@ fn resolved(lambda: f64, dof: f64) -> Result<(), Refusal> {
 
 /// The outcome of a test of one probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Proportion {
+pub(crate) struct Proportion {
     /// Number of successes.
     pub count: u64,
     /// Number of trials.
@@ -211,7 +211,12 @@ pub struct Proportion {
 ///
 /// [`Refusal::Empty`] without samples, [`Refusal::NotAProbability`], [`Refusal::Unresolved`] where
 /// N error^2 / (p q) exceeds the bound that [`pearson`] sets for its two bins.
-pub fn proportion(count: u64, samples: u64, mass: f64, error: f64) -> Result<Proportion, Refusal> {
+pub(crate) fn proportion(
+    count: u64,
+    samples: u64,
+    mass: f64,
+    error: f64,
+) -> Result<Proportion, Refusal> {
     let is_probability = |x: f64| (0.0..=1.0).contains(&x);
     if !is_probability(mass) || !is_probability(error) {
         return Err(Refusal::NotAProbability { bin: 0 });
@@ -228,7 +233,7 @@ pub fn proportion(count: u64, samples: u64, mass: f64, error: f64) -> Result<Pro
 impl Proportion {
     /// The nearest probabilities below and above that are rejected at `level` with probability `power`;
     /// 0 or 1 where there is none on that side.
-    pub fn detectable(&self, level: f64, power: f64) -> (f64, f64) {
+    pub(crate) fn detectable(&self, level: f64, power: f64) -> (f64, f64) {
         let (n, p) = (self.samples, self.mass);
         // Rejected: counts up to `low` - 1, and from `high` on.
         let low = first(n + 1, |k| 2.0 * binomial_lower(k, n, p) > level);
@@ -266,7 +271,7 @@ fn first(end: u64, holds: impl Fn(u64) -> bool) -> u64 {
 /// [`Refusal::Empty`] below two values, [`Refusal::NoSpread`], [`Refusal::Skewed`] (above
 /// [`LARGEST_SKEW`]), [`Refusal::Unresolved`] where the error's noncentrality n error^2 / s^2 exceeds
 /// its bound.
-pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<ContrastTest, Refusal> {
+pub(crate) fn contrast(values: &Moments, expected: f64, error: f64) -> Result<ContrastTest, Refusal> {
     if values.n < 2 {
         return Err(Refusal::Empty);
     }
@@ -288,7 +293,7 @@ pub fn contrast(values: &Moments, expected: f64, error: f64) -> Result<ContrastT
 
 /// The outcome of [`contrast`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContrastTest {
+pub(crate) struct ContrastTest {
     /// The difference from the expected mean; its `detectable` is the contrast's.
     pub estimate: Estimate,
     /// Statistic, degrees of freedom and p-value.

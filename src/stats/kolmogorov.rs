@@ -7,7 +7,7 @@ use crate::math::exp;
 
 /// The largest distance between the empirical distribution of values and the uniform one on [0, 1], and
 /// its p-value; 20 values or more.
-pub fn uniformity(values: &[f64]) -> (f64, f64) {
+pub(crate) fn uniformity(values: &[f64]) -> (f64, f64) {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let n = sorted.len() as f64;
@@ -22,7 +22,7 @@ pub fn uniformity(values: &[f64]) -> (f64, f64) {
 ///
 /// 2 sum (-1)^(k-1) exp(-2 k^2 x^2); for small x, by the transformation of the theta function,
 /// 1 - sqrt(2 pi)/x sum exp(-(2k-1)^2 pi^2 / (8 x^2)) (W. Feller 1948).
-pub fn kolmogorov_limit(x: f64) -> f64 {
+pub(crate) fn kolmogorov_limit(x: f64) -> f64 {
     if x <= 0.0 {
         return 1.0;
     }
@@ -39,7 +39,7 @@ pub fn kolmogorov_limit(x: f64) -> f64 {
 /// Z. Birnbaum, F. Tingey, "One-sided confidence contours for probability distribution functions"
 /// (1951): d sum_j C(n, j) (d + j/n)^(j-1) (1 - d - j/n)^(n-j) over j <= n (1 - d): binomial
 /// probabilities of j with p = d + j/n, each times d / p. All terms are positive.
-pub fn smirnov(d: f64, n: u64) -> f64 {
+pub(crate) fn smirnov(d: f64, n: u64) -> f64 {
     if d <= 0.0 {
         return 1.0;
     }
@@ -64,7 +64,7 @@ pub fn smirnov(d: f64, n: u64) -> f64 {
 /// x + 1/(6 sqrt(n)) + (x - 1)/(4 n), x = sqrt(n) d (J. Vrbik, "Small-sample corrections to
 /// Kolmogorov-Smirnov test statistic" (2018)): within 5e-4 of the exact value at n = 20, 1.5e-4 at 100
 /// and 2e-5 at 1000.
-pub fn kolmogorov_smirnov(d: f64, n: u64) -> f64 {
+pub(crate) fn kolmogorov_smirnov(d: f64, n: u64) -> f64 {
     let root = (n as f64).sqrt();
     let x = root * d;
     if x >= 2.0 {

@@ -1,21 +1,21 @@
 //! Moments, tests, multiplicity. Door for `statrs`, of which only survival functions are used.
 
 /// Two estimators at equal cost.
-pub mod efficiency;
+pub(crate) mod efficiency;
 /// E-values: evidence that multiplies.
-pub mod evidence;
+pub(crate) mod evidence;
 /// Tests of samples against known probabilities.
-pub mod goodness;
+pub(crate) mod goodness;
 /// Significance tests of means, and the smallest difference that they detect.
 pub mod hypothesis;
 /// Mergeable moments of scalars and images.
 pub mod moments;
 /// Many tests under one error rate.
-pub mod multiplicity;
+pub(crate) mod multiplicity;
 /// Sums of symmetric terms.
-pub mod signs;
+pub(crate) mod signs;
 /// Survival functions and their inverses.
-pub mod tails;
+pub(crate) mod tails;
 /// The fixed dyadic reduction over passes.
 pub mod tree;
 

@@ -6,7 +6,7 @@
 /// With p sorted upwards, adjusted(i) = max over j <= i of min(1, (m - j) p(j)), j counted from 0.
 /// S. Holm, "A simple sequentially rejective multiple test procedure" (1979). A p-value that is no
 /// number counts as a test and stays no number.
-pub fn holm(p: &[f64]) -> Vec<f64> {
+pub(crate) fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
     let mut adjusted = vec![0.0; p.len()];

@@ -6,7 +6,7 @@ use crate::math;
 /// P(T > t) <= exp(-t^2 / 2) for T = sum X / sqrt(sum X^2) of independent symmetric X: given the |X|,
 /// the signs are fair coins, and W. Hoeffding's inequality applies ("Probability inequalities for sums
 /// of bounded random variables", 1963, theorem 2). One-sided: only t > 0 speaks against the hypothesis.
-pub fn one_sided_bound(t: f64) -> f64 {
+pub(crate) fn one_sided_bound(t: f64) -> f64 {
     if t > 0.0 {
         math::exp(-0.5 * t * t)
     } else if t.is_nan() {
@@ -21,7 +21,7 @@ pub fn one_sided_bound(t: f64) -> f64 {
 ///
 /// With n terms of noise s and effect e each, T is about (z + g) / sqrt(1 + z^2 / n), z = e sqrt(n) / s
 /// and g normal; T > c where z + g > c / sqrt(1 - c^2 / n). No effect reaches c >= sqrt(n).
-pub fn detectable(level: f64, power: f64, terms: f64) -> f64 {
+pub(crate) fn detectable(level: f64, power: f64, terms: f64) -> f64 {
     let c2 = -2.0 * math::ln(level);
     let normal = critical_value(2.0 * (1.0 - power), f64::INFINITY);
     if c2 >= terms { f64::INFINITY } else { (c2 / (1.0 - c2 / terms)).sqrt() + normal }

@@ -14,7 +14,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::math::{self, exp, ln, ln_1p};
 
 /// P(|Z| > |z|) for a standard normal Z.
-pub fn normal_two_sided(z: f64) -> f64 {
+pub(crate) fn normal_two_sided(z: f64) -> f64 {
     math::erfc(z.abs() * FRAC_1_SQRT_2)
 }
 
@@ -23,7 +23,7 @@ pub fn normal_two_sided(z: f64) -> f64 {
 /// With r = t / sqrt(dof), h = 1 / (1 + r^2) and a = dof/2 this is the incomplete beta function
 /// I_h(a, 1/2) = 1 - I_(1-h)(1/2, a), each by its continued fraction where that converges fast. h and
 /// 1 - h are both formed from r: next to the centre 1 - h has no digits left in h.
-pub fn student_two_sided(t: f64, dof: f64) -> f64 {
+pub(crate) fn student_two_sided(t: f64, dof: f64) -> f64 {
     if dof == f64::INFINITY {
         return normal_two_sided(t);
     }
@@ -188,17 +188,17 @@ fn binomial_at_least(k: u64, n: u64, p: f64, q: f64) -> f64 {
 }
 
 /// P(X >= k) for a binomial X of n trials with probability p; any n up to 1e12.
-pub fn binomial_upper(k: u64, n: u64, p: f64) -> f64 {
+pub(crate) fn binomial_upper(k: u64, n: u64, p: f64) -> f64 {
     binomial_at_least(k, n, p, 1.0 - p)
 }
 
 /// P(X <= k) for a binomial X of n trials with probability p; any n up to 1e12.
-pub fn binomial_lower(k: u64, n: u64, p: f64) -> f64 {
+pub(crate) fn binomial_lower(k: u64, n: u64, p: f64) -> f64 {
     if k >= n { 1.0 } else { binomial_at_least(n - k, n, 1.0 - p, p) }
 }
 
 /// The exact two-sided p-value of k successes: twice the smaller tail, at most 1.
-pub fn binomial_two_sided(k: u64, n: u64, p: f64) -> f64 {
+pub(crate) fn binomial_two_sided(k: u64, n: u64, p: f64) -> f64 {
     (2.0 * binomial_lower(k, n, p).min(binomial_upper(k, n, p))).min(1.0)
 }
 
@@ -208,7 +208,7 @@ pub fn binomial_two_sided(k: u64, n: u64, p: f64) -> f64 {
 /// With a = dof/2, y = x/2 and Q the central tail, Q(a + 1, y) = Q(a, y) + y^a e^-y / Gamma(a + 1):
 /// upwards in J every operation adds positive numbers. Q grows with J, so the terms more than 9 standard
 /// deviations below the mean of J are less than 1e-17 of the sum; Q <= 1 bounds those after the last.
-pub fn noncentral_chi_square_sf(x: f64, dof: f64, lambda: f64) -> f64 {
+pub(crate) fn noncentral_chi_square_sf(x: f64, dof: f64, lambda: f64) -> f64 {
     let (y, mean) = (0.5 * x, 0.5 * lambda);
     // Written so that a NaN is refused too.
     if !(dof > 0.0 && lambda >= 0.0 && y >= 0.0) {
@@ -237,7 +237,7 @@ pub fn noncentral_chi_square_sf(x: f64, dof: f64, lambda: f64) -> f64 {
 }
 
 /// The boundary in [low, high] where `is_below` turns from true to false, to a rounding.
-pub fn bisect(is_below: impl Fn(f64) -> bool, low: f64, high: f64) -> f64 {
+pub(crate) fn bisect(is_below: impl Fn(f64) -> bool, low: f64, high: f64) -> f64 {
     let (mut low, mut high) = (low, high);
     while high - low > 1e-14 * high.abs() {
         let middle = 0.5 * (low + high);
@@ -264,12 +264,12 @@ pub fn critical_value(level: f64, dof: f64) -> f64 {
 }
 
 /// The x with P(X > x) = `level` for a chi-square X; `level` in (0, 1].
-pub fn chi_square_critical(level: f64, dof: f64) -> f64 {
+pub(crate) fn chi_square_critical(level: f64, dof: f64) -> f64 {
     bisect_up(|x| chi_square_sf(x, dof) > level)
 }
 
 /// The noncentrality at which a chi-square test of `level` rejects with probability `power`.
-pub fn noncentrality(dof: f64, level: f64, power: f64) -> f64 {
+pub(crate) fn noncentrality(dof: f64, level: f64, power: f64) -> f64 {
     let critical = chi_square_critical(level, dof);
     bisect_up(|lambda| noncentral_chi_square_sf(critical, dof, lambda) < power)
 }

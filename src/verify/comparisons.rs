@@ -21,14 +21,14 @@ use crate::results::store::Stored;
 use crate::stats::tree::total;
 
 /// Confidence of the intervals shown.
-pub const SHOWN: f64 = 0.95;
+pub(crate) const SHOWN: f64 = 0.95;
 
 /// The probability that any efficiency of a table is withheld although the means are equal.
 const LEVEL: f64 = 1e-3;
 
 /// One row of `comparisons.csv`. Numbers that are not quoted are absent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct EfficiencyRow {
+pub(crate) struct EfficiencyRow {
     /// Experiment name.
     pub experiment: String,
     /// Cell label.
@@ -74,13 +74,13 @@ pub struct EfficiencyRow {
 
 impl EfficiencyRow {
     /// The efficiency ratio and its interval, where they are quoted.
-    pub fn quoted(&self) -> Option<[f64; 3]> {
+    pub(crate) fn quoted(&self) -> Option<[f64; 3]> {
         Some([self.efficiency_ratio?, self.ci_low?, self.ci_high?])
     }
 }
 
 /// The rows as CSV text.
-pub fn to_csv(rows: &[EfficiencyRow]) -> String {
+pub(crate) fn to_csv(rows: &[EfficiencyRow]) -> String {
     csv_text::table(rows)
 }
 
@@ -93,7 +93,7 @@ struct RowSubject<'a> {
 }
 
 /// All rows of a record: by cell, candidate, class, band, measure.
-pub fn comparisons(stored: &Stored) -> Vec<EfficiencyRow> {
+pub(crate) fn comparisons(stored: &Stored) -> Vec<EfficiencyRow> {
     let subjects = subjects(stored);
     // Two measures share one test of the means.
     let level = 2.0 * LEVEL / subjects.len().max(1) as f64;
@@ -235,7 +235,7 @@ fn rays(stored: &Stored, run: &EstimatorRun) -> Option<f64> {
 }
 
 /// Name of a measure in tables.
-pub fn measure_name(measure: CostMeasure) -> &'static str {
+pub(crate) fn measure_name(measure: CostMeasure) -> &'static str {
     match measure {
         CostMeasure::Counters => "counters",
         CostMeasure::Cpu => "cpu",

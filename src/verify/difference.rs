@@ -32,7 +32,7 @@ use crate::stats::moments::Moments;
 
 /// Criteria for the comparison of two records.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Terms {
+pub(crate) struct Terms {
     /// Probability of any false alarm.
     pub level: f64,
     /// The largest difference that may go unseen in the first observable of a run, relative to it.
@@ -43,7 +43,7 @@ pub struct Terms {
 
 /// Result of the comparison.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Compared {
+pub(crate) struct Compared {
     /// Differences of the descriptions, as text; empty where only numbers can differ.
     pub changes: Vec<String>,
     /// One verdict for each quantity that both hold.
@@ -54,7 +54,7 @@ pub struct Compared {
 
 /// Work and its worth, second record over first.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WorkChange {
+pub(crate) struct WorkChange {
     /// Cell label.
     pub cell: String,
     /// Estimator name.
@@ -70,7 +70,7 @@ pub struct WorkChange {
 impl Compared {
     /// 1: a mean differs or the work grew too much. 3: a run's first observable could not be judged, or
     /// not well enough. 0: neither; rarer observables that cannot be judged are no reason to fail.
-    pub fn exit_code(&self) -> u8 {
+    pub(crate) fn exit_code(&self) -> u8 {
         let differs = self.verdicts.iter().any(|v| v.outcome == Outcome::Fail);
         if differs || self.work.iter().any(|work| work.too_slow.is_some()) {
             1
@@ -82,7 +82,7 @@ impl Compared {
     }
 
     /// Whether it is of the first observable that its run shares with the other record.
-    pub fn is_first(&self, verdict: &Verdict) -> bool {
+    pub(crate) fn is_first(&self, verdict: &Verdict) -> bool {
         let same = |v: &&Verdict| v.cell == verdict.cell && v.estimators == verdict.estimators;
         let first = self.verdicts.iter().find(same);
         first.is_some_and(|v| v.observable == verdict.observable && v.class == verdict.class)
@@ -90,7 +90,7 @@ impl Compared {
 }
 
 /// Compares two records; nothing where they hold no quantity in common.
-pub fn compare(a: &Stored, b: &Stored, terms: &Terms) -> Option<Compared> {
+pub(crate) fn compare(a: &Stored, b: &Stored, terms: &Terms) -> Option<Compared> {
     let mut changes = changed_words(&a.record, &b.record);
     let mut findings = Vec::new();
     let mut work = Vec::new();

@@ -46,7 +46,7 @@ use crate::stats::tree::Merge;
 const LEAST_QUADRUPLES: usize = 16;
 
 /// Two arms at equal cost.
-pub struct Contest {
+pub(crate) struct Contest {
     /// Baseline over candidate: above 1 where the candidate is the better.
     pub efficiency: Efficiency,
     /// Whether they were timed side by side; always true by counters.
@@ -57,7 +57,7 @@ pub struct Contest {
 ///
 /// # Errors
 /// As a sentence: something is missing, or the ratio does not exist.
-pub fn contest(
+pub(crate) fn contest(
     stored: &Stored,
     candidate: &Quantity,
     baseline: &Quantity,

@@ -8,7 +8,7 @@ use crate::stats::hypothesis::{Estimate, Test};
 use crate::stats::signs;
 
 /// Confidence of the intervals of efficiencies that decide.
-pub const CONFIDENCE: f64 = 0.999;
+pub(super) const CONFIDENCE: f64 = 0.999;
 
 /// What the numbers of one test show.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,12 +32,12 @@ pub(super) enum Evidence {
 
 impl Evidence {
     /// A difference whose p-value is that of Student's t.
-    pub fn of_difference(difference: Estimate) -> Evidence {
+    pub(super) fn of_difference(difference: Estimate) -> Evidence {
         Evidence::Difference { difference, times: 1.0 }
     }
 
     /// Two sides without sampling error, as `verdict` has them: the same, or not.
-    pub fn of_sides(holds: bool, verdict: &Verdict) -> Evidence {
+    pub(super) fn of_sides(holds: bool, verdict: &Verdict) -> Evidence {
         let said = match holds {
             true => "the same".into(),
             false => format!("no sampling error, {}", verdict.deviation()),
@@ -46,7 +46,7 @@ impl Evidence {
     }
 
     /// The test; none where there is nothing to test, or the statement is exact.
-    pub fn test(&self) -> Option<Test> {
+    pub(super) fn test(&self) -> Option<Test> {
         match self {
             Evidence::Nothing(_) | Evidence::Exact { .. } => None,
             Evidence::Difference { difference, times } => Some(test_of(difference, *times)),
@@ -60,13 +60,13 @@ impl Evidence {
     }
 
     /// The p-value of the test.
-    pub fn p_value(&self) -> Option<f64> {
+    pub(super) fn p_value(&self) -> Option<f64> {
         self.test().map(|test| test.p_value).filter(|p| !p.is_nan())
     }
 
     /// The smallest defect that is rejected at `level` with probability [`POWER`]: of a difference
     /// relative to `relative_to`, or absolute where that is 0.
-    pub fn detectable(&self, level: f64, relative_to: f64) -> Option<f64> {
+    pub(super) fn detectable(&self, level: f64, relative_to: f64) -> Option<f64> {
         let scale = if relative_to == 0.0 { 1.0 } else { relative_to.abs() };
         match self {
             Evidence::Nothing(_) | Evidence::Exact { .. } | Evidence::Sum(_) => None,
@@ -144,7 +144,7 @@ impl EfficiencyTest {
     /// The outcome, where the p-value adjusted over the family is `adjusted_p` and a test fails below
     /// `level`; `own_level` is the level of this test alone. A control expects E to
     /// fail.
-    pub fn outcome(
+    pub(super) fn outcome(
         &self,
         adjusted_p: Option<f64>,
         level: f64,
@@ -181,7 +181,7 @@ impl EfficiencyTest {
     }
 
     /// The reason for an outcome.
-    pub fn note(&self, found: &Outcome, own_level: f64) -> String {
+    pub(super) fn note(&self, found: &Outcome, own_level: f64) -> String {
         let (low, high) = self.ratio.interval(CONFIDENCE);
         let numbers = format!(
             "{:.3} times the efficiency, 99.9 % interval {low:.3} to {high:.3}{}",

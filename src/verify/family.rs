@@ -25,7 +25,7 @@ pub(super) struct Finding {
 
 impl Finding {
     /// With an absolute `detectable`, nothing that must be detected, and a second look.
-    pub fn new(verdict: Verdict, evidence: Evidence) -> Finding {
+    pub(super) fn new(verdict: Verdict, evidence: Evidence) -> Finding {
         Finding { evidence, relative_to: 0.0, detect: None, one_look: false, verdict }
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::evidence::Evidence;
 use super::family::{Concluded, Finding, conclude};
-pub use super::levels::{FAMILY_LEVEL, Looks, POWER};
+pub(crate) use super::levels::{FAMILY_LEVEL, Looks};
 use super::trial::{Subject, Trial, trial};
 use super::verdict::{Outcome, TestKind, Verdict};
 use crate::results::record::{Against, ClaimKind, ExpectedOutcome, Quantity};
@@ -17,7 +17,7 @@ const TABLE: usize = 10;
 
 /// A record to judge.
 #[derive(Clone, Copy, Debug)]
-pub struct Case<'a> {
+pub(crate) struct Case<'a> {
     /// Record of the main run.
     pub main: &'a Stored,
     /// Record of the second look, where there was one.
@@ -26,7 +26,7 @@ pub struct Case<'a> {
 
 /// The result of a verification.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Judgement {
+pub(crate) struct Judgement {
     /// One verdict for each comparison, case by case.
     pub verdicts: Vec<Verdict>,
     /// Number of the case that each verdict is of.
@@ -37,7 +37,7 @@ pub struct Judgement {
 
 /// A case that needs a second look.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LookAgain {
+pub(crate) struct LookAgain {
     /// Index of the case.
     pub case: usize,
     /// Subjects to measure again.
@@ -46,7 +46,7 @@ pub struct LookAgain {
 
 /// A subject that can be measured again.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Measured {
+pub(crate) enum Measured {
     /// A quantity of a scene.
     Quantity(Quantity),
     /// A sampler, by name.
@@ -54,7 +54,8 @@ pub enum Measured {
 }
 
 /// Judges one record by itself, with one look.
-pub fn judge_alone(stored: &Stored) -> Vec<Verdict> {
+#[cfg(test)]
+pub(crate) fn judge_alone(stored: &Stored) -> Vec<Verdict> {
     judge(&[Case { main: stored, retest: None }], Looks::ALONE).verdicts
 }
 
@@ -67,7 +68,7 @@ struct TrialOf {
 }
 
 /// Judges every comparison of every record as one family of tests.
-pub fn judge(cases: &[Case], looks: Looks) -> Judgement {
+pub(crate) fn judge(cases: &[Case], looks: Looks) -> Judgement {
     let (mut places, mut findings) = (Vec::new(), Vec::new());
     for (case, Case { main, .. }) in cases.iter().enumerate() {
         for Trial { subject, claim, finding } in trials(main) {

@@ -4,7 +4,7 @@ use super::verdict::{Outcome, Verdict};
 
 /// One `testsuite` an experiment, one `testcase` a verdict; a failed claim is a `failure`, one that
 /// could not be judged an `error`.
-pub fn to_junit(verdicts: &[Verdict]) -> String {
+pub(crate) fn to_junit(verdicts: &[Verdict]) -> String {
     let mut experiments: Vec<&str> = verdicts.iter().map(|v| v.experiment.as_str()).collect();
     experiments.dedup();
     let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n");

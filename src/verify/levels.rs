@@ -20,31 +20,31 @@
 //! or where a test sums over many measurements, there is one look, at `AT_ONCE`.
 
 /// The probability of any false failure in one whole verification is at most this.
-pub const FAMILY_LEVEL: f64 = 1e-6;
+pub(crate) const FAMILY_LEVEL: f64 = 1e-6;
 
 /// Family-wise level below which a test fails without a second look.
-pub const AT_ONCE: f64 = 0.5 * FAMILY_LEVEL;
+pub(crate) const AT_ONCE: f64 = 0.5 * FAMILY_LEVEL;
 
 /// Family-wise level below which a test is looked at again.
-pub const FIRST_LOOK: f64 = 1e-3;
+pub(crate) const FIRST_LOOK: f64 = 1e-3;
 
 /// Family-wise level of the second looks.
-pub const SECOND_LOOK: f64 = 5e-4;
+pub(crate) const SECOND_LOOK: f64 = 5e-4;
 
 /// Passes of a second look over those of the first.
-pub const RETEST_FACTOR: u64 = 4;
+pub(crate) const RETEST_FACTOR: u64 = 4;
 
 /// Largest stated error, relative to the sampling error, of a reference that both looks may share: with
 /// e = 0.02 s a first look at 6 s moves the second, whose error is s/2, by 0.0048 of its standard errors
 /// towards failing, which raises its level by less than 2 %.
-pub const SHARED_ERROR: f64 = 0.02;
+pub(crate) const SHARED_ERROR: f64 = 0.02;
 
 /// The probability with which a difference of size `detectable` is found.
-pub const POWER: f64 = 0.99;
+pub(crate) const POWER: f64 = 0.99;
 
 /// How many looks a family of tests has.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Looks {
+pub(crate) enum Looks {
     /// One look, at this family-wise level.
     One {
         /// The probability of any false failure.
@@ -56,10 +56,10 @@ pub enum Looks {
 
 impl Looks {
     /// A single record, without second looks.
-    pub const ALONE: Looks = Looks::One { level: FAMILY_LEVEL };
+    pub(crate) const ALONE: Looks = Looks::One { level: FAMILY_LEVEL };
 
     /// The family-wise level at which a test fails at once.
-    pub fn at_once(self) -> f64 {
+    pub(crate) fn at_once(self) -> f64 {
         match self {
             Looks::One { level } => level,
             Looks::Two => AT_ONCE,
@@ -67,7 +67,7 @@ impl Looks {
     }
 
     /// The family-wise level that a test's power rests on.
-    pub fn first(self, one_look: bool) -> f64 {
+    pub(crate) fn first(self, one_look: bool) -> f64 {
         match self {
             Looks::Two if !one_look => FIRST_LOOK,
             looks => looks.at_once(),

@@ -39,7 +39,7 @@ pub(super) struct QuantityMean<'a> {
 }
 
 impl<'a> QuantityMean<'a> {
-    pub fn of(stored: &'a Stored, quantity: &Quantity) -> Option<QuantityMean<'a>> {
+    pub(super) fn of(stored: &'a Stored, quantity: &Quantity) -> Option<QuantityMean<'a>> {
         let (run, batches) = (stored.run(quantity)?, stored.batches(quantity)?);
         let all = total(batches.iter().copied())?;
         let mean = Estimate::of_batches(&batches);
@@ -47,7 +47,7 @@ impl<'a> QuantityMean<'a> {
     }
 
     /// Why every statement about it is void.
-    pub fn objection(&self) -> Option<String> {
+    pub(super) fn objection(&self) -> Option<String> {
         let name = &self.run.estimator;
         let anomaly =
             self.run.anomalies.iter().find(|(kind, n)| **n > 0 && !STATED.contains(&kind.as_str()));
@@ -74,7 +74,7 @@ impl<'a> QuantityMean<'a> {
     }
 
     /// Why it is not nearly normal.
-    pub fn tail_objection(&self) -> Option<String> {
+    pub(super) fn tail_objection(&self) -> Option<String> {
         let name = &self.run.estimator;
         if self.batches.len() < MIN_BATCHES {
             let n = self.batches.len();
@@ -108,10 +108,10 @@ pub(super) struct Asked {
 
 impl Asked {
     /// A claim that two means are equal.
-    pub const EQUAL: Asked = Asked { agreement: true, difference: false, each: false };
+    pub(super) const EQUAL: Asked = Asked { agreement: true, difference: false, each: false };
 
     /// What a claim asks.
-    pub fn by(claim: &Claim) -> Asked {
+    pub(super) fn by(claim: &Claim) -> Asked {
         Asked {
             agreement: matches!(claim.kind, ClaimKind::Agree | ClaimKind::Faster | ClaimKind::NotSlower),
             difference: claim.expects == ExpectedOutcome::Differs,

@@ -2,32 +2,32 @@
 //! is a function of records and levels.
 
 /// Two records of one experiment: what changed.
-pub mod difference;
+pub(crate) mod difference;
 /// Images rendered elsewhere against a record.
-pub mod foreign;
+pub(crate) mod foreign;
 /// From comparisons to verdicts.
-pub mod judge;
+pub(crate) mod judge;
 /// The error rates of a whole verification.
-pub mod levels;
+pub(crate) mod levels;
 
 /// Verdicts for continuous integration.
-pub mod junit;
+pub(crate) mod junit;
 /// Verdicts: the outcome of every test, as it is shown.
-pub mod verdict;
+pub(crate) mod verdict;
 
 /// Efficiencies of all pairs of estimators.
-pub mod comparisons;
+pub(crate) mod comparisons;
 /// Claims of efficiency.
-pub mod efficiency;
+pub(crate) mod efficiency;
 /// Errors of models against transport.
-pub mod model_errors;
+pub(crate) mod model_errors;
 /// Efficiencies by CPU time in two records.
-pub mod timing_ratios;
+pub(crate) mod timing_ratios;
 /// Cost of counted work.
 pub mod weights;
 
 /// Evidence that adds up over nights.
-pub mod nights;
+pub(crate) mod nights;
 
 /// Evidence of one test by itself.
 mod evidence;

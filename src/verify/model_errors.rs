@@ -8,11 +8,11 @@ use crate::stats::hypothesis::Estimate;
 use crate::stats::tails::critical_value;
 
 /// Confidence of the intervals.
-pub const CONFIDENCE: f64 = 0.95;
+pub(crate) const CONFIDENCE: f64 = 0.95;
 
 /// One model's mean against the truth's.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ModelError {
+pub(crate) struct ModelError {
     /// Cell label.
     pub cell: String,
     /// Band name.
@@ -37,7 +37,7 @@ pub struct ModelError {
 
 impl ModelError {
     /// The interval of `relative` at [`CONFIDENCE`].
-    pub fn interval(&self) -> (f64, f64) {
+    pub(crate) fn interval(&self) -> (f64, f64) {
         let reach = critical_value(1.0 - CONFIDENCE, self.relative.dof) * self.relative.std_error;
         (self.relative.value - reach, self.relative.value + reach)
     }
@@ -46,7 +46,7 @@ impl ModelError {
 /// All rows of a record: each run that estimates a model, against the cell's first that does not;
 /// observables of images as a whole, of probes and of fluxes, in the total and in the classes that both
 /// scored.
-pub fn model_errors(stored: &Stored) -> Vec<ModelError> {
+pub(crate) fn model_errors(stored: &Stored) -> Vec<ModelError> {
     let mut rows = Vec::new();
     for cell in &stored.record.cells {
         let Some(truth) = cell.runs.iter().find(|run| run.model.is_none()) else { continue };
@@ -129,7 +129,7 @@ const COLUMNS: [&str; 14] = [
 ];
 
 /// The rows as CSV text; `ci_low` and `ci_high` are those of (value - expected) / expected.
-pub fn to_csv(rows: &[ModelError]) -> String {
+pub(crate) fn to_csv(rows: &[ModelError]) -> String {
     let fields = |row: &ModelError| {
         let (low, high) = row.interval();
         vec![

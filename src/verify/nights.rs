@@ -18,12 +18,12 @@ use crate::math::ln;
 use crate::stats::evidence::calibrated;
 
 /// The probability of any false alarm of the accumulated evidence, over all tests and nights.
-pub const LIFE_LEVEL: f64 = 1e-3;
+pub(crate) const LIFE_LEVEL: f64 = 1e-3;
 
 /// The state passed from night to night: a small JSON file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Nights {
+pub(crate) struct Nights {
     /// Names of the fresh streams that were counted.
     pub tokens: Vec<String>,
     /// By experiment, claim and quantity.
@@ -33,7 +33,7 @@ pub struct Nights {
 /// The evidence of the nights against one statement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Accumulated {
+pub(crate) struct Accumulated {
     /// Fingerprint of what fixes the numbers: another one begins again.
     pub code: String,
     /// Nights counted.
@@ -47,7 +47,12 @@ pub struct Accumulated {
 impl Nights {
     /// Adds a night of verdicts obtained on the streams `token`; `code` gives of an experiment what
     /// fixes its numbers. False where that night had been counted before: nothing is added then.
-    pub fn add(&mut self, token: &str, verdicts: &[Verdict], code: impl Fn(&str) -> String) -> bool {
+    pub(crate) fn add(
+        &mut self,
+        token: &str,
+        verdicts: &[Verdict],
+        code: impl Fn(&str) -> String,
+    ) -> bool {
         if self.tokens.iter().any(|t| t == token) {
             return false;
         }
@@ -69,7 +74,7 @@ impl Nights {
     }
 
     /// As the state file holds it.
-    pub fn to_json(&self) -> String {
+    pub(crate) fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_else(|e| panic!("a state without JSON: {e}"))
     }
 
@@ -77,17 +82,17 @@ impl Nights {
     ///
     /// # Errors
     /// A text that is not such a state.
-    pub fn from_json(text: &str) -> Result<Nights, String> {
+    pub(crate) fn from_json(text: &str) -> Result<Nights, String> {
         serde_json::from_str(text).map_err(|error| error.to_string())
     }
 
     /// The logarithm that raises an alarm.
-    pub fn threshold(&self) -> f64 {
+    pub(crate) fn threshold(&self) -> f64 {
         ln(self.tests.len().max(1) as f64 / LIFE_LEVEL)
     }
 
     /// The tests whose evidence has reached the threshold, with it.
-    pub fn alarms(&self) -> Vec<(&str, &Accumulated)> {
+    pub(crate) fn alarms(&self) -> Vec<(&str, &Accumulated)> {
         let threshold = self.threshold();
         let over = self.tests.iter().filter(|(_, evidence)| evidence.peak >= threshold);
         over.map(|(name, evidence)| (name.as_str(), evidence)).collect()

@@ -14,14 +14,14 @@ use crate::stats::multiplicity::holm;
 use crate::stats::tails::normal_two_sided;
 
 /// The probability that any ratio of a comparison is reported as different although none is.
-pub const LEVEL: f64 = 1e-3;
+pub(crate) const LEVEL: f64 = 1e-3;
 
 /// Standard errors in half a 95 % interval.
 const HALF_WIDTH: f64 = 1.96;
 
 /// One pair of estimators in both records.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TimingRatio {
+pub(crate) struct TimingRatio {
     /// Row of the first record.
     pub before: EfficiencyRow,
     /// Row of the second record.
@@ -36,13 +36,13 @@ pub struct TimingRatio {
 
 impl TimingRatio {
     /// Whether the two ratios are compatible.
-    pub fn is_compatible(&self) -> bool {
+    pub(crate) fn is_compatible(&self) -> bool {
         self.adjusted_p >= LEVEL
     }
 }
 
 /// Every efficiency by CPU time that both records quote.
-pub fn timing_ratios(before: &Stored, after: &Stored) -> Vec<TimingRatio> {
+pub(crate) fn timing_ratios(before: &Stored, after: &Stored) -> Vec<TimingRatio> {
     let name = |row: &EfficiencyRow| {
         [&row.cell, &row.band, &row.class, &row.metric, &row.baseline, &row.candidate].map(String::clone)
     };

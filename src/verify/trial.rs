@@ -34,7 +34,7 @@ pub(super) struct Trial {
 
 impl Trial {
     /// Of a claim of a record. Controls have to be seen at the first look.
-    pub fn new(record: &Record, claim: usize, subject: Subject, finding: Finding) -> Trial {
+    pub(super) fn new(record: &Record, claim: usize, subject: Subject, finding: Finding) -> Trial {
         let one_look = finding.one_look || record.statements[claim].expects != ExpectedOutcome::Pass;
         Trial { subject, claim, finding: Finding { one_look, ..finding } }
     }

@@ -9,7 +9,7 @@ use crate::results::record::CostMeasure;
 
 /// The verdict on one comparison. Only a pass is green.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Outcome {
+pub(crate) enum Outcome {
     /// The claim holds, as far as the test can see.
     Pass,
     /// The claim does not hold.
@@ -45,7 +45,7 @@ impl Serialize for Outcome {
 
 /// The tests that verdicts rest on.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum TestKind {
+pub(crate) enum TestKind {
     /// Student's t of a mean against a value.
     T,
     /// Welch's t of two means.
@@ -96,7 +96,7 @@ pub enum TestKind {
 
 impl TestKind {
     /// Whether a claim on a sampler makes it.
-    pub fn is_of_sampler(&self) -> bool {
+    pub(crate) fn is_of_sampler(&self) -> bool {
         use TestKind::{
             Chi2Coarse, Chi2Fine, Contrast, Delta, Null, Outside, OwnDensity, Serial, TotalMass,
         };
@@ -154,7 +154,7 @@ impl Serialize for TestKind {
 
 /// One comparison's verdict; a row of `verdicts.csv`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Verdict {
+pub(crate) struct Verdict {
     /// Experiment name.
     pub experiment: String,
     /// Cell label; `a vs b` across two.
@@ -202,18 +202,18 @@ pub struct Verdict {
 }
 
 /// The verdicts as CSV text.
-pub fn to_csv(verdicts: &[Verdict]) -> String {
+pub(crate) fn to_csv(verdicts: &[Verdict]) -> String {
     csv_text::table(verdicts)
 }
 
 /// The verdicts as JSON: an array of objects with the columns as keys; a number that does not apply is
 /// null.
-pub fn to_json(verdicts: &[Verdict]) -> String {
+pub(crate) fn to_json(verdicts: &[Verdict]) -> String {
     serde_json::to_string(verdicts).unwrap_or_else(|e| panic!("a verdict without JSON: {e}"))
 }
 
 /// 0 all green, 1 a claim failed, 3 none failed but some could not be judged.
-pub fn exit_code(verdicts: &[Verdict]) -> u8 {
+pub(crate) fn exit_code(verdicts: &[Verdict]) -> u8 {
     let any = |outcome: fn(&Outcome) -> bool| verdicts.iter().any(|v| outcome(&v.outcome));
     if any(|o| *o == Outcome::Fail) {
         1
@@ -231,12 +231,12 @@ pub(super) fn known(x: f64) -> Option<f64> {
 
 impl Verdict {
     /// Whether it counts as evidence for its claim.
-    pub fn is_green(&self) -> bool {
+    pub(crate) fn is_green(&self) -> bool {
         self.outcome == Outcome::Pass
     }
 
     /// What the test is called; empty for none.
-    pub fn test_name(&self) -> String {
+    pub(crate) fn test_name(&self) -> String {
         self.test.as_ref().map_or_else(String::new, TestKind::to_string)
     }
 

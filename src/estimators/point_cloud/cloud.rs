@@ -37,7 +37,12 @@ struct Incidence {
 
 impl Cloud {
     /// Draws `count` points on the surface of the body.
-    pub fn new(bssrdf: &BssrdfScene, sampler: &BodySampler, count: usize, key: &PassKey) -> Cloud {
+    pub(super) fn new(
+        bssrdf: &BssrdfScene,
+        sampler: &BodySampler,
+        count: usize,
+        key: &PassKey,
+    ) -> Cloud {
         let scene = &*bssrdf.scene;
         let point = |index: u32| {
             let mut stream = key.stream(u64::from(index), Purpose::Cloud);
@@ -112,25 +117,25 @@ impl Cloud {
     }
 
     /// Number of surface points M.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.tree.len()
     }
 
     /// Flux that enters at a place of the tree, W.
     #[inline]
-    pub fn flux(&self, place: usize, band: usize) -> f64 {
+    pub(super) fn flux(&self, place: usize, band: usize) -> f64 {
         self.flux[place * self.bands + band]
     }
 
     /// Index of the light that it comes from.
     #[inline]
-    pub fn light(&self, place: usize) -> usize {
+    pub(super) fn light(&self, place: usize) -> usize {
         self.light.get(place).map_or(0, |&light| usize::from(light))
     }
 
     /// The point, and the refracted direction of its light under this index.
     #[inline]
-    pub fn entry(&self, place: usize, eta: f64) -> Entry {
+    pub(super) fn entry(&self, place: usize, eta: f64) -> Entry {
         let point = self.tree.point(place);
         match self.directions.get(place) {
             None => Entry { point, normal: DVec3::ZERO, dir: DVec3::ZERO },
@@ -144,7 +149,7 @@ impl Cloud {
     }
 
     /// The most memory that `count` points take, while they are put in order too, bytes.
-    pub fn bytes(bssrdf: &BssrdfScene, count: usize) -> usize {
+    pub(super) fn bytes(bssrdf: &BssrdfScene, count: usize) -> usize {
         // A code, an index and a position; then coordinates, places and about half a node (40 bytes) a
         // point.
         let (sorted, kept) = (16 + 24, 24 + 4 + 20);
@@ -155,7 +160,7 @@ impl Cloud {
 
     /// Memory behind it, bytes.
     #[cfg(test)]
-    pub fn heap_bytes(&self) -> usize {
+    pub(crate) fn heap_bytes(&self) -> usize {
         self.tree.heap_bytes()
             + size_of_val(&*self.flux)
             + size_of_val(&*self.light)

@@ -71,7 +71,7 @@ pub(super) struct End<'a> {
 impl<'a> End<'a> {
     /// At an exit, towards `w_l`, which lies outside; for a smooth boundary `w_l` is the refracted
     /// direction. `keep` states which of BSDF and light sampling take part.
-    pub fn new<R: Rivals, B: WalkBands>(
+    pub(super) fn new<R: Rivals, B: WalkBands>(
         walk: &CameraWalk<'_, R, B>,
         guide: &'a Guide,
         exit: &WalkExit,
@@ -116,7 +116,7 @@ impl<'a> End<'a> {
     }
 
     /// Whether a sample with this end scores anything, and a guided technique might have drawn it.
-    pub fn counts(&self) -> bool {
+    pub(super) fn counts(&self) -> bool {
         !(self.value == 0.0 || self.by_guide == 0.0)
     }
 }
@@ -139,7 +139,7 @@ pub(super) struct Middle {
 
 impl Middle {
     /// With x_k at `hit`; `None` where points fall together or x_k is met from behind.
-    pub fn new(x_i: DVec3, x_j: DVec3, hit: &Hit) -> Option<Middle> {
+    pub(super) fn new(x_i: DVec3, x_j: DVec3, hit: &Hit) -> Option<Middle> {
         let (ij, jk) = (x_j - x_i, hit.point - x_j);
         let (d_ij, d_jk) = (ij.length(), jk.length());
         let to_j = Leg { dir: ij / d_ij, length: d_ij };

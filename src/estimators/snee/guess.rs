@@ -30,7 +30,11 @@ pub(super) struct Guess {
 
 impl Guess {
     /// For a point in the medium and a direction towards the light; `None` where no boundary is met.
-    pub fn new<R, B>(walk: &mut CameraWalk<'_, R, B>, point: DVec3, toward: DVec3) -> Option<Guess> {
+    pub(super) fn new<R, B>(
+        walk: &mut CameraWalk<'_, R, B>,
+        point: DVec3,
+        toward: DVec3,
+    ) -> Option<Guess> {
         let CameraWalk { scene, boundary, scores, .. } = walk;
         let mut shoot = |dir| {
             scores.count(Cost::Rays);
@@ -49,7 +53,7 @@ impl Guess {
 
     /// The direction from the point, against the light that is refracted at the guessed normal; that of
     /// the guess where the normal faces away from the light.
-    pub fn refracted(&self, boundary: &Boundary, toward: DVec3) -> DVec3 {
+    pub(super) fn refracted(&self, boundary: &Boundary, toward: DVec3) -> DVec3 {
         entering(boundary, self.normal, toward).unwrap_or(self.dir)
     }
 }

@@ -39,7 +39,7 @@ const COMPACT: f64 = 0.3;
 impl Guide {
     /// The guides among lights whose concentration reaches `least`. A map is split: the part of it that
     /// is far brighter than its mean, and near its brightest texel, is the guide; the rest has none.
-    pub fn all(lights: &[Light], band: usize, least: f64) -> Vec<Guide> {
+    pub(super) fn all(lights: &[Light], band: usize, least: f64) -> Vec<Guide> {
         let mut guides: Vec<Guide> = lights
             .iter()
             .enumerate()
@@ -78,7 +78,7 @@ impl Guide {
     }
 
     /// A direction towards the guide's part of its light.
-    pub fn sample(&self, light: &Light, band: usize, u: [f64; 2]) -> LightSample {
+    pub(super) fn sample(&self, light: &Light, band: usize, u: [f64; 2]) -> LightSample {
         match (&self.bright, &light.emission) {
             (Some(bright), Emission::Map(map)) => {
                 let (wi, radiance, pdf) = bright.sample(map, u);
@@ -90,7 +90,7 @@ impl Guide {
 
     /// Density of [`Self::sample`] per solid angle, the choice of the guide included; for parallel light
     /// the probability of the choice.
-    pub fn density(&self, light: &Light, band: usize, wi: DVec3) -> f64 {
+    pub(super) fn density(&self, light: &Light, band: usize, wi: DVec3) -> f64 {
         self.choice
             * match (&self.bright, &light.emission) {
                 (Some(bright), Emission::Map(map)) => bright.pdf(map, wi),

@@ -41,7 +41,7 @@ pub(super) struct ProbeMixture {
 
 impl ProbeMixture {
     /// At a vertex; lobes that its guess does not allow give their share to the uniform one.
-    pub fn new(shares: ProbeShares, guess: Option<&Guess>, mfp: f64) -> ProbeMixture {
+    pub(super) fn new(shares: ProbeShares, guess: Option<&Guess>, mfp: f64) -> ProbeMixture {
         let plane = guess.filter(|_| shares.plane > 0.0).and_then(|guess| {
             let height = guess.distance * guess.dir.dot(guess.normal);
             (height > 0.0).then(|| PlaneLobe::new(guess.normal, height, mfp))
@@ -58,7 +58,7 @@ impl ProbeMixture {
     }
 
     /// A direction from the vertex.
-    pub fn sample(&self, [u, v]: [f64; 2]) -> DVec3 {
+    pub(super) fn sample(&self, [u, v]: [f64; 2]) -> DVec3 {
         let (is_guided, u) = choose(u, self.shares.guided);
         if let (true, Some(guided)) = (is_guided, &self.guided) {
             return guided.sample([u, v]);
@@ -71,7 +71,7 @@ impl ProbeMixture {
     }
 
     /// Density of [`Self::sample`] per solid angle.
-    pub fn pdf(&self, dir: DVec3) -> f64 {
+    pub(super) fn pdf(&self, dir: DVec3) -> f64 {
         self.shares.uniform * pdf_cap(WHOLE)
             + self.guided.as_ref().map_or(0.0, |lobe| self.shares.guided * lobe.pdf(dir))
             + self.plane.as_ref().map_or(0.0, |lobe| self.shares.plane * lobe.pdf(dir))

@@ -53,31 +53,31 @@ pub(super) struct Connections<'a> {
 }
 
 impl<'a> Connections<'a> {
-    pub fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
+    pub(super) fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
         let nowhere = WalkVertex { point: DVec3::NAN, arrival: DVec3::Z, walks: 1.0 };
         let held = [Held { vertex: nowhere, guess: None }; 3];
         Connections { setup, stream, held, count: 0, is_edge_alone: false, seen: None }
     }
 
     /// The walk has come to a new medium vertex.
-    pub fn arrive(&mut self, vertex: WalkVertex) {
+    pub(super) fn arrive(&mut self, vertex: WalkVertex) {
         self.held[Slot::Previous as usize] = self.held[Slot::Latest as usize];
         self.hold(Slot::Latest, vertex);
         self.count += 1;
     }
 
     /// Puts a new vertex into a slot.
-    pub fn hold(&mut self, slot: Slot, vertex: WalkVertex) {
+    pub(super) fn hold(&mut self, slot: Slot, vertex: WalkVertex) {
         self.held[slot as usize] = Held { vertex, guess: None };
     }
 
     #[inline]
-    pub fn vertex(&self, slot: Slot) -> WalkVertex {
+    pub(super) fn vertex(&self, slot: Slot) -> WalkVertex {
         self.held[slot as usize].vertex
     }
 
     /// A guide by its probability; without a draw where there is one alone.
-    pub fn choose_guide(&mut self) -> Option<&'a Guide> {
+    pub(super) fn choose_guide(&mut self) -> Option<&'a Guide> {
         let guides = &self.setup.guides;
         match &guides[..] {
             [only] => Some(only),
@@ -90,7 +90,7 @@ impl<'a> Connections<'a> {
 
     /// Which of BSDF and light sampling take part at the end of a path with this many medium vertices
     /// since the boundary.
-    pub fn takes_part(&self, count: u32) -> [f64; 2] {
+    pub(super) fn takes_part(&self, count: u32) -> [f64; 2] {
         let strategies = &self.setup.options.strategies;
         let share = |takes_part: bool| if takes_part { 1.0 } else { 0.0 };
         if count >= 2 { [share(strategies.bsdf), share(strategies.light)] } else { [1.0, 1.0] }

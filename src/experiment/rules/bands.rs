@@ -9,7 +9,7 @@ use crate::experiment::schema::{BandsEntry, ExplicitBand};
 const NARROWEST_NM: f64 = 0.01;
 
 /// Ranges run upwards, names are unique.
-pub fn bands(at: At, bands: &BandsEntry) {
+pub(crate) fn bands(at: At, bands: &BandsEntry) {
     match bands {
         BandsEntry::Rgb {} => {}
         BandsEntry::Spectral { from_nm, to_nm, count } => {

@@ -10,7 +10,7 @@ use crate::experiment::suggest;
 use crate::experiment::sweep_point::SweepAxis;
 
 /// The names that claims may use.
-pub struct Known<'a> {
+pub(crate) struct Known<'a> {
     /// What the experiment is made of.
     pub parts: ExperimentParts,
     /// Names that claims may refer to as estimators.
@@ -26,7 +26,7 @@ pub struct Known<'a> {
 }
 
 /// The rules of one claim.
-pub fn claim(at: At, claim: &ClaimEntry, known: &Known) {
+pub(crate) fn claim(at: At, claim: &ClaimEntry, known: &Known) {
     if let Some(words) = &claim.sampler {
         return samplers(at.to("sampler"), words, known);
     }

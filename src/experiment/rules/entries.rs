@@ -6,7 +6,7 @@ use crate::experiment::suggest;
 use crate::experiment::validate::grammar::Grammar;
 
 /// The name of an experiment is that of its folder.
-pub fn experiment_name(at: At, name: &str) {
+pub(crate) fn experiment_name(at: At, name: &str) {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
     let begins_well = name.starts_with(|c: char| c.is_ascii_alphanumeric());
     if !name.is_empty() && !(begins_well && name.chars().all(is_plain)) {
@@ -19,7 +19,7 @@ pub fn experiment_name(at: At, name: &str) {
 
 /// The names of a list's entries are unique and of printable signs; `what` they are, in words:
 /// `estimators`.
-pub fn names(at: At, entries: &Node, what: &str) {
+pub(crate) fn names(at: At, entries: &Node, what: &str) {
     let mut seen = Vec::new();
     for (i, entry) in entries.items().iter().enumerate() {
         let Some(name) = entry.get("name").and_then(Node::as_str) else { continue };
@@ -37,17 +37,17 @@ pub fn names(at: At, entries: &Node, what: &str) {
 }
 
 /// Keys of a scene with estimators, which are all needed where one of them is there.
-pub const SCENE_KEYS: [&str; 6] = ["bands", "object", "sensor", "light", "estimator", "budget"];
+pub(crate) const SCENE_KEYS: [&str; 6] = ["bands", "object", "sensor", "light", "estimator", "budget"];
 
 /// Keys of samplers, likewise.
-pub const SAMPLER_KEYS: [&str; 2] = ["samples", "sampler"];
+pub(crate) const SAMPLER_KEYS: [&str; 2] = ["samples", "sampler"];
 
 /// Keys that describe more of a scene.
 const MORE_OF_SCENES: [&str; 3] = ["sweep", "pair", "picture"];
 
 /// What an experiment is made of.
 #[derive(Clone, Copy, Debug)]
-pub struct ExperimentParts {
+pub(crate) struct ExperimentParts {
     /// A scene with estimators.
     pub scene: bool,
     /// Whether the experiment has samplers.
@@ -56,14 +56,14 @@ pub struct ExperimentParts {
 
 impl ExperimentParts {
     /// The keys that must be there, except those that a sweep may supply.
-    pub fn required(self) -> Vec<&'static str> {
+    pub(crate) fn required(self) -> Vec<&'static str> {
         let of_scene = SCENE_KEYS.into_iter().filter(|key| self.scene && !CELL_KEYS.contains(key));
         of_scene.chain(SAMPLER_KEYS.into_iter().filter(|_| self.samplers)).collect()
     }
 }
 
 /// What the experiment `root` is made of: of something, and keys that describe more of a scene need one.
-pub fn parts(at: At, root: &Node) -> ExperimentParts {
+pub(crate) fn parts(at: At, root: &Node) -> ExperimentParts {
     let has = |keys: &[&str]| keys.iter().any(|key| root.get(key).is_some());
     let parts = ExperimentParts { scene: has(&SCENE_KEYS), samplers: has(&SAMPLER_KEYS) };
     let quoted = [suggest::quoted(&SCENE_KEYS), suggest::quoted(&SAMPLER_KEYS)];
@@ -84,10 +84,10 @@ pub fn parts(at: At, root: &Node) -> ExperimentParts {
 }
 
 /// The first words of keys that cells may differ in.
-pub const CELL_KEYS: [&str; 3] = ["object", "sensor", "light"];
+pub(crate) const CELL_KEYS: [&str; 3] = ["object", "sensor", "light"];
 
 /// The keys of `pair.over` lead somewhere in object, sensor or light.
-pub fn pair(at: At, over: &Node, grammar: &Grammar) {
+pub(crate) fn pair(at: At, over: &Node, grammar: &Grammar) {
     for (i, key) in over.items().iter().enumerate() {
         let Some(text) = key.as_str() else { continue };
         let words: Vec<&str> = text.split('.').collect();

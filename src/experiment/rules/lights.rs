@@ -8,7 +8,7 @@ use super::{At, nonzero, spectrum};
 use crate::experiment::schema::{Environment, LightEntry, SolidAngle, Spectrum};
 
 /// The rules of all lights in so many bands.
-pub fn lights(at: At, bands: usize) {
+pub(crate) fn lights(at: At, bands: usize) {
     let mut names = BTreeSet::new();
     for i in 0..at.count() {
         let Some(light) = at.typed::<LightEntry>(&i.to_string()) else { continue };

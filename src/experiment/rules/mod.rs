@@ -16,23 +16,23 @@ mod object;
 mod pictures;
 mod sensor;
 
-pub use bands::bands;
-pub use claims::{Known, claim};
-pub use entries::{
+pub(super) use bands::bands;
+pub(super) use claims::{Known, claim};
+pub(super) use entries::{
     CELL_KEYS, ExperimentParts, SAMPLER_KEYS, SCENE_KEYS, experiment_name, names, pair, parts,
 };
-pub use lights::lights;
-pub use object::object;
-pub use pictures::{has_pixels, picture};
-pub use sensor::sensor;
+pub(super) use lights::lights;
+pub(super) use object::object;
+pub(super) use pictures::{has_pixels, picture};
+pub(super) use sensor::sensor;
 
 /// Where the rules put their findings; a finding that is already there is not repeated.
 #[derive(Default)]
-pub struct Findings(RefCell<Vec<Diagnostic>>);
+pub(crate) struct Findings(RefCell<Vec<Diagnostic>>);
 
 impl Findings {
     /// Adds a finding unless it is already there.
-    pub fn add(&self, finding: Diagnostic) {
+    pub(crate) fn add(&self, finding: Diagnostic) {
         let mut findings = self.0.borrow_mut();
         if !findings.contains(&finding) {
             findings.push(finding);
@@ -40,12 +40,12 @@ impl Findings {
     }
 
     /// Adds what is wrong at `place`.
-    pub fn at(&self, place: &Place, rule: impl Into<String>, help: Option<String>) {
+    pub(crate) fn at(&self, place: &Place, rule: impl Into<String>, help: Option<String>) {
         self.add(Diagnostic { rule: rule.into(), place: Some(place.clone()), help });
     }
 
     /// Everything found, in the order of the text.
-    pub fn into_sorted(self) -> Vec<Diagnostic> {
+    pub(crate) fn into_sorted(self) -> Vec<Diagnostic> {
         let mut findings = self.0.into_inner();
         findings.sort_by_key(|f| f.place.as_ref().map(|p| (p.name.to_string(), p.span.start)));
         findings
@@ -54,7 +54,7 @@ impl Findings {
 
 /// A node under the eye of a rule.
 #[derive(Clone, Copy)]
-pub struct At<'a> {
+pub(super) struct At<'a> {
     node: &'a Node,
     findings: &'a Findings,
     /// Whether findings are about the key rather than the value.
@@ -63,22 +63,22 @@ pub struct At<'a> {
 
 impl<'a> At<'a> {
     /// Looks at `node` and reports to `findings`.
-    pub fn new(node: &'a Node, findings: &'a Findings) -> At<'a> {
+    pub(super) fn new(node: &'a Node, findings: &'a Findings) -> At<'a> {
         At { node, findings, is_key: false }
     }
 
     /// The entry or element `word`; the node itself where there is none.
-    pub fn to(self, word: &str) -> At<'a> {
+    pub(super) fn to(self, word: &str) -> At<'a> {
         At { node: self.node.at(&[word]).unwrap_or(self.node), ..self }
     }
 
     /// Whether there is an entry `word`.
-    pub fn has(self, word: &str) -> bool {
+    pub(super) fn has(self, word: &str) -> bool {
         self.node.at(&[word]).is_some()
     }
 
     /// The key that holds it.
-    pub fn key(self) -> At<'a> {
+    pub(super) fn key(self) -> At<'a> {
         At { is_key: true, ..self }
     }
 
@@ -87,27 +87,27 @@ impl<'a> At<'a> {
     }
 
     /// The element `index` of an array.
-    pub fn item(self, index: usize) -> At<'a> {
+    pub(super) fn item(self, index: usize) -> At<'a> {
         self.to(&index.to_string())
     }
 
     /// The entry `word` as its type; none where it is missing or the walk has refused it.
-    pub fn typed<T: DeserializeOwned>(self, word: &str) -> Option<T> {
+    pub(super) fn typed<T: DeserializeOwned>(self, word: &str) -> Option<T> {
         serde_json::from_value(self.node.at(&[word])?.to_json()).ok()
     }
 
     /// The number of elements.
-    pub fn count(self) -> usize {
+    pub(super) fn count(self) -> usize {
         self.node.items().len()
     }
 
     /// What is wrong here.
-    pub fn report(self, rule: impl Into<String>) {
+    pub(super) fn report(self, rule: impl Into<String>) {
         self.findings.at(self.place(), rule, None);
     }
 
     /// What is wrong here, and what to do.
-    pub fn report_help(self, rule: impl Into<String>, help: impl Into<String>) {
+    pub(super) fn report_help(self, rule: impl Into<String>, help: impl Into<String>) {
         self.findings.at(self.place(), rule, Some(help.into()));
     }
 }

@@ -10,7 +10,7 @@ use crate::experiment::suggest;
 use crate::optics::materials;
 
 /// The rules of the body in the bands.
-pub fn object(at: At, bands: &BandsEntry) {
+pub(crate) fn object(at: At, bands: &BandsEntry) {
     let list = bands.list();
     let body: Option<ShapeEntry> = at.typed("shape");
     if let Some(body) = &body {

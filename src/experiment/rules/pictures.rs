@@ -6,7 +6,7 @@ use crate::experiment::picture::{PictureEntry, SplitEntry};
 use crate::experiment::schema::SensorEntry;
 
 /// The rules of one picture.
-pub fn picture(at: At, picture: &PictureEntry, known: &Known) {
+pub(crate) fn picture(at: At, picture: &PictureEntry, known: &Known) {
     if let Some(words) = &picture.split {
         split(at.to("split"), words, known);
     }
@@ -43,7 +43,7 @@ fn split(at: At, words: &SplitEntry, known: &Known) {
 }
 
 /// Split pictures need pixels: `at` is the list of pictures, `sensor` that of a cell.
-pub fn has_pixels(at: At, sensor: &SensorEntry) {
+pub(crate) fn has_pixels(at: At, sensor: &SensorEntry) {
     let first = (0..at.count()).find(|i| at.item(*i).has("split"));
     let Some(first) = first else { return };
     if !sensor.has_pixels() {

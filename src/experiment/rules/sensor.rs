@@ -10,7 +10,7 @@ const PARALLEL: f64 = 1e-9;
 
 /// Directions are directions, `up` is not along the view, fluxes of planes are about +z, and
 /// caps of directions look at finite bodies, rings lie on planes and widen.
-pub fn sensor(at: At, sensor: &SensorEntry, shape: Option<&ShapeEntry>) {
+pub(crate) fn sensor(at: At, sensor: &SensorEntry, shape: Option<&ShapeEntry>) {
     let is_planar = matches!(shape, Some(ShapeEntry::HalfSpace {} | ShapeEntry::Slab { .. }));
     match sensor {
         SensorEntry::Orthographic { toward, up, acceptance_sr, .. } => {
@@ -59,7 +59,7 @@ pub fn sensor(at: At, sensor: &SensorEntry, shape: Option<&ShapeEntry>) {
 }
 
 /// A vector that is a direction has a length.
-pub fn direction(at: At, direction: &Direction) -> bool {
+pub(super) fn direction(at: At, direction: &Direction) -> bool {
     match direction {
         Direction::Vector(vector) => nonzero(at, *vector),
         Direction::Polar(_) => true,

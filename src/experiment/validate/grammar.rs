@@ -3,12 +3,12 @@
 use serde_json::Value as Json;
 
 /// A JSON Schema with its definitions.
-pub struct Grammar {
+pub(crate) struct Grammar {
     root: Json,
 }
 
 /// What a schema asks for.
-pub enum SchemaForm<'a> {
+pub(crate) enum SchemaForm<'a> {
     /// Any value at all.
     Anything,
     /// One of several alternatives of different types.
@@ -20,7 +20,7 @@ pub enum SchemaForm<'a> {
 }
 
 /// One variant of an enum.
-pub struct Variant<'a> {
+pub(crate) struct Variant<'a> {
     /// Its name in the file.
     pub name: &'a str,
     /// The schema of the value under the name; none for a bare string.
@@ -31,17 +31,17 @@ pub struct Variant<'a> {
 
 impl Grammar {
     /// The grammar of a complete schema.
-    pub fn new(root: Json) -> Grammar {
+    pub(crate) fn new(root: Json) -> Grammar {
         Grammar { root }
     }
 
     /// The schema of the whole file.
-    pub fn root(&self) -> &Json {
+    pub(crate) fn root(&self) -> &Json {
         &self.root
     }
 
     /// What `schema` asks for, references followed.
-    pub fn form<'a>(&'a self, schema: &'a Json) -> SchemaForm<'a> {
+    pub(crate) fn form<'a>(&'a self, schema: &'a Json) -> SchemaForm<'a> {
         let schema = self.resolve(schema);
         if let Some(alternatives) = schema.get("anyOf").and_then(Json::as_array) {
             let alternatives: Vec<&Json> = alternatives.iter().filter(|a| !is_null(a)).collect();
@@ -60,13 +60,13 @@ impl Grammar {
     }
 
     /// The schema at a path of keys and indices, if the grammar knows it.
-    pub fn at<'a>(&'a self, path: &[&str]) -> Option<&'a Json> {
+    pub(crate) fn at<'a>(&'a self, path: &[&str]) -> Option<&'a Json> {
         path.iter().try_fold(&self.root, |schema, word| self.step(schema, word))
     }
 
     /// Whether the last word of `path` names a variant of an enum, so that setting it as a whole
     /// replaces the variant that was there.
-    pub fn is_variant(&self, path: &[&str]) -> bool {
+    pub(crate) fn is_variant(&self, path: &[&str]) -> bool {
         let Some((last, parents)) = path.split_last() else { return false };
         match self.at(parents).map(|parent| self.form(parent)) {
             Some(SchemaForm::Variants(variants)) => variants.iter().any(|v| v.name == *last),
@@ -75,7 +75,7 @@ impl Grammar {
     }
 
     /// The names that may follow a path: keys of a table or variants of an enum.
-    pub fn names_at(&self, path: &[&str]) -> Vec<&str> {
+    pub(crate) fn names_at(&self, path: &[&str]) -> Vec<&str> {
         self.at(path).map(|schema| self.names(schema)).unwrap_or_default()
     }
 
@@ -111,18 +111,18 @@ impl Grammar {
 }
 
 /// The keys that a table's schema names.
-pub fn keys(schema: &Json) -> Vec<&str> {
+pub(crate) fn keys(schema: &Json) -> Vec<&str> {
     let properties = schema.get("properties").and_then(Json::as_object);
     properties.map(|p| p.keys().map(String::as_str).collect()).unwrap_or_default()
 }
 
 /// The first line of a schema's documentation.
-pub fn doc(schema: &Json) -> &str {
+pub(crate) fn doc(schema: &Json) -> &str {
     schema.get("description").and_then(Json::as_str).unwrap_or("").lines().next().unwrap_or("")
 }
 
 /// The strings of an array in a schema.
-pub fn strings(list: Option<&Json>) -> Vec<&str> {
+pub(crate) fn strings(list: Option<&Json>) -> Vec<&str> {
     let list = list.and_then(Json::as_array);
     list.map(|l| l.iter().filter_map(Json::as_str).collect()).unwrap_or_default()
 }

@@ -10,12 +10,12 @@ use super::suggest;
 use crate::error::{Diagnostic, Place};
 
 /// A JSON Schema as the grammar of a file.
-pub mod grammar;
+pub(crate) mod grammar;
 
 use grammar::{Grammar, SchemaForm, Variant};
 
 /// The findings of a walk.
-pub struct SchemaWalk<'a> {
+pub(crate) struct SchemaWalk<'a> {
     grammar: &'a Grammar,
     findings: Vec<Diagnostic>,
     /// Whether keys may be missing (where a sweep that is itself at fault might supply them).
@@ -24,17 +24,17 @@ pub struct SchemaWalk<'a> {
 
 impl<'a> SchemaWalk<'a> {
     /// A walk along `grammar`; `lenient` walks let required keys be missing.
-    pub fn new(grammar: &'a Grammar, lenient: bool) -> SchemaWalk<'a> {
+    pub(crate) fn new(grammar: &'a Grammar, lenient: bool) -> SchemaWalk<'a> {
         SchemaWalk { grammar, findings: Vec::new(), lenient }
     }
 
     /// Everything found so far.
-    pub fn into_findings(self) -> Vec<Diagnostic> {
+    pub(crate) fn into_findings(self) -> Vec<Diagnostic> {
         self.findings
     }
 
     /// Checks the whole document except its entries `except`; the keys `required` must be there.
-    pub fn root(&mut self, node: &Node, except: &[&str], required: &[&str]) {
+    pub(crate) fn root(&mut self, node: &Node, except: &[&str], required: &[&str]) {
         let mut schema = self.grammar.root().clone();
         if let Some(properties) = schema["properties"].as_object_mut() {
             except.iter().for_each(|key| properties[*key] = Json::Bool(true));
@@ -48,7 +48,7 @@ impl<'a> SchemaWalk<'a> {
     }
 
     /// Checks one top-level entry, which must be there.
-    pub fn entry(&mut self, root: &Node, key: &str) {
+    pub(crate) fn entry(&mut self, root: &Node, key: &str) {
         match (root.get(key), self.grammar.at(&[key])) {
             (Some(node), Some(schema)) => self.node(node, schema, key),
             _ if self.lenient => {}
@@ -57,7 +57,7 @@ impl<'a> SchemaWalk<'a> {
     }
 
     /// Checks `node`, found at the dotted `path`, along `schema`.
-    pub fn node(&mut self, node: &Node, schema: &Json, path: &str) {
+    pub(crate) fn node(&mut self, node: &Node, schema: &Json, path: &str) {
         match self.grammar.form(schema) {
             SchemaForm::Anything => self.finite(node),
             SchemaForm::Choice(alternatives) => {

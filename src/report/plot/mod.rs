@@ -7,15 +7,15 @@ use crate::results::csv_text;
 use crate::stats::hypothesis::{Estimate, critical_value};
 use scale::Scale;
 
-pub use scale::PlotAxis;
+pub(crate) use scale::PlotAxis;
 
 mod scale;
 /// Colours with their names.
-pub mod swatches;
+pub(crate) mod swatches;
 
 /// A plot of named series over two axes.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Plot {
+pub(crate) struct Plot {
     /// The horizontal axis.
     pub x: PlotAxis,
     /// The vertical axis.
@@ -30,7 +30,7 @@ pub struct Plot {
 
 /// Size of a plot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Size {
+pub(crate) enum Size {
     /// As wide as the page.
     #[default]
     Wide,
@@ -42,7 +42,7 @@ pub enum Size {
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Style {
+pub(crate) enum Style {
     /// A line through its points, with the band of their intervals.
     #[default]
     Line,
@@ -56,7 +56,7 @@ pub enum Style {
 
 /// A series of points.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Series {
+pub(crate) struct Series {
     /// Name in the legend.
     pub name: String,
     /// Its points, by x.
@@ -67,14 +67,14 @@ pub struct Series {
 
 impl Series {
     /// A named series.
-    pub fn new(name: impl Into<String>, style: Style, points: Vec<PlotPoint>) -> Series {
+    pub(crate) fn new(name: impl Into<String>, style: Style, points: Vec<PlotPoint>) -> Series {
         Series { name: name.into(), points, style }
     }
 }
 
 /// A point with an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlotPoint {
+pub(crate) struct PlotPoint {
     /// Position on the horizontal axis.
     pub x: f64,
     /// Position on the vertical axis.
@@ -89,18 +89,18 @@ pub struct PlotPoint {
 
 impl PlotPoint {
     /// A value with its interval.
-    pub fn new(x: f64, y: f64, [low, high]: [f64; 2]) -> PlotPoint {
+    pub(crate) fn new(x: f64, y: f64, [low, high]: [f64; 2]) -> PlotPoint {
         PlotPoint { x, y, low, high, is_firm: true }
     }
 
     /// An estimate with its 95 % interval.
-    pub fn of(x: f64, estimate: &Estimate) -> PlotPoint {
+    pub(crate) fn of(x: f64, estimate: &Estimate) -> PlotPoint {
         let reach = critical_value(0.05, estimate.dof) * estimate.std_error;
         PlotPoint::new(x, estimate.value, [estimate.value - reach, estimate.value + reach])
     }
 
     /// A value without an interval.
-    pub fn bare(x: f64, y: f64) -> PlotPoint {
+    pub(crate) fn bare(x: f64, y: f64) -> PlotPoint {
         PlotPoint::new(x, y, [y, y])
     }
 }
@@ -131,17 +131,18 @@ struct PlotFrame {
 
 impl Plot {
     /// A small plot of some series.
-    pub fn small(x: PlotAxis, y: PlotAxis, series: Vec<Series>) -> Plot {
+    pub(crate) fn small(x: PlotAxis, y: PlotAxis, series: Vec<Series>) -> Plot {
         Plot { x, y, series, size: Size::Small, ..Plot::default() }
     }
 
     /// The plot as an SVG document.
-    pub fn to_svg(&self) -> String {
+    #[cfg(test)]
+    pub(crate) fn to_svg(&self) -> String {
         panels(std::slice::from_ref(self))
     }
 
     /// Its numbers as CSV, a row per point.
-    pub fn to_csv(&self) -> String {
+    pub(crate) fn to_csv(&self) -> String {
         let header = ["series", &self.x.label, &self.y.label, "low", "high", "firm"];
         let x = |p: &PlotPoint| match self.x.names.get(p.x.round() as usize) {
             Some(name) => name.clone(),
@@ -285,7 +286,7 @@ impl Plot {
 }
 
 /// Plots below each other in one picture.
-pub fn panels(plots: &[Plot]) -> String {
+pub(crate) fn panels(plots: &[Plot]) -> String {
     let frames: Vec<PlotFrame> = plots.iter().map(Plot::frame).collect();
     let width = frames.iter().map(|f| f.width).fold(0.0, f64::max);
     let height: f64 = frames.iter().map(|f| f.height).sum();

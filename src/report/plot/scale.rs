@@ -5,7 +5,7 @@ use crate::report::number::significant;
 
 /// Label, scale and range of an axis.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct PlotAxis {
+pub(crate) struct PlotAxis {
     /// Label of the axis, with its unit.
     pub label: String,
     /// Whether it is logarithmic.
@@ -18,12 +18,12 @@ pub struct PlotAxis {
 
 impl PlotAxis {
     /// A linear axis over the range of the series.
-    pub fn linear(label: impl Into<String>) -> PlotAxis {
+    pub(crate) fn linear(label: impl Into<String>) -> PlotAxis {
         PlotAxis { label: label.into(), ..PlotAxis::default() }
     }
 
     /// A logarithmic axis over the range of the series.
-    pub fn log(label: impl Into<String>) -> PlotAxis {
+    pub(crate) fn log(label: impl Into<String>) -> PlotAxis {
         PlotAxis { is_log: true, ..PlotAxis::linear(label) }
     }
 }

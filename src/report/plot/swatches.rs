@@ -3,7 +3,7 @@
 use crate::report::markup::escape;
 
 /// Colours with their names.
-pub fn to_svg(colours: &[(String, [u8; 3])]) -> String {
+pub(crate) fn to_svg(colours: &[(String, [u8; 3])]) -> String {
     let height = 12.0 + 44.0 * colours.len() as f64;
     let row = |(place, (name, [r, g, b])): (usize, &(String, [u8; 3]))| {
         let top = 12.0 + 44.0 * place as f64;

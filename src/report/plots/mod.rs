@@ -6,7 +6,7 @@ use crate::results::pictures::Wanted;
 use crate::results::store::Stored;
 use crate::verify::comparisons::EfficiencyRow;
 
-pub use section::{Content, PlotFigure, Section};
+pub(crate) use section::Section;
 
 /// Error against time and rays.
 mod convergence;
@@ -24,7 +24,7 @@ mod section;
 mod spectra;
 
 /// Every section that this record has plots for, in the order of the page.
-pub fn sections(stored: &Stored, rows: &[EfficiencyRow], wanted: &[Wanted]) -> Vec<Section> {
+pub(crate) fn sections(stored: &Stored, rows: &[EfficiencyRow], wanted: &[Wanted]) -> Vec<Section> {
     let sections = [
         ratios::section(stored, rows),
         running::section(stored, wanted),

@@ -9,7 +9,7 @@ use crate::results::store::{RecordFolder, Stored};
 
 /// One picture of one or more plots below each other.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PlotFigure {
+pub(crate) struct PlotFigure {
     /// Stem of its files under `plots/`, unique on its page.
     pub name: String,
     /// Short description of the plot.
@@ -22,7 +22,7 @@ pub struct PlotFigure {
 
 /// Content of a section.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Content {
+pub(crate) enum Content {
     /// Plots in order.
     Plots(Vec<Plot>),
     /// Names with their 8-bit sRGB colours.
@@ -31,7 +31,7 @@ pub enum Content {
 
 /// Plots under one heading.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Section {
+pub(crate) struct Section {
     /// Heading of the section.
     pub heading: String,
     /// Text for all of them.
@@ -47,7 +47,7 @@ impl Section {
     ///
     /// # Errors
     /// I/O.
-    pub fn write(&self, folder: &RecordFolder) -> Result<()> {
+    pub(crate) fn write(&self, folder: &RecordFolder) -> Result<()> {
         for drawn in &self.drawn {
             folder.write_view(&drawn.path(), drawn.to_svg().as_bytes())?;
             let Content::Plots(plots) = &drawn.content else { continue };
@@ -61,7 +61,7 @@ impl Section {
     }
 
     /// The blocks of the page.
-    pub fn blocks(&self) -> Vec<PageBlock> {
+    pub(crate) fn blocks(&self) -> Vec<PageBlock> {
         let mut blocks = vec![PageBlock::Heading(2, self.heading.clone())];
         if !self.text.is_empty() {
             blocks.push(PageBlock::Text(self.text.clone()));

@@ -14,7 +14,7 @@ const SCRIPTS: [&str; 4] = [
 ];
 
 /// A viewer on the page.
-pub fn to_html(viewer: &ViewerBlock) -> String {
+pub(crate) fn to_html(viewer: &ViewerBlock) -> String {
     let figures: String = viewer.figures.iter().map(figure).collect();
     let figures = format!("<div class=\"figures\">\n{figures}</div>");
     let label = match viewer.cell.as_str() {
@@ -44,7 +44,7 @@ pub fn to_html(viewer: &ViewerBlock) -> String {
 }
 
 /// Style and script of a page with viewers, for its head and its end.
-pub fn parts(blocks: &[PageBlock]) -> (String, String) {
+pub(crate) fn parts(blocks: &[PageBlock]) -> (String, String) {
     if !blocks.iter().any(has_viewer) {
         return Default::default();
     }

@@ -19,7 +19,7 @@ mod html;
 /// False-colour maps.
 mod maps;
 
-pub use html::{parts, to_html};
+pub(crate) use html::{parts, to_html};
 
 /// Bytes of all viewers of a page together; a browser opens that much at once.
 const ROOM: usize = 24_000_000;

@@ -11,7 +11,7 @@ use super::quadrature::{Area, Mass, Quadrature, wrap};
 use crate::samplers::Coordinate;
 
 /// Least number of draws that a bin expects.
-pub const LEAST: f64 = 25.0;
+pub(crate) const LEAST: f64 = 25.0;
 /// Coarse bins of two dimensions, in all, before boxes are quartered and joined.
 const COARSE: f64 = 256.0;
 /// Coarse bins of one dimension.
@@ -23,7 +23,7 @@ const OFFSET: f64 = 0.381_966_011_250_105_15;
 
 /// Something of mass that is no box of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extra {
+pub(crate) enum Extra {
     /// A discrete outcome.
     Delta(usize),
     /// The sampler returned no sample.
@@ -32,7 +32,7 @@ pub enum Extra {
 
 /// Leaves, and the bins that they are joined to.
 #[derive(Clone, Debug)]
-pub struct Partition {
+pub(crate) struct Partition {
     maps: Vec<LeafMap>,
     /// Areas of the leaves.
     pub leaves: Vec<Area>,
@@ -78,7 +78,7 @@ enum Patch {
 
 impl Partition {
     /// Bins for `samples` draws. `extras` are discrete outcomes and a null with their masses.
-    pub fn new(quadrature: &mut Quadrature, samples: u64, extras: &[(Extra, f64)]) -> Partition {
+    pub(crate) fn new(quadrature: &mut Quadrature, samples: u64, extras: &[(Extra, f64)]) -> Partition {
         let n = samples as f64;
         let shares = shares(quadrature);
         let mut builder = PartitionBuilder { n, quadrature, leaves: Vec::new(), masses: Vec::new() };
@@ -134,7 +134,7 @@ impl Partition {
 
     /// The leaf of a point; none where it lies outside the chart or is no number.
     #[inline]
-    pub fn leaf(&self, piece: usize, at: [f64; 2]) -> Option<usize> {
+    pub(crate) fn leaf(&self, piece: usize, at: [f64; 2]) -> Option<usize> {
         match self.maps.get(piece)? {
             LeafMap::Line { range, edges, first } => {
                 let inside = at[0] >= range[0] && at[0] <= range[1];
@@ -147,7 +147,7 @@ impl Partition {
 }
 
 /// The mass of each piece, roughly. Everything that was integrated is forgotten.
-pub fn shares(quadrature: &mut Quadrature) -> Vec<f64> {
+pub(crate) fn shares(quadrature: &mut Quadrature) -> Vec<f64> {
     let pieces = quadrature.pieces().to_vec();
     let steps = |dimensions: usize| if dimensions == 1 { [64, 1] } else { [8, 8] };
     let masses = pieces.iter().enumerate().map(|(piece, p)| {
@@ -453,7 +453,7 @@ impl Plane {
 /// coordinate, cut along the second, 4 by 4. `centres` are of the bins, by piece; `pairs` are to be
 /// counted. Returns the group of each bin and their number, at most 16; 0 where the draws do not suffice
 /// for two.
-pub fn groups(centres: &[(usize, [f64; 2])], masses: &[Mass], pairs: f64) -> (Vec<usize>, usize) {
+pub(crate) fn groups(centres: &[(usize, [f64; 2])], masses: &[Mass], pairs: f64) -> (Vec<usize>, usize) {
     let sides = 4;
     let mut order: Vec<usize> = (0..masses.len()).collect();
     order.sort_by(|&a, &b| key(centres[a], 0).total_cmp(&key(centres[b], 0)));
@@ -508,7 +508,7 @@ fn cut(order: &[usize], masses: &[Mass], parts: usize) -> Vec<Vec<usize>> {
 }
 
 /// The centre of an area, wrapped into the chart.
-pub fn centre(area: &Area, axes: &[Coordinate; 2]) -> [f64; 2] {
+pub(crate) fn centre(area: &Area, axes: &[Coordinate; 2]) -> [f64; 2] {
     [0, 1].map(|k| wrap(&axes[k], 0.5 * (area.low[k] + area.high[k])))
 }
 

@@ -15,7 +15,7 @@ use crate::stats::moments::Moments;
 use crate::stats::tree::Counter;
 
 /// Draws per chunk.
-pub const CHUNK: u64 = 4096;
+pub(crate) const CHUNK: u64 = 4096;
 
 /// Chunks after which the moments are merged.
 const ROUND: u64 = 4096;
@@ -24,7 +24,7 @@ const ROUND: u64 = 4096;
 const MOST_GROUPS: usize = 16;
 
 /// What is drawn from, and into what.
-pub struct Counting<'a> {
+pub(crate) struct Counting<'a> {
     /// Sampler under test.
     pub sampler: &'a dyn Sampler,
     /// Contrasts whose means are known.
@@ -43,7 +43,7 @@ pub struct Counting<'a> {
 
 /// What the draws counted.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct DrawCounts {
+pub(crate) struct DrawCounts {
     /// By leaf, then extra.
     pub leaves: Vec<u64>,
     /// Draws of each discrete outcome.
@@ -95,7 +95,7 @@ impl DrawCounts {
 impl Counting<'_> {
     /// Counts `samples` draws on a number of threads; nothing where it was interrupted. Returns the
     /// counts and the moments of each contrast.
-    pub fn count(
+    pub(crate) fn count(
         &self,
         samples: u64,
         threads: usize,

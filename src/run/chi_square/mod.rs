@@ -1,9 +1,9 @@
 //! Chi-square tests of samplers: bins chosen by the density, their masses by quadrature, counts of
 //! draws.
 
-pub mod bins;
-pub mod count;
-pub mod quadrature;
+pub(crate) mod bins;
+pub(crate) mod count;
+pub(crate) mod quadrature;
 
 use std::time::Instant;
 
@@ -22,7 +22,7 @@ use quadrature::{Mass, Quadrature, ROUNDING};
 
 /// What one sampler gave.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sampled {
+pub(crate) struct Sampled {
     /// Its entry in the record.
     pub run: SamplerRun,
     /// Its arrays, by the names that `run` gives.
@@ -32,7 +32,7 @@ pub struct Sampled {
 }
 
 /// A built sampler with its streams.
-pub struct Draws {
+pub(crate) struct Draws {
     /// Its index in the experiment file.
     pub index: usize,
     /// The name that the file gives it.
@@ -49,7 +49,7 @@ pub struct Draws {
 
 impl Draws {
     /// CPU seconds that the draws take, by the time of the first few.
-    pub fn estimate_seconds(&self) -> f64 {
+    pub(crate) fn estimate_seconds(&self) -> f64 {
         let few = 20_000;
         let mut stream = self.key.pass(0).stream(0, Purpose::Walk);
         let before = thread_cpu_time();
@@ -62,7 +62,7 @@ impl Draws {
     }
 
     /// Integrates and draws; nothing where it was interrupted.
-    pub fn run(&self, threads: usize, interrupt: &Interrupt) -> Option<Sampled> {
+    pub(crate) fn run(&self, threads: usize, interrupt: &Interrupt) -> Option<Sampled> {
         let (wall, cpu) = (Instant::now(), thread_cpu_time());
         let sampler = &*self.sampler;
         let (deltas, null) = (sampler.deltas(), sampler.null());

@@ -13,7 +13,7 @@ use crate::math::gauss_kronrod;
 use crate::samplers::{Contrast, Coordinate, Piece, Sampler};
 
 /// Densities are taken to be exact to this relative error: what a draw's own density may differ by.
-pub const ROUNDING: f64 = 1e-9;
+pub(crate) const ROUNDING: f64 = 1e-9;
 
 /// Sum of all bounds at which refinement ends.
 const TARGET: f64 = 1e-9;
@@ -23,7 +23,7 @@ const BUDGET: u64 = 2_000_000;
 
 /// An integral and a bound of its error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Mass {
+pub(crate) struct Mass {
     /// Estimate of the integral.
     pub value: f64,
     /// Bound of its error.
@@ -32,7 +32,7 @@ pub struct Mass {
 
 impl Mass {
     /// Adds the mass and the bound of another region.
-    pub fn add(&mut self, other: Mass) {
+    pub(crate) fn add(&mut self, other: Mass) {
         self.value += other.value;
         self.bound += other.bound;
     }
@@ -41,7 +41,7 @@ impl Mass {
 /// A box in the chart of a piece. Along a periodic axis it may reach beyond the range: points are
 /// wrapped.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Area {
+pub(crate) struct Area {
     /// Index of the piece of the chart.
     pub piece: usize,
     /// Lower corner, in coordinates of the piece.
@@ -79,7 +79,7 @@ impl Ord for LargestBound {
 }
 
 /// Integrates a sampler's density.
-pub struct Quadrature<'a> {
+pub(crate) struct Quadrature<'a> {
     sampler: &'a dyn Sampler,
     pieces: Vec<Piece>,
     nodes: [(f64, f64, f64); 15],
@@ -92,7 +92,7 @@ pub struct Quadrature<'a> {
 
 impl<'a> Quadrature<'a> {
     /// Nothing is integrated yet.
-    pub fn new(sampler: &'a dyn Sampler) -> Quadrature<'a> {
+    pub(crate) fn new(sampler: &'a dyn Sampler) -> Quadrature<'a> {
         Quadrature {
             sampler,
             pieces: sampler.pieces(),
@@ -104,12 +104,12 @@ impl<'a> Quadrature<'a> {
     }
 
     /// Pieces of the sampler's chart.
-    pub fn pieces(&self) -> &[Piece] {
+    pub(crate) fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
 
     /// Integrates over an area without refinement, and keeps its parts for `owner`.
-    pub fn add(&mut self, owner: usize, area: Area) -> Mass {
+    pub(crate) fn add(&mut self, owner: usize, area: Area) -> Mass {
         let axes = &self.pieces[area.piece].axes;
         let cuts = [0, 1].map(|k| cuts(&axes[k], area.low[k], area.high[k]));
         let mut sum = Mass::default();
@@ -125,23 +125,23 @@ impl<'a> Quadrature<'a> {
     }
 
     /// The mass of a stretch of a one-dimensional piece, not kept.
-    pub fn stretch(&mut self, piece: usize, low: f64, high: f64) -> f64 {
+    pub(crate) fn stretch(&mut self, piece: usize, low: f64, high: f64) -> f64 {
         self.region(0, Area { piece, low: [low, 0.0], high: [high, 1.0] }).mass.value
     }
 
     /// Frees the values that are kept between calls.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.regions.clear();
     }
 
     /// Forgets the parts of an owner.
-    pub fn forget_owner(&mut self, owner: usize) {
+    pub(crate) fn forget_owner(&mut self, owner: usize) {
         self.regions.retain(|region| region.owner != owner);
     }
 
     /// Halves the worst regions until the bounds sum to the target or the budget is spent; whether it
     /// was.
-    pub fn refine(&mut self) -> bool {
+    pub(crate) fn refine(&mut self) -> bool {
         let worst = |(i, region): (usize, &SubArea)| LargestBound(region.mass.bound, i);
         let mut heap: BinaryHeap<LargestBound> = self.regions.iter().enumerate().map(worst).collect();
         let mut total: f64 = self.regions.iter().map(|region| region.mass.bound).sum();
@@ -164,7 +164,7 @@ impl<'a> Quadrature<'a> {
     }
 
     /// The masses of all owners 0..`count`, rounding of the densities in their bounds.
-    pub fn masses(&self, count: usize) -> Vec<Mass> {
+    pub(crate) fn masses(&self, count: usize) -> Vec<Mass> {
         let mut masses = vec![Mass::default(); count];
         self.regions.iter().for_each(|region| masses[region.owner].add(region.mass));
         masses.iter_mut().for_each(|mass| mass.bound += ROUNDING * mass.value);
@@ -172,7 +172,7 @@ impl<'a> Quadrature<'a> {
     }
 
     /// The integral of a contrast times the density over everything that is kept.
-    pub fn contrast(&mut self, contrast: &Contrast) -> Mass {
+    pub(crate) fn contrast(&mut self, contrast: &Contrast) -> Mass {
         let mut sum = Mass::default();
         for i in 0..self.regions.len() {
             let SubArea { area, .. } = self.regions[i];
@@ -226,7 +226,7 @@ impl<'a> Quadrature<'a> {
 }
 
 /// The point of the range that a coordinate beyond it denotes.
-pub fn wrap(axis: &Coordinate, x: f64) -> f64 {
+pub(crate) fn wrap(axis: &Coordinate, x: f64) -> f64 {
     let [low, high] = axis.range;
     if !axis.periodic || (low..=high).contains(&x) { x } else { low + (x - low).rem_euclid(high - low) }
 }

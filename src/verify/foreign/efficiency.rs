@@ -25,7 +25,7 @@ const SHARE: f64 = 0.05;
 
 /// The ratio of costs at equal error: how much longer the other renderer takes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ratio {
+pub(crate) struct Ratio {
     /// Band name.
     pub band: String,
     /// (variance of a pixel's mean x seconds) of the images over that of the record, pixels averaged.
@@ -43,7 +43,7 @@ pub struct Ratio {
 /// the record's, that of its pixels, its error by a jackknife over batches of the sum of its tiles'
 /// variances, which is the same sum of pixels. Seconds are taken as exact. t has K - 1 degrees of
 /// freedom.
-pub fn ratios(
+pub(crate) fn ratios(
     stored: &Stored,
     cell: usize,
     run: &EstimatorRun,

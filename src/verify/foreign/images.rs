@@ -13,7 +13,7 @@ const HALF: f64 = 1.0 / 2048.0;
 
 /// The pixels of several seeds in every band of a record.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Planes {
+pub(crate) struct Planes {
     /// Pixels per row.
     pub width: usize,
     /// Rows, from the top.
@@ -35,7 +35,7 @@ pub struct Planes {
 /// # Errors
 /// Fewer than two images, two with the same pixels, other sizes than `size` (pixels per row, rows),
 /// a band without a channel.
-pub fn planes(
+pub(crate) fn planes(
     images: &[(String, ExrImage)],
     bands: &[Band],
     size: (usize, usize),

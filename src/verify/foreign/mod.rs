@@ -22,9 +22,9 @@ use crate::stats::hypothesis::{Estimate, Spread};
 use crate::stats::tails::{chi_square_sf, normal_two_sided};
 
 /// Variance times seconds, as a ratio.
-pub mod efficiency;
+pub(crate) mod efficiency;
 /// Images made elsewhere, as planes of a record's bands.
-pub mod images;
+pub(crate) mod images;
 /// Statistics per pixel.
 mod pixels;
 
@@ -32,7 +32,7 @@ use images::Planes;
 use pixels::BandImages;
 
 /// The default of the probability of any false alarm in one call.
-pub const LEVEL: f64 = 1e-4;
+pub(crate) const LEVEL: f64 = 1e-4;
 
 /// One pixel of fewer than this many may well hold half of their spread.
 const FEW_PIXELS: usize = 64;
@@ -42,7 +42,7 @@ const FEW_PIXELS: usize = 64;
 const SPREAD_LEVEL: f64 = 1e-6;
 
 /// What the images are compared with, and how.
-pub struct Question<'a> {
+pub(crate) struct Question<'a> {
     /// Record that the images are compared with.
     pub stored: &'a Stored,
     /// Index of the cell.
@@ -61,7 +61,7 @@ pub struct Question<'a> {
 
 /// One band's pixels for a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PixelMap {
+pub(crate) struct PixelMap {
     /// Band name.
     pub band: String,
     /// Scores: differences in units of their error, as normal values.
@@ -76,7 +76,7 @@ pub struct PixelMap {
 
 /// Result of judging the images.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Answer {
+pub(crate) struct Answer {
     /// One verdict a test.
     pub verdicts: Vec<Verdict>,
     /// One map for each band; none for a single class, of which the record has no pixels.
@@ -89,7 +89,7 @@ pub struct Answer {
 ///
 /// # Errors
 /// No such estimator in the cell, or no image of it.
-pub fn run_of<'a>(stored: &'a Stored, cell: usize, estimator: &str) -> Result<&'a EstimatorRun> {
+pub(crate) fn run_of<'a>(stored: &'a Stored, cell: usize, estimator: &str) -> Result<&'a EstimatorRun> {
     let runs = &stored.record.cells[cell].runs;
     let run = runs.iter().find(|run| run.estimator == estimator).ok_or_else(|| {
         let names: Vec<&str> = runs.iter().map(|run| run.estimator.as_str()).collect();
@@ -111,7 +111,7 @@ pub fn run_of<'a>(stored: &'a Stored, cell: usize, estimator: &str) -> Result<&'
 ///
 /// # Errors
 /// No such estimator or class, no image in the record.
-pub fn judge(question: &Question, planes: &Planes) -> Result<Answer> {
+pub(crate) fn judge(question: &Question, planes: &Planes) -> Result<Answer> {
     let run = run_of(question.stored, question.cell, question.estimator)?;
     let Some(picture) = Picture::of(question.stored, run) else {
         return Err(Error::input("the record has no image"));

@@ -26,7 +26,7 @@ pub(super) struct BandImages<'a> {
 }
 
 impl<'a> BandImages<'a> {
-    pub fn of(planes: &'a Planes, picture: &Picture, band: usize, passes: u64) -> BandImages<'a> {
+    pub(super) fn of(planes: &'a Planes, picture: &Picture, band: usize, passes: u64) -> BandImages<'a> {
         BandImages {
             width: planes.width,
             height: planes.height,
@@ -38,28 +38,28 @@ impl<'a> BandImages<'a> {
         }
     }
 
-    pub fn seeds(&self) -> f64 {
+    pub(super) fn seeds(&self) -> f64 {
         self.theirs.len() as f64
     }
 
     /// Mean over seeds.
-    pub fn mean(&self, pixel: usize) -> f64 {
+    pub(super) fn mean(&self, pixel: usize) -> f64 {
         self.theirs.iter().map(|seed| seed[pixel]).sum::<f64>() / self.seeds()
     }
 
     /// Sum over seeds of squared deviations from their mean.
-    pub fn squares(&self, pixel: usize) -> f64 {
+    pub(super) fn squares(&self, pixel: usize) -> f64 {
         let mean = self.mean(pixel);
         self.theirs.iter().map(|seed| (seed[pixel] - mean) * (seed[pixel] - mean)).sum()
     }
 
     /// Variance of the mean over seeds.
-    pub fn variance(&self, pixel: usize) -> f64 {
+    pub(super) fn variance(&self, pixel: usize) -> f64 {
         self.squares(pixel) / (self.seeds() * (self.seeds() - 1.0))
     }
 
     /// Standard error of the mean over seeds, arithmetic included.
-    pub fn std_error(&self, pixel: usize) -> f64 {
+    pub(super) fn std_error(&self, pixel: usize) -> f64 {
         let rounding = self.rounding * self.mean(pixel);
         (self.variance(pixel) + rounding * rounding).sqrt()
     }
@@ -68,7 +68,7 @@ impl<'a> BandImages<'a> {
     /// with these Student's t bounds the tails for every ratio of the two variances (M. Mickey, M.
     /// Brown, "Bounds on the distribution functions of the Behrens-Fisher statistic", 1966). The number
     /// that Satterthwaite estimates is too large where a few seeds agree by chance.
-    pub fn difference(&self, pixel: usize) -> Estimate {
+    pub(super) fn difference(&self, pixel: usize) -> Estimate {
         let (a, b) = (self.std_error(pixel), self.ours_error[pixel]);
         let dof = self.ours_dof.min(self.seeds() - 1.0);
         let value = self.mean(pixel) - self.ours[pixel];
@@ -77,7 +77,7 @@ impl<'a> BandImages<'a> {
 
     /// The score of a pixel: the normal value with the p-value and sign of its t test; 0 where both
     /// sides are the same, without any error.
-    pub fn z(&self, pixel: usize) -> f64 {
+    pub(super) fn z(&self, pixel: usize) -> f64 {
         let difference = self.difference(pixel);
         if difference.value == 0.0 {
             return 0.0;
@@ -92,7 +92,7 @@ impl<'a> BandImages<'a> {
     }
 
     /// Where a value is not a number that can be judged.
-    pub fn not_finite(&self) -> Option<String> {
+    pub(super) fn not_finite(&self) -> Option<String> {
         let bad = |x: &f64| !x.is_finite();
         let found = self.theirs.iter().enumerate().find_map(|(k, seed)| {
             let pixel = seed.iter().position(bad)?;
@@ -111,7 +111,7 @@ impl<'a> BandImages<'a> {
     }
 
     /// The share of the pixels' squared deviations that one pixel holds, among these.
-    pub fn largest_share(&self, pixels: &[usize]) -> f64 {
+    pub(super) fn largest_share(&self, pixels: &[usize]) -> f64 {
         let squares: Vec<f64> = pixels.iter().map(|&i| self.squares(i)).collect();
         let sum: f64 = squares.iter().sum();
         if sum > 0.0 { squares.iter().fold(0.0, |a: f64, b| a.max(*b)) / sum } else { 0.0 }

@@ -17,7 +17,7 @@ use crate::optics::medium::Medium;
 
 /// The BRDF of once-scattered light, 1/sr; `wi` and `wo` point away from the surface, whose normal is
 /// +z. A boundary is matched where `eta` (inside over outside) is 1.
-pub fn half_space_brdf(medium: &Medium, eta: f64, wi: DVec3, wo: DVec3) -> f64 {
+pub(crate) fn half_space_brdf(medium: &Medium, eta: f64, wi: DVec3, wo: DVec3) -> f64 {
     if wi.z <= 0.0 || wo.z <= 0.0 {
         return 0.0;
     }
@@ -37,7 +37,7 @@ pub fn half_space_brdf(medium: &Medium, eta: f64, wi: DVec3, wo: DVec3) -> f64 {
 ///   (alpha/2) int_0^1 mu/(1 + mu) (1 - F) dmu,
 /// mu inside, from the critical cosine on; there F has the slope of a square root, which integrating
 /// over the cosine c outside removes (mu dmu = c dc / eta^2).
-pub fn albedo_normal(albedo: f64, eta: f64) -> f64 {
+pub(crate) fn albedo_normal(albedo: f64, eta: f64) -> f64 {
     let tolerance = 1e-14;
     let value = if eta < 1.0 {
         let emerges = |mu: f64| mu / (1.0 + mu) * (1.0 - fresnel(mu, 1.0 / eta).reflectance);
