@@ -40,7 +40,7 @@ use serde::Deserialize;
 use super::choice::{choose_light, light_shares};
 use super::crossing::{other, radiance_scale};
 use super::{
-    Anomaly, Bias, Cost, Estimator, EstimatorKind, History, Scores, SensorKind, Serves, read_options,
+    Anomaly, Bias, Cost, Estimator, EstimatorKind, History, Scores, Sensors, Serves, read_options,
 };
 use crate::error::{Error, Result};
 use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Shape, Side};
@@ -76,10 +76,7 @@ impl LightTracer {
     pub const KIND: EstimatorKind = EstimatorKind {
         kind: "light_trace",
         doc: "analog tracing from the lights, into `flux`, `rings` or `acceptance_sr`; unbiased at true normals",
-        serves: Serves {
-            sensors: &[SensorKind::Flux, SensorKind::Rings, SensorKind::Accepting],
-            ..Serves::ALL
-        },
+        serves: Serves { sensors: Sensors::Receiving, ..Serves::ALL },
         options_schema: || schemars::schema_for!(LightTraceOptions),
         build: |options, scene| {
             let LightTraceOptions { paths } = read_options(options)?;

@@ -29,7 +29,7 @@ pub use estimator::{BandUse, Bias, Estimator, HeavyTail};
 pub use history::{History, TransportClass};
 pub use kind::{EstimatorKind, read_options};
 pub use scores::{Anomaly, Cost, Layout, ObservableName, Scores};
-pub use serves::{Bodies, BoundaryKind, SensorKind, Serves};
+pub use serves::{Bodies, BoundaryKind, Sensors, Serves};
 pub use walk::Roulette;
 
 /// Every estimator of this crate, in the order in which they are listed.

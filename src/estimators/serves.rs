@@ -2,36 +2,33 @@
 
 use crate::error::{Error, Result};
 use crate::optics::boundary::Boundary;
+use crate::scene::sensor::SensorClass;
 use crate::scene::{Scene, Sensor};
 
 /// The scenes that an estimator serves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Serves {
     /// Sensors that the estimator serves.
-    pub sensors: &'static [SensorKind],
+    pub sensors: Sensors,
     /// Boundaries that the estimator serves.
     pub boundaries: &'static [BoundaryKind],
     /// Extents of bodies that the estimator serves.
     pub bodies: Bodies,
 }
 
-/// Kinds of sensors, as estimators distinguish them.
+/// Sensors, by what an estimator must be able to do for them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SensorKind {
-    /// Parallel rays through pixels.
-    Orthographic,
-    /// Pixels that accept light from a cap of directions.
-    Accepting,
-    /// Rays from a point through pixels.
-    Perspective,
-    /// One ray from outside.
-    Probe,
-    /// Sensor at a medium vertex.
+pub enum Sensors {
+    /// All sensors.
+    All,
+    /// Sensors whose rays start outside the body.
+    Outside,
+    /// Sensors whose rays start outside the body and that do not depend on where light entered.
+    WithoutEntries,
+    /// A medium vertex.
     Vertex,
-    /// Exitance or flux by the cosine of the exit direction.
-    Flux,
-    /// Exitance by the distance between entry and exit.
-    Rings,
+    /// Sensors that light leaving the body can hit.
+    Receiving,
 }
 
 /// Kinds of boundaries, as scenes distinguish them.
@@ -57,43 +54,16 @@ pub enum Bodies {
 impl Serves {
     /// No restriction: every scene is served.
     pub const ALL: Serves = Serves {
-        sensors: &[
-            SensorKind::Orthographic,
-            SensorKind::Accepting,
-            SensorKind::Perspective,
-            SensorKind::Probe,
-            SensorKind::Vertex,
-            SensorKind::Flux,
-            SensorKind::Rings,
-        ],
+        sensors: Sensors::All,
         boundaries: &[BoundaryKind::Matched, BoundaryKind::Smooth, BoundaryKind::Rough],
         bodies: Bodies::All,
     };
 
     /// Scenes whose sensor looks at the body from outside.
-    pub const FROM_OUTSIDE: Serves = Serves {
-        sensors: &[
-            SensorKind::Orthographic,
-            SensorKind::Accepting,
-            SensorKind::Perspective,
-            SensorKind::Probe,
-            SensorKind::Flux,
-            SensorKind::Rings,
-        ],
-        ..Serves::ALL
-    };
+    pub const FROM_OUTSIDE: Serves = Serves { sensors: Sensors::Outside, ..Serves::ALL };
 
     /// Scenes whose sensor looks from outside and does not depend on where light entered.
-    pub const WITHOUT_ENTRIES: Serves = Serves {
-        sensors: &[
-            SensorKind::Orthographic,
-            SensorKind::Accepting,
-            SensorKind::Perspective,
-            SensorKind::Probe,
-            SensorKind::Flux,
-        ],
-        ..Serves::ALL
-    };
+    pub const WITHOUT_ENTRIES: Serves = Serves { sensors: Sensors::WithoutEntries, ..Serves::ALL };
 
     /// Scenes whose sensor looks from outside at a body without a rough boundary, which the BSSRDFs here
     /// need.
@@ -102,9 +72,8 @@ impl Serves {
 
     /// Refuses a scene that `name` does not serve.
     pub(super) fn check(&self, name: &str, scene: &Scene) -> Result<()> {
-        let sensor = SensorKind::of(&scene.sensor);
-        if !self.sensors.contains(&sensor) {
-            return Err(self.refuse_sensor(name, sensor));
+        if !self.sensors.contain(&scene.sensor) {
+            return Err(self.sensors.refuse(name, &scene.sensor));
         }
         let is_served = |boundary: &BoundaryKind| self.boundaries.contains(boundary);
         if let Some(boundary) = scene.boundary.iter().map(BoundaryKind::of).find(|b| !is_served(b)) {
@@ -126,68 +95,56 @@ impl Serves {
         }
         Ok(())
     }
+}
 
-    fn refuse_sensor(&self, name: &str, sensor: SensorKind) -> Error {
-        let served = |sensor| self.sensors.contains(&sensor);
-        match sensor {
-            SensorKind::Vertex => Error::input_help(
+impl Sensors {
+    fn contain(self, sensor: &Sensor) -> bool {
+        match self {
+            Sensors::All => true,
+            Sensors::Outside => sensor.class() != SensorClass::Inside,
+            Sensors::WithoutEntries => sensor.class() == SensorClass::Outside,
+            Sensors::Vertex => sensor.class() == SensorClass::Inside,
+            Sensors::Receiving => sensor.receives(true) || sensor.receives(false),
+        }
+    }
+
+    fn refuse(self, name: &str, sensor: &Sensor) -> Error {
+        match (self, sensor.class()) {
+            (Sensors::Outside | Sensors::WithoutEntries, SensorClass::Inside) => Error::input_help(
                 format!("{name} starts its paths outside the body, the sensor `vertex` is inside"),
                 "use two_bounce, or another sensor",
             ),
-            SensorKind::Rings if served(SensorKind::Flux) => Error::input_help(
+            (Sensors::WithoutEntries, SensorClass::Entries) => Error::input_help(
                 format!("{name} does not keep where light came in, by which the sensor `rings` counts"),
                 "use light_trace, path, bssrdf_probe or bssrdf_rays, or the sensor `flux`",
             ),
             _ => Error::input_help(
-                format!("{name} cannot serve the sensor {}", sensor.name()),
-                format!("it serves {}", self.sensor_names()),
+                format!("{name} cannot serve this sensor"),
+                format!("it serves {}", self.names()),
             ),
         }
     }
 
-    fn sensor_names(&self) -> String {
-        let names: Vec<&str> = self.sensors.iter().map(|sensor| sensor.name()).collect();
-        names.join(", ")
+    fn names(self) -> &'static str {
+        match self {
+            Sensors::All => "every sensor",
+            Sensors::Outside => "every sensor except `vertex`",
+            Sensors::WithoutEntries => "every sensor except `vertex` and `rings`",
+            Sensors::Vertex => "the sensor `vertex`",
+            Sensors::Receiving => "`flux`, `rings`, and `orthographic` with `acceptance_sr`",
+        }
     }
 }
 
 impl std::fmt::Display for Serves {
     /// Sensors, boundaries and bodies; what is not restricted is left out.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "sensors {}", self.sensor_names())?;
+        write!(f, "{}", self.sensors.names())?;
         if self.boundaries != Serves::ALL.boundaries {
             let names: Vec<&str> = self.boundaries.iter().map(|b| b.name()).collect();
             write!(f, "; {} boundaries", names.join(" or "))?;
         }
         if self.bodies == Bodies::Finite { write!(f, "; finite bodies") } else { Ok(()) }
-    }
-}
-
-impl SensorKind {
-    /// The kind of a sensor.
-    pub fn of(sensor: &Sensor) -> SensorKind {
-        match sensor {
-            Sensor::Orthographic(_) => SensorKind::Orthographic,
-            Sensor::Accepting(_) => SensorKind::Accepting,
-            Sensor::Perspective(_) => SensorKind::Perspective,
-            Sensor::Probe { .. } => SensorKind::Probe,
-            Sensor::Vertex { .. } => SensorKind::Vertex,
-            Sensor::FaceFlux { .. } | Sensor::BodyFlux { .. } => SensorKind::Flux,
-            Sensor::Rings(_) => SensorKind::Rings,
-        }
-    }
-
-    /// As messages name it.
-    fn name(self) -> &'static str {
-        match self {
-            SensorKind::Orthographic => "`orthographic`",
-            SensorKind::Accepting => "`orthographic` with `acceptance_sr`",
-            SensorKind::Perspective => "`perspective`",
-            SensorKind::Probe => "`probe`",
-            SensorKind::Vertex => "`vertex`",
-            SensorKind::Flux => "`flux`",
-            SensorKind::Rings => "`rings`",
-        }
     }
 }
 

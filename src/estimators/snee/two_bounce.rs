@@ -13,7 +13,7 @@ use super::{Snee, SneeChoices, SneeOptions};
 use crate::error::{Error, Result};
 use crate::estimators::bands::OneBand;
 use crate::estimators::walk::{CameraWalk, Path, Unrivalled};
-use crate::estimators::{Estimator, EstimatorKind, Scores, SensorKind, Serves, read_options};
+use crate::estimators::{Estimator, EstimatorKind, Scores, Sensors, Serves, read_options};
 use crate::sampling::stream::{PassKey, Purpose};
 use crate::scene::Scene;
 
@@ -26,7 +26,7 @@ impl TwoBounce {
     pub const KIND: EstimatorKind = EstimatorKind {
         kind: "two_bounce",
         doc: "the last two segments alone, from a medium vertex, by snee's techniques; unbiased",
-        serves: Serves { sensors: &[SensorKind::Vertex], ..Serves::ALL },
+        serves: Serves { sensors: Sensors::Vertex, ..Serves::ALL },
         options_schema: || schemars::schema_for!(SneeChoices),
         build: |options, scene| {
             let choices: SneeChoices = read_options(options)?;

@@ -49,6 +49,17 @@ pub enum Sensor {
     BodyFlux(BodyFlux),
 }
 
+/// What a sensor asks of an estimator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SensorClass {
+    /// Rays that start outside the body.
+    Outside,
+    /// The same, and the point at which light entered.
+    Entries,
+    /// Rays that start inside the body.
+    Inside,
+}
+
 /// Calls a method of [`SensorMethods`] on whichever kind a sensor is.
 macro_rules! call {
     ($sensor:ident.$method:ident($($argument:expr),*)) => {
@@ -109,6 +120,10 @@ trait SensorMethods {
         None
     }
 
+    fn class(&self) -> SensorClass {
+        SensorClass::Outside
+    }
+
     fn slot_of(&self, slot: usize, _entry: DVec3) -> usize {
         slot
     }
@@ -132,6 +147,11 @@ impl Sensor {
     /// be.
     pub fn position(&self) -> Option<(DVec3, Side)> {
         call!(self.position())
+    }
+
+    /// What it asks of an estimator.
+    pub fn class(&self) -> SensorClass {
+        call!(self.class())
     }
 
     /// Number of rays of a pass.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{RegionShares, SensorMethods, SensorRay, SensorRegion};
+use super::{RegionShares, SensorClass, SensorMethods, SensorRay, SensorRegion};
 use crate::geometry::Ray;
 use crate::math::{DVec3, Frame};
 use crate::sampling::warp::square_to_cosine_hemisphere;
@@ -36,6 +36,10 @@ impl Rings {
 }
 
 impl SensorMethods for Rings {
+    fn class(&self) -> SensorClass {
+        SensorClass::Entries
+    }
+
     fn rays_per_pass(&self) -> usize {
         self.paths
     }

@@ -1,6 +1,6 @@
 //! A medium vertex.
 
-use super::{SensorMethods, SensorRay, SensorRegion};
+use super::{SensorClass, SensorMethods, SensorRay, SensorRegion};
 use crate::geometry::{Ray, Side};
 use crate::math::DVec3;
 
@@ -14,6 +14,10 @@ pub struct Vertex {
 }
 
 impl SensorMethods for Vertex {
+    fn class(&self) -> SensorClass {
+        SensorClass::Inside
+    }
+
     fn position(&self) -> Option<(DVec3, Side)> {
         Some((self.ray.origin, Side::Inside))
     }
