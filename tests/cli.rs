@@ -27,7 +27,7 @@ fn words_and_types() {
     let help = "did you mean `radius_mm`?";
     bad("{ radius_mm", "{ radius_m", &["unknown key `radius_m`", "x.toml:4:25", help]);
     bad("seed", "sead", &["unknown key `sead`", "x.toml:2:1", "did you mean `seed`?"]);
-    bad("budget.passes = 100\n", "", &["missing key `budget`", "How much work"]);
+    bad("budget.passes = 100\n", "", &["missing key `budget`", "Number of passes"]);
     bad(
         "mm = 1.0",
         "mm = \"one\"",

@@ -168,7 +168,7 @@ mod tests {
         assert!(list(Some(Topic::Shapes)).contains("half_space     Everything below z = 0."));
         assert!(
             list(Some(Topic::Estimators))
-                .contains("path  Path tracing.\n  max_bounces  The longest path.")
+                .contains("path  Path tracing.\n  max_bounces  Largest number of bounces.")
         );
         assert!(list(Some(Topic::Lights)).contains("directional"));
     }
