@@ -11,8 +11,7 @@ use crate::geometry::{Ray, Shape};
 use crate::math::{DVec3, Frame, tan};
 use crate::scene::Sensor;
 use crate::scene::sensor::{
-    Accepting, BodyFlux, Disc, FaceFlux, FluxFace, Orthographic, Perspective, Probe, Rings, Screen,
-    Vertex,
+    Accepting, BodyFlux, FaceFlux, FluxFace, Orthographic, Perspective, Probe, Rings, Screen, Vertex,
 };
 
 /// What is measured. Light that reaches the sensor without meeting the body is not scored.
@@ -61,20 +60,6 @@ pub enum SensorEntry {
         /// Whether the means of 4 by 4 tiles are observables too, for claims on parts of the image.
         #[serde(default = "yes", skip_serializing_if = "is_true")]
         tiles: bool,
-    },
-    /// Mean radiance over a disc, along its axis.
-    Disc {
-        /// Its centre, mm; outside the body.
-        center_mm: [f64; 3],
-        /// Direction of the rays.
-        toward: Direction,
-        /// Its radius, mm.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        radius_mm: f64,
-        /// Independent paths whose mean is one pass.
-        #[serde(default = "default_paths_per_pass")]
-        #[schemars(range(min = 1, max = 1048576))]
-        paths_per_pass: usize,
     },
     /// Radiance along one ray.
     Probe {
@@ -191,11 +176,6 @@ impl SensorEntry {
             SensorEntry::Vertex { point_mm, toward, paths_per_pass } => {
                 Sensor::Vertex(Vertex { ray: ray(*point_mm, toward), paths: *paths_per_pass })
             }
-            SensorEntry::Disc { center_mm, toward, radius_mm, paths_per_pass } => Sensor::Disc(Disc {
-                axis: ray(*center_mm, toward),
-                radius: *radius_mm,
-                paths: *paths_per_pass,
-            }),
             SensorEntry::Probe { point_mm, toward, paths_per_pass } => {
                 Sensor::Probe(Probe { ray: ray(*point_mm, toward), paths: *paths_per_pass })
             }

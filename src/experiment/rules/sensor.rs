@@ -34,9 +34,6 @@ pub(crate) fn sensor(at: At, sensor: &SensorEntry, shape: Option<&ShapeEntry>) {
                 upright(at.to("up"), *up, unit(view.to_array()));
             }
         }
-        SensorEntry::Disc { toward, .. } => {
-            direction(at.to("disc").to("toward"), toward);
-        }
         SensorEntry::Probe { toward, .. } => {
             direction(at.to("probe").to("toward"), toward);
         }

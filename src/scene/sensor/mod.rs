@@ -6,7 +6,6 @@
 
 mod accepting;
 mod body_flux;
-mod disc;
 mod face_flux;
 mod orthographic;
 mod perspective;
@@ -17,7 +16,6 @@ mod vertex;
 
 pub use accepting::Accepting;
 pub use body_flux::BodyFlux;
-pub use disc::Disc;
 pub use face_flux::{FaceFlux, FluxFace};
 pub use orthographic::Orthographic;
 pub use perspective::Perspective;
@@ -38,8 +36,6 @@ pub enum Sensor {
     Accepting(Accepting),
     /// Rays from a point through the pixels of a screen.
     Perspective(Perspective),
-    /// Mean radiance over a disc, along its axis.
-    Disc(Disc),
     /// Radiance along one ray.
     Probe(Probe),
     /// Radiance that arrives at a medium vertex.
@@ -71,7 +67,6 @@ macro_rules! call {
             Sensor::Orthographic(kind) => kind.$method($($argument),*),
             Sensor::Accepting(kind) => kind.$method($($argument),*),
             Sensor::Perspective(kind) => kind.$method($($argument),*),
-            Sensor::Disc(kind) => kind.$method($($argument),*),
             Sensor::Probe(kind) => kind.$method($($argument),*),
             Sensor::Vertex(kind) => kind.$method($($argument),*),
             Sensor::FaceFlux(kind) => kind.$method($($argument),*),
