@@ -14,7 +14,6 @@
 pub mod body;
 pub mod boundary;
 pub mod chart;
-pub mod cosine;
 pub mod discrete;
 pub mod distance;
 pub mod facets;
@@ -37,7 +36,6 @@ pub use sampler::{Contrast, Coordinate, Discrete, Draw, Null, Piece, Sampler, tu
 /// Every sampler of this crate, in the order in which they are listed.
 pub const KINDS: &[SamplerKind] = &[
     phase::KIND,
-    cosine::KIND,
     surface::TRIANGLE,
     surface::MESH,
     body::KIND,
