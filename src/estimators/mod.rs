@@ -5,7 +5,6 @@
 //! Its file also states under which name and with which options an experiment asks for it, and which
 //! scenes it serves ([`EstimatorKind`]); [`KINDS`] lists them all.
 
-pub mod ballistic;
 mod bands;
 pub mod bssrdf_density;
 pub mod bssrdf_probe;
@@ -36,7 +35,6 @@ pub use walk::Roulette;
 /// Every estimator of this crate, in the order in which they are listed.
 pub const KINDS: &[EstimatorKind] = &[
     path::PathTracer::KIND,
-    ballistic::BALLISTIC,
     snee::Snee::KIND,
     snee::TwoBounce::KIND,
     snee::Bidirectional::KIND,
