@@ -3,7 +3,7 @@
 //! An estimator is built for one cell and runs passes: it turns a pass's random streams into scores
 //! and knows no file, thread or statistic. The runner folds scores into moments, zeros included.
 //! Its file also states under which name and with which options an experiment asks for it, and which
-//! scenes it serves ([`EstimatorKind`]); [`KINDS`] lists them all.
+//! scenes it serves (`EstimatorKind`); `KINDS` lists them all.
 
 mod bands;
 pub mod bssrdf_density;

@@ -28,7 +28,7 @@ fn write_with(path: &Path, doing: &str, fill: impl FnOnce(&mut File) -> io::Resu
     })
 }
 
-/// Removes the files that [`write`] had not finished where its process was killed.
+/// Removes the files that `write` had not finished where its process was killed.
 pub fn sweep(folder: &Path) -> Result<()> {
     for entry in fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?.flatten() {
         let name = entry.file_name();

@@ -8,8 +8,8 @@
 //! come from different functions of the code under test, so that each is checked by the other.
 //!
 //! Samplers of directions, of distances along a line and of points of a plane need no chart of their
-//! own: [`chart`] has one for each of these domains. A sampler's file also states under which name and
-//! with which options an experiment asks for it ([`SamplerKind`]); [`KINDS`] lists them all.
+//! own: `chart` has one for each of these domains. A sampler's file also states under which name and
+//! with which options an experiment asks for it (`SamplerKind`); `KINDS` lists them all.
 
 pub mod body;
 pub mod boundary;

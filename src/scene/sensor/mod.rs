@@ -1,7 +1,7 @@
 //! Sensors: what a pass measures, as rays with weights. A pass traces every ray of the sensor once;
 //! ray i belongs to one slot (a pixel, or a bin of a flux), and slots add up to regions.
 //!
-//! One file a kind of sensor, which implements [`SensorMethods`]; [`Sensor`] passes every call on to its
+//! One file a kind of sensor, which implements `SensorMethods`; `Sensor` passes every call on to its
 //! kind.
 
 mod accepting;
