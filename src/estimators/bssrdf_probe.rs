@@ -11,8 +11,8 @@
 //! disc across a to the surface. All axes, bands and techniques that could have made an entry are in the
 //! sum, whichever made it (the balance heuristic), so that
 //!   L_r = mean over probes of sum over their entries of K T12 L cos / (pdf_light pdf_area)
-//! is unbiased for every surface: the line meets all sheets of it, and at least one axis has |n_i . a|
-//! >= 1/sqrt 3. On half-space and slab lines along tangents lie parallel to the surface and meet
+//! is unbiased for every surface: the line meets all sheets of it, and at least one axis has
+//! |n_i . a| at least 1/sqrt 3. On half-space and slab lines along tangents lie parallel to the surface and meet
 //! nothing; there the normal is always taken.
 //!
 //! Normals: the geometric one carries areas, the shading one the Fresnel factor and the cosine.

@@ -25,8 +25,11 @@ pub struct EstimatorKind {
     /// keys and keep to the keywords that validation understands.
     pub options_schema: fn() -> Schema,
     /// Builds it from its validated options and a scene.
-    pub build: fn(&Json, Arc<Scene>) -> Result<Box<dyn Estimator>>,
+    pub build: BuildEstimator,
 }
+
+/// Builds an estimator from its validated options and a scene.
+pub type BuildEstimator = fn(&Json, Arc<Scene>) -> Result<Box<dyn Estimator>>;
 
 impl EstimatorKind {
     /// Refuses a scene that it does not serve.

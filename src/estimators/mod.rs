@@ -27,7 +27,7 @@ mod walk;
 
 pub use estimator::{BandUse, Bias, Estimator, HeavyTail};
 pub use history::{History, TransportClass};
-pub use kind::{EstimatorKind, read_options};
+pub use kind::{BuildEstimator, EstimatorKind, read_options};
 pub use scores::{Anomaly, Cost, Layout, ObservableName, Scores};
 pub use serves::{Bodies, BoundaryKind, Sensors, Serves};
 pub use walk::Roulette;

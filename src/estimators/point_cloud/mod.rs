@@ -213,9 +213,8 @@ impl Estimator for PointCloud {
 
     /// Under p = e^(-m d) an accepted term of a band with effective transport s has weights like e^((m -
     /// s) d), with a Pareto tail of index m / (m - s) on an unbounded surface: of infinite variance
-    /// where m
-    /// > 2 s. A finite body cuts the tail off at its diameter D; the variance has then grown by about
-    /// e^((m - 2 s) D).
+    /// where m exceeds 2 s. A finite body cuts the tail off at its diameter D; the variance has then
+    /// grown by about e^((m - 2 s) D).
     fn heavy_tails(&self) -> Vec<HeavyTail> {
         if self.options.acceptance != (AcceptanceRule::Mean {}) {
             return Vec::new(); // weights of all other rules are bounded by what the kernel loses, or by their floor

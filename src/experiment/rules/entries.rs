@@ -9,7 +9,8 @@ use crate::experiment::validate::grammar::Grammar;
 pub(crate) fn experiment_name(at: At, name: &str) {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
     let begins_well = name.starts_with(|c: char| c.is_ascii_alphanumeric());
-    if !name.is_empty() && !(begins_well && name.chars().all(is_plain)) {
+    let is_good = begins_well && name.chars().all(is_plain);
+    if !name.is_empty() && !is_good {
         at.report_help(
             format!("`{name}` cannot name a folder"),
             "take letters, digits, `-` and `_` only, the first of them a letter or a digit",

@@ -3,8 +3,8 @@
 //!
 //! Light from wi is refracted to the cosine mu_i', scatters once at depth z and leaves along wo' with
 //! cosine mu_o':
-//!   int_0^inf sigma_s p e^(-sigma_t z/mu_i') e^(-sigma_t z/mu_o') dz / (mu_i' mu_o') = alpha p / (mu_i'
-//!   + mu_o').
+//!   int_0^inf sigma_s p e^(-sigma_t z/mu_i') e^(-sigma_t z/mu_o') dz / (mu_i' mu_o')
+//!     = alpha p / (mu_i' + mu_o').
 //! Radiance scales by 1/eta^2 on leaving, and the irradiance that arrives, L mu_i dwi T12 outside, is
 //! L eta^2 mu_i' dwi' T12 inside, so that per irradiance outside
 //!   f1 = alpha T12 T21 p(wi'.wo') / (eta^2 (mu_i' + mu_o')).
