@@ -1,6 +1,6 @@
 //! Cost of a query of a point cloud: by the hierarchy, and by visiting every point.
 //!
-//!   cargo bench --bench point_cloud
+//!   cargo bench -p benches --bench point_cloud
 //!
 //! For bodies of three materials and two sizes: points built into the hierarchy, nanoseconds for each
 //! node or point that a query visits, for each point that the scan rejects, for each BSSRDF evaluated,

@@ -63,7 +63,7 @@ def diffused(scattering, absorption, n, radius):
 
 print("# Flux that leaves a sphere under a uniform sky of radiance 1, W, after diffusing:")
 print("# classical dipole (Jensen et al. 2001), exact Fresnel moments, quadrature with 30 digits.")
-print("# scripts/sphere_under_sky.py writes this file and states how.")
+print("# scripts/sphere_under_sky.py writes this file and says how.")
 print("label,material,radius_mm,eta,R,G,B")
 for name, (scattering, absorption, n, radii) in MATERIALS.items():
     if int(sys.argv[1]) >= len(radii):
