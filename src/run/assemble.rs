@@ -78,12 +78,14 @@ pub(super) fn assemble(
                 let run = estimator_run(experiment, passes, cell.runs.len(), *finished, &mut arrays);
                 cell.runs.push(run);
             }
-            (_, Output::Draws(sampled)) => {
+            (Task::Draw(_), Output::Draws(sampled)) => {
                 timing.add("", &sampled.run.sampler, sampled.cost);
                 samplers.push(sampled.run);
                 arrays.extend(sampled.arrays);
             }
-            (Task::Draw(_), Output::Passes(_)) => {}
+            (Task::Estimate(_), Output::Draws(_)) | (Task::Draw(_), Output::Passes(_)) => {
+                unreachable!("a job gives what its task asks for")
+            }
         }
     }
     let claims = json!(experiment.file.claim);

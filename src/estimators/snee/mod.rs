@@ -5,9 +5,8 @@
 //! is subdivided by a vertex x_j, from the light's end or from the walk's (`subdivision`). Both are
 //! weighted against the walk's own ways of making the same path. Beyond the talk: probes that know where
 //! light probably enters (`guess`, `probe`), a last vertex guided by the light (`last_vertex`), calls
-//! made with a probability that falls with depth; lights that are not concentrated are skipped and left
-//! to the walk (`guide`): where every light is skipped, the estimator is `path` to the
-//! last bit.
+//! made with a probability that falls with depth. Lights that are not concentrated are skipped and left
+//! to the walk (`guide`): where every light is skipped, the estimator is `path` to the last bit.
 //!
 //! Unbiased for all that the walk or a rival can sample. Through a smooth boundary parallel light is
 //! only found by subdivision from the light's end: what lacks two medium vertices before the exit is
