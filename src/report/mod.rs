@@ -69,7 +69,7 @@ pub(crate) fn write_judged(
     let stored = Stored { timing: folder.read_timing()?, ..stored };
     let provenance = folder.read_provenance()?;
     let rows = measurements(&stored, stored.timing.as_ref());
-    folder.clear_pictures()?;
+    folder.clear_views()?;
     let pictures = pictures::write_pictures(folder, &stored)?;
     let viewers = viewer::viewers(&stored, &pictures)?;
     let wanted = folder.read_pictures()?;
@@ -78,7 +78,6 @@ pub(crate) fn write_judged(
     let comparisons = comparisons::comparisons(&stored);
     let model_errors = model_errors(&stored);
     let plots = plots::sections(&stored, &comparisons, &wanted);
-    folder.clear_views("plots")?;
     plots.iter().try_for_each(|section| section.write(folder))?;
     let data = ReportData {
         stored,
@@ -114,7 +113,6 @@ pub(crate) fn write_judged(
 
 /// Every table of the page as Markdown, CSV and LaTeX.
 fn write_tables(folder: &RecordFolder, page: &document::Document) -> Result<()> {
-    folder.clear_views("tables")?;
     for block in page.tables() {
         let document::TableBlock { name, caption, table } = block;
         let forms = [

@@ -10,11 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use super::json::{canonical, hash_hex};
 use super::record::{EstimatorRun, Record};
+pub use super::store::MANIFEST;
 use super::store::RecordFolder;
 use crate::error::{Error, Result};
-
-/// The file's name in a results folder.
-pub const MANIFEST: &str = "manifest.json";
 
 /// Version of this layout; a reader refuses others. A new layout of records does not change it.
 const VERSION: u32 = 1;

@@ -25,6 +25,23 @@ use super::{atomic, provenance::Provenance, timing::Timing};
 use crate::error::{Error, Result};
 use crate::stats::moments::Moments;
 
+/// The manifest's name in a results folder.
+pub const MANIFEST: &str = "manifest.json";
+
+/// What a report writes beside a record, besides pictures.
+const VIEW_FOLDERS: [&str; 2] = ["plots", "tables"];
+const VIEW_FILES: [&str; 9] = [
+    "comparisons.csv",
+    MANIFEST,
+    "measurements.csv",
+    "model_errors.csv",
+    "report.html",
+    "report.md",
+    "report.tex",
+    "summary.json",
+    "verdicts.csv",
+];
+
 /// Arrays by their path relative to the record's folder.
 pub type Arrays = BTreeMap<String, Array>;
 
@@ -195,7 +212,7 @@ impl RecordFolder {
     }
 
     /// Writes a record, with the checksums of its arrays filled in, and returns it as written. An
-    /// earlier record stays as it was until this one is complete.
+    /// earlier record stays as it was until this one is complete, and its views go with it.
     pub fn write(&self, mut record: Record, arrays: Arrays) -> Result<Stored> {
         let checksums = arrays.iter().map(|(name, array)| (name.clone(), hash_hex(&array.to_npy())));
         record.checksums = checksums.collect();
@@ -211,7 +228,9 @@ impl RecordFolder {
         if written.is_err() {
             let _ = fs::remove_dir_all(&stage);
         }
-        written.map(|()| stored)
+        written?;
+        self.clear_views()?;
+        Ok(stored)
     }
 
     /// Removes a record that a killed run had not finished.
@@ -305,15 +324,20 @@ impl RecordFolder {
         atomic::write(&path, bytes, "write results")
     }
 
-    /// Removes a folder of views beside the record, so that none of an earlier record stays among those
-    /// of this one.
-    pub fn clear_views(&self, name: &str) -> Result<()> {
-        remove_folder(&self.root.join(name), "remove the views of an earlier record")
+    /// Removes every view beside the record, so that none of an earlier record outlives it.
+    pub fn clear_views(&self) -> Result<()> {
+        for folder in VIEW_FOLDERS {
+            remove_folder(&self.root.join(folder), "remove the views of an earlier record")?;
+        }
+        for path in VIEW_FILES.map(|name| self.root.join(name)).iter().filter(|path| path.exists()) {
+            fs::remove_file(path).map_err(Error::io(path, "remove a view of an earlier record"))?;
+        }
+        self.clear_pictures()
     }
 
     /// Removes the pictures of an earlier record from `images/`: what begins with the number of a cell
     /// or `split-`, as every picture of a report does.
-    pub fn clear_pictures(&self) -> Result<()> {
+    fn clear_pictures(&self) -> Result<()> {
         let folder = self.root.join("images");
         let Ok(entries) = fs::read_dir(&folder) else { return Ok(()) };
         for entry in entries.flatten() {

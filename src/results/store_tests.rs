@@ -19,6 +19,19 @@ fn refused(folder: &RecordFolder, what: &[&str]) {
     assert!(what.iter().all(|w| error.contains(w)), "{error}");
 }
 
+/// A report of an earlier record is never left beside a new one, whether or not a report follows.
+#[test]
+fn views_go_with_their_record() {
+    let (_temp, folder, stored) = written();
+    let own = ["images/of-mine.png", "notes.txt"];
+    let views = VIEW_FILES.into_iter().chain(["plots/x.svg", "tables/x.md", "images/000-mis.png"]);
+    let views: Vec<&str> = views.collect();
+    views.iter().chain(&own).for_each(|name| folder.write_view(name, b"").expect("a file"));
+    folder.write(stored.record, stored.arrays).expect("a written record");
+    let left = |names: &[&str]| names.iter().filter(|name| folder.root().join(name).exists()).count();
+    assert_eq!((left(&views), left(&own)), (0, own.len()));
+}
+
 /// Replaces text in a file of the record and, if asked, mends the checksum of record.json.
 fn tamper(folder: &RecordFolder, from: &str, to: &str, mend: bool) {
     let path = folder.record_dir().join("record.json");
