@@ -295,8 +295,8 @@ mod tests {
         assert!(probe.contains("0.7 and 0.3") && probe.contains("uniform"), "{probe}");
         let none = message("preset = \"paper\"\nstrategies = []");
         assert!(none.contains("nothing takes part"), "{none}");
-        let gated = message("strategies = [\"top_to_bottom\"]");
-        assert!(gated.contains("never sampled"), "{gated}");
+        let partial = message("strategies = [\"top_to_bottom\"]");
+        assert!(partial.contains("never sampled"), "{partial}");
         let last_alone = words("strategies = []\nleast_concentration = 1").options();
         assert!(last_alone.is_ok(), "the last vertex is left");
     }

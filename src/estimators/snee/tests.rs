@@ -1,4 +1,4 @@
-//! What holds to the last bit: the gate, and bands that share a walk.
+//! What holds to the last bit: skipped lights, and bands that share a walk.
 
 use std::sync::Arc;
 
@@ -73,7 +73,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
 #[test]
 fn behind_the_gate_it_is_path() {
     for boundary in [ROUGH, SMOOTH, Boundary::Matched] {
-        // 4 pi over the solid angle: 9.9 and 10.1, on either side of the gate.
+        // 4 pi over the solid angle: 9.9 and 10.1, on either side of the limit.
         for (concentration, is_open) in [(1.0, false), (9.9, false), (10.1, true)] {
             let light = cap(4.0 * std::f64::consts::PI / concentration, 1);
             let scene = scene(boundary, &[(10.0, 0.95, 0.3)], light);
