@@ -192,7 +192,7 @@ fn unit_sphere(boundary: Boundary, emission: Emission) -> Scene {
     Scene {
         shape: Arc::new(Shape::Sphere { radius: 1.0 }),
         boundary: vec![boundary],
-        medium: vec![Medium { sigma_t: 10.0, albedo: 0.99, phase }],
+        medium: vec![Medium { sigma_t: 10.0, albedo: 0.99, phase, emission: 0.0 }],
         lights: vec![Light { name: "light".into(), emission }],
         sensor: Sensor::Probe(Probe { ray, paths: PATHS }),
     }

@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
-"""Writes three tables of what the classical dipole makes of a sphere under a uniform sky:
+"""Writes four tables of what the classical dipole makes of a sphere under a uniform sky:
 
     python3 -m venv venv && venv/bin/pip install mpmath
     venv/bin/python scripts/sphere_under_sky.py 0 > experiments/verify/small_spheres.csv
     venv/bin/python scripts/sphere_under_sky.py 1 > experiments/verify/large_spheres.csv
     venv/bin/python scripts/sphere_under_sky.py 2 > experiments/figures/red_tail.csv
+    venv/bin/python scripts/sphere_under_sky.py matched > experiments/verify/matched_spheres.csv
 
 Irradiance that enters is the same at every point, pi L (1 - F_ext), F_ext = 2 int F mu dmu from outside; in chord length
 d the area of a sphere is 2 pi d dd. So the radiance that leaves any point is T(mu) L (1 - F_ext) D with
 D = int_0^2R R_d(d) 2 pi d dd, and the flux that leaves the sphere
     4 pi R^2 int T(mu) L (1 - F_ext) D mu dw = 4 pi^2 R^2 (1 - F_ext)^2 L D,
 with R_d of Jensen, Marschner, Levoy & Hanrahan 2001 (eq. 4) and their coefficients (figure 5), A by the exact Fresnel
-integral. By quadrature with 30 digits: none of it is the program's code.
+integral. By quadrature with 30 digits: none of it is the program's code. `matched` is the small spheres with index 1 and
+no reflection: F = 0, A = 1.
 """
 
 import sys
@@ -61,13 +63,22 @@ def diffused(scattering, absorption, n, radius):
     return 4 * pi**2 * radius**2 * (1 - external) ** 2 * whole
 
 
+matched = sys.argv[1] == "matched"
+which = 0 if matched else int(sys.argv[1])
+if matched:
+    MATERIALS["skin2"] = ((1.09, 1.59, 1.79), (0.013, 0.07, 0.145), 1.3, (5,))
+    MATERIALS["potato"] = ((0.68, 0.70, 0.55), (0.0024, 0.009, 0.12), 1.3, (5,))
+    del MATERIALS["marble"], MATERIALS["wholemilk"]
+
 print("# Flux that leaves a sphere under a uniform sky of radiance 1, W, after diffusing:")
 print("# classical dipole (Jensen et al. 2001), exact Fresnel moments, quadrature with 30 digits.")
 print("# scripts/sphere_under_sky.py writes this file and says how.")
-print("label,material,radius_mm,eta,R,G,B")
+print("label,material,radius_mm,R,G,B" if matched else "label,material,radius_mm,eta,R,G,B")
 for name, (scattering, absorption, n, radii) in MATERIALS.items():
-    if int(sys.argv[1]) >= len(radii):
+    if which >= len(radii):
         continue
-    radius = radii[int(sys.argv[1])]
+    radius = radii[which]
+    n = 1 if matched else n
     values = [nstr(diffused(s, a, n, mpf(str(radius))), 12) for s, a in zip(scattering, absorption)]
-    print(f"{name},{name},{radius},{n},{','.join(values)}")
+    index = "" if matched else f"{n},"
+    print(f"{name},{name},{radius},{index}{','.join(values)}")

@@ -51,7 +51,8 @@
 //! | block | a fixed run of passes: the unit of scheduling and resuming; never enters a result |
 //! | batch | passes whose moments a record keeps together; set by the number of passes alone |
 //! | run | all passes of one estimator in one cell, and what the record keeps of them |
-//! | arm | one of the runs that are timed side by side; the baseline has a second arm as a control |
+//! | arm | one of the runs that are compared by cost |
+//! | interleaved | run by turns, A B .. B A, so that CPU times of the arms can be compared |
 //! | campaign | all that one experiment plans and runs: cells with estimators, or samplers |
 //! | record | what a campaign writes |
 //! | re-run | to run a published experiment again and compare its record |

@@ -121,3 +121,17 @@ fn fresh_streams_and_their_nights() {
     assert!(work.path("e.json").exists());
     work.run("verify x.toml --evidence e.json").exits(2).complains("--fresh-seed");
 }
+
+/// A mistake in the last of three files is told before the first is run.
+#[test]
+fn all_files_are_checked_before_the_first_runs() {
+    let work = Work::with(&equals(1.0));
+    let malformed = equals(1.0).replace("value = 1", "valu = 1");
+    std::fs::write(work.path("y.toml"), malformed).expect("written");
+    // Valid as a text, and its sensor is inside the body.
+    let inside = equals(1.0).replace("[0.2, 0, 3]", "[0.2, 0, 0]");
+    std::fs::write(work.path("z.toml"), inside).expect("written");
+    let found = work.run("verify x.toml y.toml z.toml -q");
+    found.exits(2).complains("unknown key").complains("inside or on the body");
+    assert!(!work.path("results/x").exists(), "nothing was run");
+}

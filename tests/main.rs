@@ -13,6 +13,7 @@ mod judging;
 mod layering;
 mod looks;
 mod pictures;
+mod planted;
 mod published;
 mod reproducibility;
 mod samplers;

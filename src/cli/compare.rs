@@ -144,6 +144,15 @@ fn tell_timing(ratios: &[TimingRatio], out: &mut impl Write) -> std::io::Result<
         number(largest.change),
         interval(largest.interval[0], largest.interval[1]),
     )?;
+    let is_apart = |ratio: &&TimingRatio| !(ratio.before.interleaved && ratio.after.interleaved);
+    let apart = ratios.iter().filter(is_apart).count();
+    if apart > 0 {
+        writeln!(
+            out,
+            "note: {apart} of them were not interleaved in both records: what the machine did between two \
+             estimators is in them"
+        )?;
+    }
     if others.is_empty() {
         return Ok(());
     }

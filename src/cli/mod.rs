@@ -70,6 +70,13 @@ impl Reading {
     fn options(&self) -> LoadOptions {
         LoadOptions { sets: self.set.clone(), setting: self.setting.clone() }
     }
+
+    /// The arguments again, each with a space before it, but for the value of one key.
+    fn arguments_without(&self, key: &str) -> String {
+        let setting = self.setting.iter().map(|name| format!(" --setting {name}"));
+        let others = self.set.iter().filter(|set| set.split('=').next() != Some(key));
+        setting.chain(others.map(|set| format!(" --set '{set}'"))).collect()
+    }
 }
 
 /// How work is carried out; nothing here changes a result.

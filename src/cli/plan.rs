@@ -49,12 +49,13 @@ pub(super) fn run(args: &Args, registry: &Registry) -> Result<u8> {
         println!("about {:.0} s on {threads} threads", total / threads as f64);
     }
 
-    let memory = plan.memory(threads);
+    let memory = plan.memory(threads, true);
     let free = available().map_or("unknown".into(), readable);
     println!(
-        "memory: {} (shapes {}, results {}, working {}); available: {free}",
+        "memory: {} (shapes {}, making them {}, results {}, working {}); available: {free}",
         readable(memory.total()),
         readable(memory.shapes),
+        readable(memory.building),
         readable(memory.results),
         readable(memory.working)
     );

@@ -5,13 +5,15 @@ use std::path::{Path, PathBuf};
 use super::{Reading, Working, listen};
 use crate::error::{Error, Result};
 use crate::experiment::registry::Registry;
+use crate::experiment::schema::Budget;
 use crate::experiment::{Experiment, LoadOptions, load};
+use crate::report::undecided::{Undecided, two_digits_up, undecided};
 use crate::report::{self, tables::verdict_table};
 use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::{atomic, provenance};
 use crate::run::interrupt::Interrupt;
-use crate::run::{Options, Remeasured};
+use crate::run::{Options, Remeasured, build_all};
 use crate::verify::judge::{Case, Judgement, Looks, Measured, judge};
 use crate::verify::junit;
 use crate::verify::levels::{FAMILY_LEVEL, FIRST_LOOK, RETEST_FACTOR};
@@ -70,6 +72,14 @@ struct Judged {
     experiment: Option<Experiment>,
 }
 
+/// What a path names.
+enum Named {
+    /// A record, judged as it is.
+    Record(Judged),
+    /// An experiment, run where it has no record yet.
+    Experiment(Experiment),
+}
+
 /// Everything that verification of one call works with.
 struct Court<'a> {
     registry: &'a Registry,
@@ -101,7 +111,7 @@ pub(super) fn run(args: &Args, registry: &Registry) -> Result<u8> {
             "add a [[claim]] to the experiment, or name one that has some",
         ));
     }
-    tell(&judgement.verdicts, args.verbose);
+    tell(&judgement.verdicts, args.verbose, &subjects, &args.reading);
     write_files(args, &judgement.verdicts)?;
     let alarmed = match &token {
         Some(token) => {
@@ -163,34 +173,56 @@ impl Court<'_> {
         Ok(!alarms.is_empty())
     }
 
-    /// Records that the paths name, run where there is none yet.
+    /// Records that the paths name, run where there is none yet. Everything is read, and everything that
+    /// is wrong with a file is told, before anything runs.
     fn subjects(&self, paths: &[PathBuf]) -> Result<Vec<Judged>> {
-        let mut subjects = Vec::new();
+        let (mut named, mut wrong) = (Vec::new(), Vec::new());
         for path in paths {
             if path.join("record").join("record.json").exists() {
-                let folder = RecordFolder::new(path);
-                let main = folder.read()?;
-                let retest = folder.retest_of(&main)?;
-                subjects.push(Judged { folder, main, retest, experiment: None });
+                named.push(Named::Record(Self::judged(RecordFolder::new(path), None)?));
                 continue;
             }
             for file in experiment_files(path)? {
-                subjects.push(self.measured(load(&file, &self.reading, self.registry)?)?);
+                match self.checked(&file) {
+                    Ok(experiment) => named.push(Named::Experiment(experiment)),
+                    Err(Error::Input(findings)) => wrong.extend(findings),
+                    Err(other) => return Err(other),
+                }
             }
         }
-        Ok(subjects)
+        if !wrong.is_empty() {
+            return Err(Error::Input(wrong));
+        }
+        let measured = |named| match named {
+            Named::Record(judged) => Ok(judged),
+            Named::Experiment(experiment) => self.measured(experiment),
+        };
+        named.into_iter().map(measured).collect()
+    }
+
+    /// What is judged of a folder.
+    fn judged(folder: RecordFolder, experiment: Option<Experiment>) -> Result<Judged> {
+        let main = folder.read()?;
+        let retest = folder.retest_of(&main)?;
+        Ok(Judged { folder, main, retest, experiment })
     }
 
     fn measured(&self, experiment: Experiment) -> Result<Judged> {
         let folder = RecordFolder::new(self.working.folder(&experiment.file.name));
-        let main = if crate::run::has_record(&experiment, &self.working.out) {
-            folder.read()?
-        } else {
+        if !crate::run::has_record(&experiment, &self.working.out) {
             eprintln!("running {}", experiment.file.name);
-            crate::run::run(&experiment, self.registry, &self.working, &self.interrupt)?.1
-        };
-        let retest = folder.retest_of(&main)?;
-        Ok(Judged { folder, main, retest, experiment: Some(experiment) })
+            crate::run::run(&experiment, self.registry, &self.working, &self.interrupt)?;
+        }
+        Self::judged(folder, Some(experiment))
+    }
+
+    /// An experiment, with everything found that `check` finds where it has yet to run.
+    fn checked(&self, file: &Path) -> Result<Experiment> {
+        let experiment = load(file, &self.reading, self.registry)?;
+        if !crate::run::has_record(&experiment, &self.working.out) {
+            build_all(&experiment, self.registry)?;
+        }
+        Ok(experiment)
     }
 
     /// Runs second looks where they are needed; true where any was run.
@@ -273,18 +305,25 @@ fn write_files(args: &Args, verdicts: &[Verdict]) -> Result<()> {
     Ok(())
 }
 
-fn tell(verdicts: &[Verdict], verbose: bool) {
+fn tell(verdicts: &[Verdict], verbose: bool, subjects: &[Judged], reading: &Reading) {
+    let groups = undecided(verdicts);
+    let is_told = |v: &Verdict| {
+        groups.iter().any(|g| g.is_many() && g.verdicts.iter().any(|own| std::ptr::eq(*own, v)))
+    };
     let green = verdicts.iter().filter(|v| v.is_green()).count();
     let shown: Vec<Verdict> = verdicts
         .iter()
         .filter(|v| {
             let is_summary = v.test == Some(TestKind::SumOfSquares);
-            verbose || !v.is_green() || is_summary || v.second_p.is_some()
+            verbose || !(v.is_green() || is_told(v)) || is_summary || v.second_p.is_some()
         })
         .cloned()
         .collect();
     if !shown.is_empty() {
         print!("{}", verdict_table(&shown).to_text());
+    }
+    for group in &groups {
+        println!("{}; {}", group.sentence(), next_step(group, subjects, reading));
     }
     println!(
         "{green} of {} verdicts are green; any of them fails by chance with probability at most \
@@ -292,6 +331,39 @@ fn tell(verdicts: &[Verdict], verbose: bool) {
         verdicts.len()
     );
     tell_power(verdicts);
+}
+
+/// What would decide a group of verdicts: how many passes or draws, in which time, by which command.
+fn next_step(group: &Undecided, subjects: &[Judged], reading: &Reading) -> String {
+    let Some(factor) = group.factor() else {
+        return "no number of passes is known to decide all of them".into();
+    };
+    let name = &group.verdicts[0].experiment;
+    let subject = subjects.iter().find(|subject| subject.main.record.experiment == *name);
+    let run = |subject: &Judged| {
+        let experiment = subject.experiment.as_ref()?;
+        let (key, made) = match (experiment.file.samples, &experiment.file.budget) {
+            (Some(samples), _) => ("samples", samples as f64),
+            (None, Some(Budget::Passes(passes))) => ("budget.passes", *passes as f64),
+            (None, _) => return None,
+        };
+        let cpu: f64 = subject
+            .main
+            .timing
+            .iter()
+            .flat_map(|timing| timing.cells.values())
+            .flat_map(|cell| cell.values())
+            .map(|spent| spent.cpu_seconds)
+            .sum();
+        Some(format!(
+            "about {} CPU s decide them: scatterproof verify {}{} --set {key}={}",
+            two_digits_up(factor * cpu),
+            experiment.path.display(),
+            reading.arguments_without(key),
+            two_digits_up(factor * made)
+        ))
+    };
+    subject.and_then(run).unwrap_or_else(|| format!("{factor:.1} times the passes decide them"))
 }
 
 /// The largest defects that could have gone unseen, by what they are relative to.

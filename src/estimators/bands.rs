@@ -36,6 +36,20 @@ pub(super) trait WalkBands: Clone {
     /// Adds a contribution of the walk's own band, and to every other that the walk scores what it is
     /// there.
     fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64);
+
+    /// Whether the medium emits in a band that a walk of band `own` scores.
+    fn emits(&self, media: &[Medium], own: usize) -> bool;
+
+    /// Adds, for every band that the walk scores, `factor` times the emission that reaches the walk's
+    /// vertex along the next `t` mm of its direction.
+    fn score_emission(
+        &self,
+        scores: &mut Scores,
+        own: ScorePlace,
+        media: &[Medium],
+        t: f64,
+        factor: f64,
+    );
 }
 
 /// Where a contribution counts.
@@ -44,6 +58,7 @@ pub(super) struct ScorePlace {
     pub slot: usize,
     pub band: usize,
     pub class: TransportClass,
+    /// Index of the light; the number of lights stands for the medium's emission.
     pub light: usize,
 }
 
@@ -71,6 +86,22 @@ impl WalkBands for OneBand {
     #[inline]
     fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64) {
         scores.add(own.slot, own.band, own.class, own.light, value);
+    }
+
+    #[inline]
+    fn emits(&self, media: &[Medium], own: usize) -> bool {
+        media[own].emission > 0.0
+    }
+
+    fn score_emission(
+        &self,
+        scores: &mut Scores,
+        own: ScorePlace,
+        media: &[Medium],
+        t: f64,
+        factor: f64,
+    ) {
+        self.score(scores, own, factor * media[own.band].emitted(t));
     }
 }
 
@@ -136,6 +167,26 @@ impl WalkBands for SharedBands {
     fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64) {
         for band in 0..self.count {
             scores.add(own.slot, band, own.class, own.light, self.value[band] * value);
+        }
+    }
+
+    fn emits(&self, media: &[Medium], _: usize) -> bool {
+        media.iter().any(|medium| medium.emission > 0.0)
+    }
+
+    /// The technique has drawn the walk up to the direction of the ray; along the ray it integrates, in
+    /// every band with the extinction of that band. So value and density are those at the ray's vertex.
+    fn score_emission(
+        &self,
+        scores: &mut Scores,
+        own: ScorePlace,
+        media: &[Medium],
+        t: f64,
+        factor: f64,
+    ) {
+        for (band, medium) in media.iter().enumerate() {
+            let value = self.value[band] * factor * medium.emitted(t);
+            scores.add(own.slot, band, own.class, own.light, value);
         }
     }
 }

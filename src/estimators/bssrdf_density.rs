@@ -268,7 +268,12 @@ mod tests {
         let scene = Scene {
             shape: Arc::new(SPHERE),
             boundary: vec![Boundary::Smooth { eta: 1.3 }],
-            medium: vec![Medium { sigma_t: 2.0, albedo: 0.95, phase: HenyeyGreenstein { g: 0.3 } }],
+            medium: vec![Medium {
+                sigma_t: 2.0,
+                albedo: 0.95,
+                phase: HenyeyGreenstein { g: 0.3 },
+                emission: 0.0,
+            }],
             lights: vec![Light { name: "light".into(), emission }],
             sensor: Sensor::Probe(Probe { ray, paths: 16 }),
         };

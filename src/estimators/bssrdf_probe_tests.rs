@@ -22,7 +22,7 @@ use crate::scene::{Emission, Light, Sensor};
 const MODEL: Model = Model::Classical { moments: MomentKind::Exact, outgoing: Outgoing::Plain };
 
 fn medium(sigma_t: f64, albedo: f64, g: f64) -> Medium {
-    Medium { sigma_t, albedo, phase: HenyeyGreenstein { g } }
+    Medium { sigma_t, albedo, phase: HenyeyGreenstein { g }, emission: 0.0 }
 }
 
 /// Radiance 1 from 1 - cos theta < `height` about the zenith: 1 the upper half, 2 everything.

@@ -125,7 +125,12 @@ mod tests {
         for eta in [1.0, 1.3, 1.5] {
             for toward in [DVec3::Z, DVec3::new(0.8, -0.1, 0.5), DVec3::new(-0.9, 0.3, 0.1)] {
                 let wi = toward.normalize();
-                let medium = Medium { sigma_t: 3.0, albedo: 0.8, phase: HenyeyGreenstein { g: 0.4 } };
+                let medium = Medium {
+                    sigma_t: 3.0,
+                    albedo: 0.8,
+                    phase: HenyeyGreenstein { g: 0.4 },
+                    emission: 0.0,
+                };
                 let dir = DVec3::new(0.36, 0.48, -0.8);
                 let exit = Exit { point: DVec3::new(0.3, 0.2, 0.0), normal: DVec3::Z };
                 let sun = Emission::Directional { toward: wi, irradiance: vec![2.0] };

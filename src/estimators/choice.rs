@@ -1,13 +1,22 @@
-//! One light out of several, with probability proportional to its strength.
+//! One source of light out of several, with probability proportional to its strength.
+
+use std::f64::consts::PI;
 
 use crate::sampling::discrete::choose_share;
 use crate::scene::Scene;
 
 /// Probability of choosing each light, per band; all 0 where no light shines.
 pub(super) fn light_shares(scene: &Scene) -> Vec<Vec<f64>> {
+    source_shares(scene, None)
+}
+
+/// The same of every source of light, the emission of the medium as a light that shines from everywhere
+/// with the radiance of a ray of length `emitting`, mm; without it the emission is left out.
+pub(super) fn source_shares(scene: &Scene, emitting: Option<f64>) -> Vec<Vec<f64>> {
     (0..scene.bands())
         .map(|band| {
-            let strengths: Vec<f64> = scene.lights.iter().map(|l| l.strength(band)).collect();
+            let mut strengths: Vec<f64> = scene.lights.iter().map(|l| l.strength(band)).collect();
+            strengths.extend(emitting.map(|length| 4.0 * PI * length * scene.medium[band].emission));
             let total: f64 = strengths.iter().sum();
             let share = |s: &f64| if total > 0.0 { s / total } else { 0.0 };
             strengths.iter().map(share).collect()

@@ -1,21 +1,25 @@
 //! Camera paths over a body whose inside is a BSSRDF: reflection or refraction at every hit of the
 //! surface by roulette with the Fresnel reflectance, and at a refraction (point-cloud note, phase two)
 //!   L_o = L_e + L_t + L_r
-//! with L_e = 0 (no medium here emits), L_t the light that goes straight through, and L_r gathered from
-//! the surface by whoever walks.
+//! with L_e what the medium emits along the refracted ray, L_t the light that goes straight through, and
+//! L_r gathered from the surface by whoever walks.
 //!
 //! The branch of refraction is taken with probability T21, so that what is gathered there must leave T21
 //! out. L_t follows the refracted ray to the other side with transmittance exp(-sigma_t* t), leaves with
 //! the transmittance of the boundary as a weight (the model accounts for what is reflected there) and
 //! continues outside as the same path.
 //!
+//! L_e follows the same ray: over its length t inside, radiance epsilon (1 - e^(-sigma_t* t)) / sigma_t*
+//! arrives at the exit, and loses eta^2 on its way out. Emission that is scattered, or reflected inside,
+//! before it leaves is no part of it: a BSSRDF carries light from surface to surface only.
+//!
 //! Bands that refract alike share a path; with dispersion each index has its own.
 
 use std::sync::Arc;
 
 use super::choice::{choose_light, light_shares};
+use super::illumination::unscattered_notes;
 use super::illumination::{Entrance, Illumination};
-use super::walk::unscattered_notes;
 use super::{Anomaly, Cost, Scores, TransportClass};
 use crate::error::{Error, Result};
 use crate::geometry::{FaceId, Hit, Ray, Side};
@@ -23,6 +27,7 @@ use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 use crate::optics::bssrdf::{Bssrdf, Entry, Exit, Model};
 use crate::optics::fresnel::fresnel;
+use crate::optics::medium::Medium;
 use crate::sampling::distance::transmittance;
 use crate::sampling::stream::{PassKey, Purpose, Stream};
 use crate::scene::Scene;
@@ -318,11 +323,13 @@ impl CameraPath<'_> {
             throughput: &self.throughput,
             slot: self.slot,
         };
-        gather.gather(&emergence, &mut self.streams, scores);
-        if self.bssrdf.straight { self.go_through(scores) } else { None }
+        if !self.bssrdf.scene.lights.is_empty() {
+            gather.gather(&emergence, &mut self.streams, scores);
+        }
+        if self.bssrdf.straight || self.bssrdf.scene.emits() { self.go_through(scores) } else { None }
     }
 
-    /// Goes straight to the other side and out.
+    /// Goes straight to the other side, with what is emitted on the way there, and out.
     fn go_through(&mut self, scores: &mut Scores) -> Option<()> {
         scores.count(Cost::Rays);
         let shape = &self.bssrdf.scene.shape;
@@ -332,6 +339,10 @@ impl CameraPath<'_> {
             }
             return None; // down a half-space for good
         };
+        self.score_emission(hit.t, scores);
+        if !self.bssrdf.straight {
+            return None;
+        }
         scores.count(Cost::BoundaryEvents);
         let frame = Frame::about(hit.shading_normal);
         let wo = frame.to_local(-self.ray.dir);
@@ -354,6 +365,18 @@ impl CameraPath<'_> {
         self.ray.dir = frame.to_world(DVec3::new(-wo.x * self.eta, -wo.y * self.eta, surface.cos_t));
         self.from = Some(hit.face);
         self.stays(&hit, Side::Outside, scores)
+    }
+
+    /// Scores L_e of a ray that runs for `t` mm inside.
+    fn score_emission(&self, t: f64, scores: &mut Scores) {
+        let BssrdfScene { scene, models, .. } = self.bssrdf;
+        for (&band, throughput) in self.bands.iter().zip(&self.throughput) {
+            let medium = Medium { sigma_t: models[band].straight_sigma_t, ..scene.medium[band] };
+            if medium.emission > 0.0 {
+                let value = throughput * medium.emitted(t) / (self.eta * self.eta);
+                scores.add(self.slot, band, TransportClass::Surface, scene.lights.len(), value);
+            }
+        }
     }
 
     /// Whether the new direction is on the side where it should be.

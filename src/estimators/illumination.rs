@@ -5,6 +5,7 @@ use super::choice::{choose_light, light_shares};
 use super::{Anomaly, Cost, Scores};
 use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, Frame};
+use crate::optics::boundary::Boundary;
 use crate::optics::fresnel::fresnel;
 use crate::scene::Scene;
 
@@ -91,4 +92,17 @@ impl Entrance {
         let shadow_ray = Ray { origin: hit.point, dir: wi };
         (!scene.shape.occluded(&shadow_ray, Some(hit.face))).then_some(entrance)
     }
+}
+
+/// Notes on parallel light that every walk lacks at a matched boundary.
+pub(super) fn unscattered_notes(scene: &Scene) -> impl Iterator<Item = String> {
+    let is_matched = scene.boundary.contains(&Boundary::Matched);
+    let parallel = scene.lights.iter().filter(move |light| light.is_directional() && is_matched);
+    parallel.map(|light| {
+        format!(
+            "no path from a sensor follows directional light `{}` straight through the matched body: unscattered \
+             light (class surface) is excluded from this estimator's result",
+            light.name
+        )
+    })
 }

@@ -1,4 +1,4 @@
-//! Analog tracing from the lights into sensors of finite extent.
+//! Analog tracing from the lights, and from a medium that emits, into sensors of finite extent.
 //!
 //! A photon draws a light, a direction from it and a place, and follows the light: it is reflected or
 //! refracted at the boundary, flies distances of density sigma_t exp(-sigma_t t), is absorbed with
@@ -19,6 +19,15 @@
 //! with the irradiance in place of L / p for parallel light. Photons that miss the body score nothing:
 //! light that has not met the body is not scored.
 //!
+//! Emission. A body that emits epsilon per length, in every direction, sends out epsilon dV dw. Lines of
+//! uniform direction through points that are uniform on the disc across it cover dV dw = dA dw ds, so a
+//! photon of the medium draws such a line, starts uniformly on the parts of it inside the body, l mm
+//! together, flies along it, and carries
+//!   finite body     epsilon 4 pi * pi R^2 * l / (P N); nothing where the line misses the body
+//!   slab            epsilon 4 pi * d / (P N) per area, its depth uniform over the thickness d
+//! which is power inside: no index enters. P is in proportion to power: of lights that through the disc
+//! of area pi R^2 (or per area of a face), of the medium 4 pi epsilon V (or 4 pi epsilon d).
+//!
 //! At the boundary. Power flows from direction a (towards where the photon came from) into b, drawn with
 //! the density pdf(b | a) of [`Boundary::sample`] for wo = a. Its weight is f(b; a) |cos_b| / pdf(b |
 //! a), f(wo; wi) being the value of radiance's BSDF, which obeys f(b; a) / n_b^2 = f(a; b) / n_a^2. The
@@ -37,7 +46,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::choice::{choose_light, light_shares};
+use super::choice::{choose_light, source_shares};
 use super::crossing::{other, radiance_scale};
 use super::{
     Anomaly, Bias, Cost, Estimator, EstimatorKind, History, Scores, Sensors, Serves, read_options,
@@ -47,9 +56,12 @@ use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Shape, Side};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::{Boundary, Event};
 use crate::optics::medium::Medium;
+use crate::sampling::discrete::choose_share;
 use crate::sampling::distance::sample_exponential;
 use crate::sampling::stream::{PassKey, Purpose, Stream};
+use crate::sampling::warp::{pdf_cap, square_to_cap};
 use crate::scene::Scene;
+use crate::scene::sensor::{PathMeasure, SensorClass};
 
 /// Options of `light_trace`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
@@ -67,7 +79,7 @@ pub struct LightTracer {
     /// Photons per band and pass.
     photons: usize,
     bounds: Option<BoundingSphere>,
-    /// Per band: probability of choosing each light.
+    /// Per band: probability of choosing each light, and after them the medium where it emits.
     choice: Vec<Vec<f64>>,
 }
 
@@ -75,8 +87,8 @@ impl LightTracer {
     /// `light_trace` in experiment files.
     pub const KIND: EstimatorKind = EstimatorKind {
         kind: "light_trace",
-        doc: "analog tracing from the lights, into `flux`, `rings` or `acceptance_sr`; unbiased at true normals",
-        serves: Serves { sensors: Sensors::Receiving, ..Serves::ALL },
+        doc: "analog tracing from the lights, into `flux`, `rings`, `path_length` or `acceptance_sr`; unbiased at true normals",
+        serves: Serves { sensors: Sensors::Receiving, emission: true, ..Serves::ALL },
         options_schema: || schemars::schema_for!(LightTraceOptions),
         build: |options, scene| {
             let LightTraceOptions { paths } = read_options(options)?;
@@ -88,14 +100,14 @@ impl LightTracer {
     ///
     /// # Errors
     /// A scene that it does not serve: photons hit no single point or direction; a sensor whose unit
-    /// does not fit the body; no photons.
+    /// does not fit the body; no photons; emission of infinite power, or that never ends.
     pub fn new(scene: Arc<Scene>, photons: Option<usize>) -> Result<LightTracer> {
         LightTracer::KIND.check(&scene)?;
         let bounds = scene.shape.bounds();
         if !scene.sensor.receives(bounds.is_some()) {
             return Err(Error::input_help(
                 "light_trace: the sensor and the body do not fit",
-                "`rings` and the `flux` of faces need a half-space or slab; other `flux` and `acceptance_sr` a \
+                "`rings` and the `flux` of faces need a half-space or slab; other `flux`, `path_length` and `acceptance_sr` a \
                  finite body",
             ));
         }
@@ -106,7 +118,8 @@ impl LightTracer {
                 "trace at least one photon a pass",
             ));
         }
-        Ok(LightTracer { bounds, photons, choice: light_shares(&scene), scene })
+        let emitting = if scene.emits() { Some(emitting_length(&scene, bounds)?) } else { None };
+        Ok(LightTracer { bounds, photons, choice: source_shares(&scene, emitting), scene })
     }
 }
 
@@ -133,6 +146,31 @@ impl Estimator for LightTracer {
     }
 }
 
+/// Emitted power over emission and over the power of a sky of radiance 1: the mean length of a ray through
+/// the sphere, or of one along the normal through the slab, inside the body.
+fn emitting_length(scene: &Scene, bounds: Option<BoundingSphere>) -> Result<f64> {
+    let is_trap = |(boundary, medium): (&Boundary, &Medium)| {
+        matches!(boundary, Boundary::Smooth { eta } if *eta > 1.0) && medium.sigma_t == 0.0
+    };
+    if scene.boundary.iter().zip(&scene.medium).any(is_trap) {
+        return Err(Error::input_help(
+            "light_trace: without extinction, light that the medium emits is reflected inside a smooth boundary \
+             for ever",
+            "let the medium absorb a little, or use path",
+        ));
+    }
+    match (&*scene.shape, scene.shape.volume().zip(bounds)) {
+        (_, Some((volume, bounds))) => {
+            Ok(volume / (std::f64::consts::PI * bounds.radius * bounds.radius))
+        }
+        (Shape::Slab { thickness }, None) => Ok(*thickness),
+        _ => Err(Error::input_help(
+            "light_trace: a half-space that emits has infinite power",
+            "use path, or a slab",
+        )),
+    }
+}
+
 /// Part of a body's size by which rounding may put a medium vertex outside its bounding sphere.
 const ROUNDING: f64 = 1e-9;
 
@@ -143,11 +181,14 @@ struct Photon<'a> {
     boundary: Boundary,
     medium: Medium,
     band: usize,
+    /// Index of its light; the number of lights stands for the medium's emission.
     light: usize,
     ray: Ray,
     from: Option<FaceId>,
     power: f64,
     history: History,
+    /// What a sensor of path lengths scores.
+    measure: PathMeasure,
     stream: Stream,
     scores: &'a mut Scores,
 }
@@ -178,6 +219,42 @@ fn start(
     }
 }
 
+/// Where a photon starts that the medium emits along `dir`, and the factor from emission over density to
+/// its power: `place` places its line, `u` the start on the line. `None` where the line misses the body.
+fn start_inside(
+    shape: &Shape,
+    bounds: Option<BoundingSphere>,
+    dir: DVec3,
+    place: [f64; 2],
+    u: f64,
+    scores: &mut Scores,
+) -> Option<(Ray, f64)> {
+    let Some(bounds) = bounds else {
+        let Shape::Slab { thickness } = shape else { return None };
+        return Some((Ray { origin: DVec3::new(0.0, 0.0, -thickness * u), dir }, *thickness));
+    };
+    let mut chords = Vec::new();
+    let (mut ray, mut from) = (bounds.beam(-dir, place), None);
+    scores.count(Cost::Rays);
+    while let Some(enters) = shape.intersect(&ray, Side::Outside, from, f64::INFINITY) {
+        ray.origin = enters.point;
+        scores.count_many(Cost::Rays, 2);
+        let leaves = shape.intersect(&ray, Side::Inside, Some(enters.face), f64::INFINITY);
+        let Some(leaves) = leaves else {
+            scores.note(Anomaly::LostRay);
+            return None;
+        };
+        chords.push((enters.point, leaves.t));
+        (ray.origin, from) = (leaves.point, Some(leaves.face));
+    }
+    let length: f64 = chords.iter().map(|(_, length)| length).sum();
+    let (chord, _) = choose_share(chords.iter().map(|(_, own)| own / length), u)?;
+    let before: f64 = chords[..chord].iter().map(|(_, length)| length).sum();
+    let (point, own) = chords[chord];
+    let origin = point + dir * (u * length - before).clamp(0.0, own);
+    Some((Ray { origin, dir }, std::f64::consts::PI * bounds.radius * bounds.radius * length))
+}
+
 impl<'a> Photon<'a> {
     /// Traces photon `index` of a pass; returns how many numbers its walk drew.
     fn trace(
@@ -193,14 +270,7 @@ impl<'a> Photon<'a> {
         let place = emission.draw2();
         scores.count(Cost::Paths);
         let Some((light, choice)) = choose_light(&tracer.choice[band], u) else { return 0 };
-        let sample = scene.lights[light].sample(band, [v, w]);
-        let Some((ray, extent)) = start(&scene.shape, tracer.bounds, sample.wi, place) else { return 0 };
-        scores.count(Cost::Rays);
-        let Some(hit) = scene.shape.intersect(&ray, Side::Outside, None, f64::INFINITY) else {
-            return 0; // light that has not met the body is not scored
-        };
-        let emitted = sample.radiance / sample.pdf.unwrap_or(1.0);
-        let photon = Photon {
+        let photon = |ray: Ray, power: f64, scores: &'a mut Scores| Photon {
             scene,
             bounds: tracer.bounds,
             boundary: scene.boundary[band],
@@ -209,17 +279,36 @@ impl<'a> Photon<'a> {
             light,
             ray,
             from: None,
-            power: emitted / choice * extent / tracer.photons as f64,
+            power: power / tracer.photons as f64,
             history: History::default(),
+            measure: scene.sensor.measure(),
             stream: key.stream(index as u64, Purpose::Walk),
             scores,
         };
-        photon.run(hit)
+        let Some(light) = scene.lights.get(light) else {
+            let dir = square_to_cap(2.0, [v, w]);
+            let start = start_inside(&scene.shape, tracer.bounds, dir, place, emission.draw(), scores);
+            let Some((ray, extent)) = start else { return 0 };
+            let emitted = scene.medium[band].emission / pdf_cap(2.0);
+            let mut photon = photon(ray, emitted / choice * extent, scores);
+            return match photon.walk_inside() {
+                Some(hit) => photon.run(hit, Side::Inside),
+                None => photon.stream.draws(),
+            };
+        };
+        let sample = light.sample(band, [v, w]);
+        let Some((ray, extent)) = start(&scene.shape, tracer.bounds, sample.wi, place) else { return 0 };
+        scores.count(Cost::Rays);
+        let Some(hit) = scene.shape.intersect(&ray, Side::Outside, None, f64::INFINITY) else {
+            return 0; // light that has not met the body is not scored
+        };
+        let emitted = sample.radiance / sample.pdf.unwrap_or(1.0);
+        photon(ray, emitted / choice * extent, scores).run(hit, Side::Outside)
     }
 
-    /// Runs from a first hit until the photon is absorbed or leaves.
-    fn run(mut self, hit: Hit) -> u64 {
-        let mut side = Side::Outside;
+    /// Runs from a first hit, met from `side`, until the photon is absorbed or leaves.
+    fn run(mut self, hit: Hit, side: Side) -> u64 {
+        let mut side = side;
         let mut hit = hit;
         loop {
             let Some(next_side) = self.cross(&hit, side) else { return self.stream.draws() };
@@ -241,7 +330,10 @@ impl<'a> Photon<'a> {
             let t = sample_exponential(self.medium.sigma_t, self.stream.draw());
             self.scores.count(Cost::Rays);
             match self.scene.shape.intersect(&self.ray, Side::Inside, self.from, t) {
-                Some(hit) => return Some(hit),
+                Some(hit) => {
+                    self.measure.fly(&self.ray, hit.t);
+                    return Some(hit);
+                }
                 None if t == f64::INFINITY => {
                     // Without extinction a half-space swallows the photon; a finite body lets none go.
                     if self.bounds.is_some() {
@@ -256,6 +348,7 @@ impl<'a> Photon<'a> {
 
     /// A scattering event at distance `t`; `None` where the photon ends.
     fn scatter(&mut self, t: f64) -> Option<()> {
+        self.measure.fly(&self.ray, t);
         self.ray.origin = self.ray.at(t);
         self.from = None;
         if let Some(bounds) = self.bounds
@@ -278,11 +371,19 @@ impl<'a> Photon<'a> {
     fn fly_outside(&mut self) -> Option<Hit> {
         self.scores.count(Cost::Rays);
         let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
+        // Emission has come in nowhere: for rings it leaves as far away as can be.
+        let emitted = self.light == self.scene.lights.len();
+        let out = match self.scene.sensor.class() {
+            SensorClass::Entries if emitted => Ray { origin: DVec3::INFINITY, ..self.ray },
+            _ => self.ray,
+        };
         if hit.is_none()
-            && let Some((slot, factor)) = self.scene.sensor.receive(&self.ray)
+            && let Some((slot, factor)) = self.scene.sensor.receive(&out)
         {
-            let value = self.power * factor;
-            self.scores.add(slot, self.band, self.history.class(), self.light, value);
+            let (value, class) = (self.power * factor, self.history.class());
+            for (slot, times) in self.measure.slots(slot) {
+                self.scores.add(slot, self.band, class, self.light, times * value);
+            }
         }
         hit
     }
@@ -291,6 +392,7 @@ impl<'a> Photon<'a> {
     /// ends.
     fn cross(&mut self, hit: &Hit, side: Side) -> Option<Side> {
         self.from = Some(hit.face);
+        self.measure.meet(side);
         self.ray.origin = hit.point;
         if self.boundary == Boundary::Matched {
             return Some(other(side));

@@ -29,7 +29,7 @@ fn sun(toward: DVec3, irradiance: f64) -> Light {
 }
 
 fn medium(sigma_t: f64, albedo: f64, g: f64) -> Medium {
-    Medium { sigma_t, albedo, phase: HenyeyGreenstein { g } }
+    Medium { sigma_t, albedo, phase: HenyeyGreenstein { g }, emission: 0.0 }
 }
 
 fn scene(shape: Shape, boundary: Boundary, medium: Medium, lights: Vec<Light>, sensor: Sensor) -> Scene {

@@ -46,4 +46,10 @@ pub const KINDS: &[EstimatorKind] = &[
 ];
 
 #[cfg(test)]
+mod emission_tests;
+#[cfg(test)]
+mod path_length_tests;
+#[cfg(test)]
 mod rings_tests;
+#[cfg(test)]
+mod streams_tests;

@@ -23,7 +23,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::bands::OneBand;
-use super::walk::{CameraWalk, Field, Path, Unrivalled, unscattered_notes};
+use super::illumination::unscattered_notes;
+use super::walk::{CameraWalk, Field, Path, Unrivalled};
 use super::{Estimator, EstimatorKind, Scores, Serves, read_options};
 use crate::error::Result;
 use crate::optics::boundary::Boundary;
@@ -52,7 +53,7 @@ impl PathTracer {
     pub const KIND: EstimatorKind = EstimatorKind {
         kind: "path",
         doc: "unidirectional path tracing with MIS between BSDF and light sampling; unbiased",
-        serves: Serves::FROM_OUTSIDE,
+        serves: Serves { emission: true, ..Serves::WALKS },
         options_schema: || schemars::schema_for!(PathOptions),
         build: |options, scene| {
             let PathOptions { roulette } = read_options(options)?;

@@ -24,7 +24,7 @@ fn scene(shape: Shape, boundary: Boundary, medium: Medium, lights: Vec<Light>, r
 }
 
 fn medium(sigma_t: f64, albedo: f64, g: f64) -> Medium {
-    Medium { sigma_t, albedo, phase: HenyeyGreenstein { g } }
+    Medium { sigma_t, albedo, phase: HenyeyGreenstein { g }, emission: 0.0 }
 }
 
 fn down() -> Ray {

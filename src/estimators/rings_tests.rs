@@ -24,7 +24,8 @@ const MODEL: Model = Model::Classical { moments: MomentKind::Exact, outgoing: Ou
 const SMOOTH: Boundary = Boundary::Smooth { eta: 1.3 };
 const GGX: Boundary =
     Boundary::Rough { eta: 1.4, facets: Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.4 } };
-const MEDIUM: Medium = Medium { sigma_t: 2.0, albedo: 0.9, phase: HenyeyGreenstein { g: 0.3 } };
+const MEDIUM: Medium =
+    Medium { sigma_t: 2.0, albedo: 0.9, phase: HenyeyGreenstein { g: 0.3 }, emission: 0.0 };
 const EDGES: [f64; 5] = [0.05, 0.2, 0.5, 1.0, 3.0];
 
 /// Radiance 1 from the upper half or, with height 2, from everywhere.
@@ -93,7 +94,7 @@ fn rings_of_the_classical_dipole() {
         integrate(|mu| 2.0 * mu * (1.0 - fresnel(mu, eta).reflectance), 0.0, 1.0, 1e-13).value
     };
     let (passed, kept) = (moment(1.3), 1.0 - moment(1.0 / 1.3));
-    let Medium { sigma_t, albedo, phase } = MEDIUM;
+    let Medium { sigma_t, albedo, phase, .. } = MEDIUM;
     let (sigma_a, sigma_s) = (sigma_t * (1.0 - albedo), sigma_t * albedo * (1.0 - phase.g));
     let reduced = sigma_a + sigma_s;
     let s = (3.0 * sigma_a * reduced).sqrt();

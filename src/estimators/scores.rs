@@ -1,7 +1,8 @@
 //! Scores of one pass: `[observable][band]`, and counts of work and of anomalies.
 //!
 //! Observables: for each region of the sensor that is split, its total, its transport classes, and
-//! (with more than one light) each light's share; for the other regions the total. Pixels beside them.
+//! (with more than one source of light) the share of each; for the other regions the total. Pixels
+//! beside them.
 
 use super::TransportClass;
 use crate::scene::sensor::SensorRegion;
@@ -105,7 +106,8 @@ pub struct ObservableName {
 pub struct Layout {
     sensor: Sensor,
     bands: usize,
-    lights: usize,
+    /// Sources of light whose shares are kept; 0 where there is only one.
+    sources: usize,
     regions: Vec<SensorRegion>,
     split_regions: usize,
     names: Vec<ObservableName>,
@@ -115,24 +117,24 @@ impl Layout {
     /// The layout of a scene.
     pub fn new(scene: &Scene) -> Layout {
         let mut names = Vec::new();
+        let sources: Vec<&str> = scene.sources().collect();
+        let sources = if sources.len() > 1 { &sources[..] } else { &[] };
         let observable = |name: &str, class| ObservableName { name: name.into(), class };
         let regions = scene.sensor.regions();
         for region in &regions {
             names.push(observable(&region.name, "all"));
             if region.split {
                 names.extend(TransportClass::ALL.map(|class| observable(&region.name, class.name())));
-                if scene.lights.len() > 1 {
-                    names.extend(scene.lights.iter().map(|light| ObservableName {
-                        name: format!("{}@{}", region.name, light.name),
-                        class: "all",
-                    }));
-                }
+                names.extend(sources.iter().map(|source| ObservableName {
+                    name: format!("{}@{source}", region.name),
+                    class: "all",
+                }));
             }
         }
         Layout {
             sensor: scene.sensor.clone(),
             bands: scene.bands(),
-            lights: if scene.lights.len() > 1 { scene.lights.len() } else { 0 },
+            sources: sources.len(),
             split_regions: regions.iter().filter(|region| region.split).count(),
             regions,
             names,
@@ -164,9 +166,9 @@ impl Layout {
         self.sensor.pixels().map_or(0, |(width, height)| width * height)
     }
 
-    /// Observables of one split region: total, classes, lights.
+    /// Observables of one split region: total, classes, sources.
     fn stride(&self) -> usize {
-        1 + TransportClass::ALL.len() + self.lights
+        1 + TransportClass::ALL.len() + self.sources
     }
 }
 
@@ -202,9 +204,10 @@ impl Scores {
         self.pixels.fill(0.0);
     }
 
-    /// Adds a contribution to a slot of the sensor: its pixel, its regions, its class, its light.
+    /// Adds a contribution to a slot of the sensor: its pixel, its regions, its class, its source: the
+    /// index of a light, or the number of lights for the medium's emission.
     #[inline]
-    pub fn add(&mut self, slot: usize, band: usize, class: TransportClass, light: usize, value: f64) {
+    pub fn add(&mut self, slot: usize, band: usize, class: TransportClass, source: usize, value: f64) {
         if !value.is_finite() {
             self.anomalies[Anomaly::NonFinite as usize] += 1;
             return;
@@ -220,8 +223,8 @@ impl Scores {
                 let first = region * layout.stride();
                 self.observables[first * bands + band] += share;
                 self.observables[(first + 1 + class as usize) * bands + band] += share;
-                if layout.lights > 0 {
-                    self.observables[(first + 1 + TransportClass::ALL.len() + light) * bands + band] +=
+                if layout.sources > 0 {
+                    self.observables[(first + 1 + TransportClass::ALL.len() + source) * bands + band] +=
                         share;
                 }
             } else {

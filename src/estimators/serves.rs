@@ -1,4 +1,4 @@
-//! Which scenes an estimator serves: by sensor, boundary and body.
+//! Which scenes an estimator serves: by sensor, boundary, body and medium.
 
 use crate::error::{Error, Result};
 use crate::optics::boundary::Boundary;
@@ -14,6 +14,8 @@ pub struct Serves {
     pub boundaries: &'static [BoundaryKind],
     /// Extents of bodies that the estimator serves.
     pub bodies: Bodies,
+    /// Whether it counts light that the medium emits; if not, media that emit are refused.
+    pub emission: bool,
 }
 
 /// Sensors, by what an estimator must be able to do for them.
@@ -21,7 +23,9 @@ pub struct Serves {
 pub enum Sensors {
     /// All sensors.
     All,
-    /// Sensors whose rays start outside the body.
+    /// Sensors whose rays start outside the body, those of path lengths included.
+    Walks,
+    /// Sensors whose rays start outside the body and that do not depend on what paths do inside.
     Outside,
     /// Sensors whose rays start outside the body and that do not depend on where light entered.
     WithoutEntries,
@@ -52,12 +56,16 @@ pub enum Bodies {
 }
 
 impl Serves {
-    /// No restriction: every scene is served.
+    /// Every scene whose medium does not emit: an estimator has to say that it counts emission.
     pub const ALL: Serves = Serves {
         sensors: Sensors::All,
         boundaries: &[BoundaryKind::Matched, BoundaryKind::Smooth, BoundaryKind::Rough],
         bodies: Bodies::All,
+        emission: false,
     };
+
+    /// Scenes whose sensor looks at the body from outside, path lengths included.
+    pub const WALKS: Serves = Serves { sensors: Sensors::Walks, ..Serves::ALL };
 
     /// Scenes whose sensor looks at the body from outside.
     pub const FROM_OUTSIDE: Serves = Serves { sensors: Sensors::Outside, ..Serves::ALL };
@@ -93,6 +101,13 @@ impl Serves {
                 "use a finite body, or an estimator for all bodies (`scatterproof list estimators`)",
             ));
         }
+        if !self.emission && scene.emits() {
+            return Err(Error::input_help(
+                format!("{name} does not count light that the medium emits"),
+                "use path, snee, bidirectional, light_trace or point_cloud, or leave out \
+                 `object.medium.emission_per_mm`",
+            ));
+        }
         Ok(())
     }
 }
@@ -101,7 +116,8 @@ impl Sensors {
     fn contain(self, sensor: &Sensor) -> bool {
         match self {
             Sensors::All => true,
-            Sensors::Outside => sensor.class() != SensorClass::Inside,
+            Sensors::Walks => sensor.class() != SensorClass::Inside,
+            Sensors::Outside => matches!(sensor.class(), SensorClass::Outside | SensorClass::Entries),
             Sensors::WithoutEntries => sensor.class() == SensorClass::Outside,
             Sensors::Vertex => sensor.class() == SensorClass::Inside,
             Sensors::Receiving => sensor.receives(true) || sensor.receives(false),
@@ -110,13 +126,21 @@ impl Sensors {
 
     fn refuse(self, name: &str, sensor: &Sensor) -> Error {
         match (self, sensor.class()) {
-            (Sensors::Outside | Sensors::WithoutEntries, SensorClass::Inside) => Error::input_help(
-                format!("{name} starts its paths outside the body, the sensor `vertex` is inside"),
-                "use two_bounce, or another sensor",
-            ),
+            (Sensors::Walks | Sensors::Outside | Sensors::WithoutEntries, SensorClass::Inside) => {
+                Error::input_help(
+                    format!("{name} starts its paths outside the body, the sensor `vertex` is inside"),
+                    "use two_bounce, or another sensor",
+                )
+            }
             (Sensors::WithoutEntries, SensorClass::Entries) => Error::input_help(
                 format!("{name} does not keep where light came in, by which the sensor `rings` counts"),
                 "use light_trace, path, bssrdf_probe or bssrdf_rays, or the sensor `flux`",
+            ),
+            (Sensors::Outside | Sensors::WithoutEntries, SensorClass::Lengths) => Error::input_help(
+                format!(
+                    "{name} does not keep how far its light went inside, as the sensor `path_length` asks"
+                ),
+                "use path or light_trace, or the sensor `flux`",
             ),
             _ => Error::input_help(
                 format!("{name} cannot serve this sensor"),
@@ -128,23 +152,29 @@ impl Sensors {
     fn names(self) -> &'static str {
         match self {
             Sensors::All => "every sensor",
-            Sensors::Outside => "every sensor except `vertex`",
-            Sensors::WithoutEntries => "every sensor except `vertex` and `rings`",
+            Sensors::Walks => "every sensor except `vertex`",
+            Sensors::Outside => "every sensor except `vertex` and `path_length`",
+            Sensors::WithoutEntries => "every sensor except `vertex`, `rings` and `path_length`",
             Sensors::Vertex => "the sensor `vertex`",
-            Sensors::Receiving => "`flux`, `rings`, and `orthographic` with `acceptance_sr`",
+            Sensors::Receiving => {
+                "`flux`, `rings`, `path_length`, and `orthographic` with `acceptance_sr`"
+            }
         }
     }
 }
 
 impl std::fmt::Display for Serves {
-    /// Sensors, boundaries and bodies; what is not restricted is left out.
+    /// Sensors, boundaries and bodies, where they are restricted, and media that emit.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.sensors.names())?;
         if self.boundaries != Serves::ALL.boundaries {
             let names: Vec<&str> = self.boundaries.iter().map(|b| b.name()).collect();
             write!(f, "; {} boundaries", names.join(" or "))?;
         }
-        if self.bodies == Bodies::Finite { write!(f, "; finite bodies") } else { Ok(()) }
+        if self.bodies == Bodies::Finite {
+            write!(f, "; finite bodies")?;
+        }
+        if self.emission { write!(f, "; media that emit") } else { Ok(()) }
     }
 }
 

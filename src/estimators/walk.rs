@@ -8,6 +8,13 @@
 //! so that U itself, which underflows in thick media, is never formed: a light sample has density p_L, a
 //! BSDF sample p_B, a rival p_R / U. Roulette is in no density: each walk divides by its own survival,
 //! and weights without it still sum to 1.
+//!
+//! Emission. What the medium emits along a flight is no end of a path that anything else samples: each
+//! flight inside, from its vertex to the boundary whatever the distance drawn, scores
+//!   throughput * emission (1 - e^(-sigma_t t_b)) / sigma_t,
+//! t_b being the distance of the boundary: the mean, over the distance, of scoring at collisions
+//! (emission / sigma_t) and by track length (emission times length), and exact for a ray that is not
+//! scattered. It is radiance inside; the throughput holds the 1 / eta^2 of its way out.
 
 use std::sync::Arc;
 
@@ -25,6 +32,7 @@ use crate::optics::medium::Medium;
 use crate::sampling::distance::{sample_exponential, transmittance};
 use crate::sampling::stream::{PassKey, Purpose, Stream};
 use crate::scene::Scene;
+use crate::scene::sensor::PathMeasure;
 
 /// Russian roulette: when a path is ended by chance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -195,10 +203,14 @@ pub(super) struct CameraWalk<'a, R, B> {
     /// The throughput without radiance's eta^2, which roulette compares with its threshold.
     survival: f64,
     pub history: History,
+    /// What a sensor of path lengths scores.
+    measure: PathMeasure,
     drawn: DirectionDraw,
     exit: Option<WalkExit>,
     /// The latest event was a reflection by a smooth boundary, met from outside.
     is_mirrored: bool,
+    /// The medium emits in a band that the walk scores.
+    emits: bool,
     stream: Stream,
     light_stream: Stream,
     pub scores: &'a mut Scores,
@@ -267,9 +279,11 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             throughput: start.weight,
             survival: 1.0,
             history: History::default(),
+            measure: scene.sensor.measure(),
             drawn: DirectionDraw::Alone,
             exit: None,
             is_mirrored: false,
+            emits: bands.emits(&scene.medium, band),
             stream: key.stream(index as u64, Purpose::Walk),
             light_stream: key.stream(index as u64, Purpose::Light),
             scores,
@@ -300,7 +314,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     fn walk_inside(&mut self) -> Option<Hit> {
         loop {
             let t = self.flight();
-            match self.scene.shape.intersect(&self.ray, Side::Inside, self.from, t) {
+            match self.end_of_flight(t) {
                 Some(hit) => {
                     self.drawn = match self.drawn {
                         DirectionDraw::Competing(pdf) if self.matched() => {
@@ -309,6 +323,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                         drawn => drawn,
                     };
                     self.bands.flight(&self.scene.medium, hit.t, false);
+                    self.measure.fly(&self.ray, hit.t);
                     return Some(hit);
                 }
                 None if t == f64::INFINITY => {
@@ -330,6 +345,27 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         sample_exponential(self.medium.sigma_t, self.stream.draw())
     }
 
+    /// Where the boundary ends a flight of length `t`, if it does; scores what the medium emits on the
+    /// way to the boundary, which is then asked for however far it is.
+    #[inline]
+    fn end_of_flight(&mut self, t: f64) -> Option<Hit> {
+        let shape = &self.scene.shape;
+        if !self.emits {
+            return shape.intersect(&self.ray, Side::Inside, self.from, t);
+        }
+        let hit = shape.intersect(&self.ray, Side::Inside, self.from, f64::INFINITY);
+        if hit.is_none() && self.bounds.is_some() {
+            return None; // a lost ray, which `arrive` counts
+        }
+        let reach = hit.map_or(f64::INFINITY, |hit| hit.t);
+        // Emission has come in nowhere: of rings it counts in no ring, which is the slot of the ray.
+        let (slot, band, light) = (self.slot, self.band, self.scene.lights.len());
+        let place = ScorePlace { slot, band, class: self.history.class(), light };
+        let factor = self.throughput / self.bands.density();
+        self.bands.score_emission(self.scores, place, &self.scene.medium, reach, factor);
+        hit.filter(|hit| hit.t <= t)
+    }
+
     /// A scattering event at distance `t`; `None` where the path ends.
     fn scatter(&mut self, t: f64) -> Option<()> {
         self.arrive(t)?;
@@ -340,6 +376,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// A new medium vertex at distance `t`, with what connects from it; `None` where the path ends.
     #[inline]
     fn arrive(&mut self, t: f64) -> Option<()> {
+        self.measure.fly(&self.ray, t);
         self.ray.origin = self.ray.at(t);
         self.from = None;
         if let Some(bounds) = self.bounds
@@ -402,6 +439,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// ends.
     fn cross(&mut self, hit: &Hit, side: Side) -> Option<Side> {
         self.from = Some(hit.face);
+        self.measure.meet(side);
         let wo = -self.ray.dir;
         self.ray.origin = hit.point;
         if self.matched() {
@@ -497,7 +535,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     fn score(&mut self, class: TransportClass, light: usize, entry: DVec3, value: f64) {
         let slot = self.scene.sensor.slot_of(self.slot, entry);
         let place = ScorePlace { slot, band: self.band, class, light };
-        self.bands.score(self.scores, place, value);
+        for (slot, factor) in self.measure.slots(slot) {
+            self.bands.score(self.scores, ScorePlace { slot, ..place }, factor * value);
+        }
     }
 
     /// The same for a path that has left the walk, with what the bands made of it since. Where it ends
@@ -573,15 +613,18 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             return;
         }
         let phase = self.medium.phase.pdf(self.ray.dir.dot(sample.wi));
-        let Some((through, entry)) = self.transmittance_out(sample.wi) else { return };
-        let own = phase * through;
-        let value = own * sample.radiance;
-        let light = LightDraw { index, choice, wi: sample.wi, pdf: sample.pdf };
-        self.score_connection(light, entry, value, own);
+        let path = self.measure; // without the connection, which is a path of its own
+        if let Some((through, entry)) = self.transmittance_out(sample.wi) {
+            let own = phase * through;
+            let value = own * sample.radiance;
+            let light = LightDraw { index, choice, wi: sample.wi, pdf: sample.pdf };
+            self.score_connection(light, entry, value, own);
+        }
+        self.measure = path;
     }
 
     /// Transmittance from the path's medium vertex to infinity along `dir`, through every part of the
-    /// body on the way, and the last point of the boundary there.
+    /// body on the way, and the last point of the boundary there. The path's measure follows.
     fn transmittance_out(&mut self, dir: DVec3) -> Option<(f64, DVec3)> {
         let mut ray = Ray { origin: self.ray.origin, dir };
         let mut from = None;
@@ -591,7 +634,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             self.scores.count(Cost::ShadowRays);
             match self.scene.shape.intersect(&ray, side, from, f64::INFINITY) {
                 Some(hit) => {
+                    self.measure.meet(side);
                     if side == Side::Inside {
+                        self.measure.fly(&ray, hit.t);
                         inside_length += hit.t;
                     }
                     ray.origin = hit.point;
@@ -650,15 +695,6 @@ pub(super) fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> 
     (u() < probability).then_some(probability)
 }
 
-/// Notes on parallel light that every walk lacks at a matched boundary.
-pub(super) fn unscattered_notes(scene: &Scene) -> impl Iterator<Item = String> {
-    let is_matched = scene.boundary.contains(&Boundary::Matched);
-    let parallel = scene.lights.iter().filter(move |light| light.is_directional() && is_matched);
-    parallel.map(|light| {
-        format!(
-            "no path from a sensor follows directional light `{}` straight through the matched body: unscattered \
-             light (class surface) is excluded from this estimator's result",
-            light.name
-        )
-    })
-}
+#[cfg(test)]
+#[path = "walk_led_tests.rs"]
+mod led;

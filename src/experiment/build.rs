@@ -45,6 +45,11 @@ impl<'a> Builder<'a> {
         shapes + self.maps.values().map(|map| map.memory_bytes()).sum::<usize>()
     }
 
+    /// Bytes that making the largest shape took for a moment.
+    pub(crate) fn building_bytes(&self) -> usize {
+        self.shapes.values().map(|shape| shape.building_bytes()).max().unwrap_or(0)
+    }
+
     /// The scene of one cell.
     ///
     /// # Errors
@@ -54,7 +59,12 @@ impl<'a> Builder<'a> {
         let boundary = self.boundary(&cell.object.boundary)?;
         let medium = cell.object.medium.per_band(&self.experiment.file.band_list());
         let medium = medium.ok_or_else(|| Error::input("the medium has no coefficients"))?;
-        let medium = medium.iter().map(|m| Medium::new(m.sigma_a, m.sigma_s, m.g)).collect();
+        let emission = cell.object.medium.emission(medium.len());
+        let medium = medium
+            .iter()
+            .zip(emission)
+            .map(|(m, emission)| Medium { emission, ..Medium::new(m.sigma_a, m.sigma_s, m.g) });
+        let medium = medium.collect();
         let lights = cell.light.iter().enumerate();
         let lights = lights.map(|(i, entry)| self.light(i, entry)).collect::<Result<Vec<Light>>>()?;
         let sensor = cell.sensor.build(&shape)?;
@@ -220,6 +230,9 @@ fn build_shape(words: &ShapeEntry, experiment: &Experiment) -> Result<Shape> {
         }
         ShapeEntry::BumpySphere { radius_mm, subdivisions, amplitude, wavenumber, normals } => {
             procedural::bumpy_sphere(*radius_mm, *subdivisions, *amplitude, *wavenumber, smooth(normals))
+        }
+        ShapeEntry::LumpySphere { radius_mm, subdivisions, amplitude, normals } => {
+            procedural::lumpy_sphere(*radius_mm, *subdivisions, *amplitude, smooth(normals))
         }
         ShapeEntry::Torus { major_radius_mm, minor_radius_mm, segments, normals } => {
             procedural::torus(*major_radius_mm, *minor_radius_mm, *segments, smooth(normals))

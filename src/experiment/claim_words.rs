@@ -6,11 +6,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::duel::{Faster, NotSlower};
+use crate::results::record::InvalidReason;
 
 /// One claim: exactly one kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{ "required": ["equals"] }, { "required": ["agree"] }, { "required": ["differs"] }, { "required": ["reproduces"] }, { "required": ["faster"] }, { "required": ["not_slower"] }, { "required": ["sampler"] }]))]
+#[schemars(extend("oneOf" = [{ "required": ["equals"] }, { "required": ["agree"] }, { "required": ["differs"] }, { "required": ["mean_path_length"] }, { "required": ["reproduces"] }, { "required": ["faster"] }, { "required": ["not_slower"] }, { "required": ["sampler"] }]))]
 pub struct ClaimEntry {
     /// Label in verdict tables.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -18,6 +19,9 @@ pub struct ClaimEntry {
     /// The outcome that makes the claim green, where it is not a pass (controls).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expect: Option<Expect>,
+    /// The reason for which a control expects its test to be invalid; any other turns it red.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub because: Option<InvalidReason>,
     /// A quantity equals a known value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equals: Option<Equals>,
@@ -27,6 +31,9 @@ pub struct ClaimEntry {
     /// Two measurements do not agree (a control): the difference must be found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differs: Option<Differs>,
+    /// The mean path length is 4 eta^2 V / S.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_path_length: Option<MeanPathLength>,
     /// The record is reproduced bit for bit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reproduces: Option<Reproduces>,
@@ -62,6 +69,14 @@ pub struct SamplerClaim {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub detect: Option<f64>,
+    /// The same for fine bins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub detect_fine: Option<f64>,
+    /// The same for bins of pairs of consecutive draws.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub detect_serial: Option<f64>,
 }
 
 /// Outcomes that controls expect.
@@ -72,7 +87,7 @@ pub enum Expect {
     Differs,
     /// The claim must be found not to hold.
     Fails,
-    /// The test must be refused as statistically invalid.
+    /// The test must be refused as statistically invalid, for the reason stated by `because`.
     Invalid,
 }
 
@@ -107,6 +122,28 @@ pub struct Equals {
     /// Where the expected value comes from.
     pub source: String,
     /// The largest relative defect that may go unseen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub detect: Option<f64>,
+    /// The band; every band by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub band: Option<String>,
+    /// Only cells with these labels: axis -> label.
+    #[serde(default, rename = "where", skip_serializing_if = "BTreeMap::is_empty")]
+    pub only: BTreeMap<String, String>,
+}
+
+/// In a sky of equal radiance L, with scattering but no absorption, and a boundary that loses nothing, the
+/// mean of `path_length` is 4 eta^2 V / S times L and that of `incident` is L, whatever the shape, the
+/// medium and the phase function; V is the volume of the body, or of the sensor's ball, and S the body's surface.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeanPathLength {
+    /// The estimators; all by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
+    pub estimators: Option<Vec<String>>,
+    /// The largest relative defect of either mean that may go unseen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub detect: Option<f64>,

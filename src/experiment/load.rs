@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use super::document::{self, Node, Value};
 use super::picture::PictureEntry;
 use super::registry::Registry;
-use super::rules::{self, At, CELL_KEYS, ExperimentParts, Findings, Known};
+use super::rules::{self, At, CELL_KEYS, CellPoint, ExperimentParts, Findings, Known};
 use super::schema::{BandsEntry, ClaimEntry, ExperimentFile};
 use super::schema_json::json_schema;
 use super::sweep::{self, AxisPoint, SweepAxis};
@@ -87,6 +87,10 @@ impl Loader<'_> {
         let points = if parts.scene { sweep::cells(&axes) } else { Vec::new() };
         let trees: Vec<Node> = points.iter().map(|points| self.cell_tree(points)).collect();
         trees.iter().for_each(|tree| self.cell_rules(tree, bands.as_ref(), false));
+        if let Some(bands) = &bands {
+            let cells = trees.iter().zip(&points);
+            cells.for_each(|(tree, points)| self.claim_rules(tree, bands, &axes, points));
+        }
         let cells: Option<Vec<CellSpec>> =
             trees.iter().zip(&points).map(|(tree, points)| cell(tree, &axes, points)).collect();
         let first = self.first_cell(trees.first());
@@ -135,8 +139,8 @@ impl Loader<'_> {
         };
         let (estimators, samplers) = (names("estimator"), names("sampler"));
         let bands = self.bands().map(|bands| bands.list().into_iter().map(|band| band.name).collect());
-        let budget = at.typed("budget");
-        let known = Known { parts, estimators, samplers, bands, axes, budget };
+        let entries = at.typed("estimator").unwrap_or_default();
+        let known = Known { parts, estimators, entries, samplers, bands, axes };
         let claims = at.to("claim");
         for (i, entry) in self.root.get("claim").map(Node::items).unwrap_or_default().iter().enumerate()
         {
@@ -156,18 +160,32 @@ impl Loader<'_> {
     /// The walk and the rules of object, sensor and lights in one cell.
     fn cell_rules(&self, tree: &Node, bands: Option<&BandsEntry>, lenient: bool) {
         let mut walk = SchemaWalk::new(&self.grammar, lenient);
-        CELL_KEYS.iter().for_each(|key| walk.entry(tree, key));
-        walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
         let at = At::new(tree, &self.findings);
+        let emits = rules::emits(at.to("object"));
+        let is_needed = |key: &&&str| **key != "light" || !emits || tree.get("light").is_some();
+        CELL_KEYS.iter().filter(is_needed).for_each(|key| walk.entry(tree, key));
+        walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
         if let Some(bands) = bands {
             rules::object(at.to("object"), bands);
-            rules::lights(at.to("light"), bands.list().len());
+            rules::lights(at.to("light"), bands.list().len(), emits);
         }
         if let Some(sensor) = at.typed("sensor") {
             let shape = at.to("object").typed("shape");
             rules::sensor(at.to("sensor"), &sensor, shape.as_ref());
             if let Some(pictures) = self.root.get("picture") {
                 rules::has_pixels(At::new(pictures, &self.findings), &sensor);
+            }
+        }
+    }
+
+    /// Rules of claims that hold in some cells only.
+    fn claim_rules(&self, tree: &Node, bands: &BandsEntry, axes: &[SweepAxis], points: &[&AxisPoint]) {
+        let claims = At::new(&self.root, &self.findings).to("claim");
+        let cell = CellPoint { tree: At::new(tree, &self.findings), bands, axes, points };
+        for (i, entry) in self.root.get("claim").map(Node::items).unwrap_or_default().iter().enumerate()
+        {
+            if let Some(words) = typed::<ClaimEntry>(entry).and_then(|claim| claim.mean_path_length) {
+                rules::mean_path_length(claims.item(i).to("mean_path_length"), &words, &cell);
             }
         }
     }
@@ -241,7 +259,7 @@ fn cell(tree: &Node, axes: &[SweepAxis], points: &[&AxisPoint]) -> Option<CellSp
             .collect(),
         object: typed(tree.get("object")?)?,
         sensor: typed(tree.get("sensor")?)?,
-        light: typed(tree.get("light")?)?,
+        light: tree.get("light").map_or(Some(Vec::new()), typed)?,
         csv_row,
         csv_line: points.iter().find_map(|point| point.csv_line),
         sweep_values: sets.map(|(key, value)| (key.clone(), value.to_json())).collect(),

@@ -8,7 +8,8 @@ use super::validate::grammar::Grammar;
 use crate::error::Diagnostic;
 
 /// Sets `value` at the dotted `key`; missing tables are created on the way. Naming a variant of an
-/// enum, as `object.boundary.rough`, replaces the variant that was there.
+/// enum, as `object.boundary.rough`, or one of the keys of which a table has exactly one, as
+/// `object.medium.preset`, replaces the one that was there.
 ///
 /// # Errors
 /// A key that leads through a value that is no table, or past the end of an array.
@@ -25,8 +26,11 @@ pub(super) fn set(root: &mut Node, key: &str, value: Node, grammar: &Grammar) ->
     let mut node = &mut *root;
     for (i, word) in words.iter().enumerate() {
         let so_far = words[..i].join(".");
-        if i + 1 == words.len() && grammar.is_variant(&words) {
-            drop_siblings(node, word);
+        if i + 1 == words.len()
+            && let Value::Table(entries) = &mut node.value
+        {
+            let rivals = grammar.rivals(&words);
+            entries.retain(|key, _| !rivals.contains(&key.as_str()));
         }
         let fresh = fresh(&value, words.get(i + 1).copied());
         node = child(node, word, fresh).map_err(|what| refuse(format!("`{so_far}` {what}")))?;
@@ -118,11 +122,5 @@ fn child<'a>(node: &'a mut Node, word: &str, fresh: Node) -> Result<&'a mut Node
             Ok(&mut items[index])
         }
         _ => Err(format!("is not a table, `{word}` cannot be set in it")),
-    }
-}
-
-fn drop_siblings(node: &mut Node, word: &str) {
-    if let Value::Table(entries) = &mut node.value {
-        entries.retain(|key, _| key == word);
     }
 }

@@ -1,6 +1,8 @@
 //! What the entries of a file mean: values per band, coefficients.
 
-use super::schema::{BandsEntry, Coefficients, Eta, EtaFormula, ExperimentFile, MediumEntry, Spectrum};
+use super::schema::{
+    BandsEntry, Coefficients, Eta, EtaFormula, ExperimentFile, MediumEntry, PresetMedium, Spectrum,
+};
 use crate::optics::colour::{self, BandColours};
 use crate::optics::dispersion::{self, Dispersion};
 use crate::optics::materials;
@@ -127,27 +129,30 @@ impl MediumEntry {
     /// The coefficients in each band; none where a name is unknown, no pair is whole, or wavelengths are
     /// needed and missing.
     pub fn per_band(&self, bands: &[BandInterval]) -> Option<Vec<BandMedium>> {
-        match self {
-            MediumEntry::Coefficients(coefficients) => coefficients.per_band(bands.len()),
-            MediumEntry::Skin(words) => {
-                let g = words.g.unwrap_or(0.0);
-                let band = |band: &BandInterval| {
-                    let (sigma_a, reduced) = words.band(band.range_nm?);
-                    Some(BandMedium { sigma_a, sigma_s: reduced / (1.0 - g), g })
-                };
-                bands.iter().map(band).collect()
-            }
-            MediumEntry::Preset { name, scale, g } => {
-                let material = materials::find(name)?;
-                let g = g.unwrap_or(0.0);
-                let band = |(s, a): (&f64, &f64)| BandMedium {
-                    sigma_a: a * scale,
-                    sigma_s: s * scale / (1.0 - g),
-                    g,
-                };
-                Some(material.reduced_sigma_s.iter().zip(&material.sigma_a).map(band).collect())
-            }
+        if let Some(words) = &self.skin {
+            let g = words.g.unwrap_or(0.0);
+            let band = |band: &BandInterval| {
+                let (sigma_a, reduced) = words.band(band.range_nm?);
+                Some(BandMedium { sigma_a, sigma_s: reduced / (1.0 - g), g })
+            };
+            bands.iter().map(band).collect()
+        } else if let Some(PresetMedium { name, scale, g }) = &self.preset {
+            let material = materials::find(name)?;
+            let g = g.unwrap_or(0.0);
+            let band = |(s, a): (&f64, &f64)| BandMedium {
+                sigma_a: a * scale,
+                sigma_s: s * scale / (1.0 - g),
+                g,
+            };
+            Some(material.reduced_sigma_s.iter().zip(&material.sigma_a).map(band).collect())
+        } else {
+            self.coefficients.as_ref()?.per_band(bands.len())
         }
+    }
+
+    /// Emission in each of `count` bands, W/(mm^2 sr) per mm.
+    pub fn emission(&self, count: usize) -> Vec<f64> {
+        self.emission_per_mm.as_ref().map_or(vec![0.0; count], |values| values.values(count))
     }
 }
 
@@ -203,10 +208,12 @@ mod tests {
         };
         let two = BandsEntry::Rgb {}.list()[..2].to_vec();
         for coefficients in [total, parts, reduced] {
-            assert_eq!(MediumEntry::Coefficients(coefficients).per_band(&two), Some(expected.clone()));
+            let medium = MediumEntry { coefficients: Some(coefficients), ..MediumEntry::default() };
+            assert_eq!(medium.per_band(&two), Some(expected.clone()));
         }
         assert_eq!(none.per_band(2), None);
-        let preset = MediumEntry::Preset { name: "skin1".into(), scale: 2.0, g: Some(0.5) };
+        let preset = PresetMedium { name: "skin1".into(), scale: 2.0, g: Some(0.5) };
+        let preset = MediumEntry { preset: Some(preset), ..MediumEntry::default() };
         let red = preset.per_band(&BandsEntry::Rgb {}.list()).unwrap()[0];
         assert_eq!(red, BandMedium { sigma_a: 0.064, sigma_s: 2.96, g: 0.5 });
     }

@@ -10,7 +10,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-pub(crate) use super::claim_words::{Agree, ClaimEntry, Differs, Equals, Expect, SamplerClaim};
+pub(crate) use super::claim_words::{
+    Agree, ClaimEntry, Differs, Equals, Expect, MeanPathLength, SamplerClaim,
+};
 pub(crate) use super::direction::Direction;
 pub(crate) use super::duel::{CONTROL, CostMeasure, Faster};
 use super::picture::PictureEntry;
@@ -45,7 +47,7 @@ pub struct ExperimentFile {
     /// The sensor, which defines what is measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor: Option<SensorEntry>,
-    /// The lights, all shining at once.
+    /// The lights, all shining at once; none are needed where the medium emits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(min = 1))]
     pub light: Vec<LightEntry>,
@@ -209,6 +211,20 @@ pub enum ShapeEntry {
         /// Which normal the boundary sees.
         normals: NormalsEntry,
     },
+    /// A sphere displaced along its radius by irregular hollows and lumps of four scales, like a scan.
+    LumpySphere {
+        /// Mean radius, mm.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius_mm: f64,
+        /// Number of subdivisions of the icosahedron.
+        #[schemars(range(min = 0, max = 9))]
+        subdivisions: u32,
+        /// Bound of the displacement as a fraction of the radius.
+        #[schemars(range(min = 0.0, max = 0.5))]
+        amplitude: f64,
+        /// Which normal the boundary sees.
+        normals: NormalsEntry,
+    },
     /// A torus about the z axis.
     Torus {
         /// Radius of the ring, mm.
@@ -321,26 +337,40 @@ pub enum EtaFormula {
     Material(String),
 }
 
-/// The medium.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum MediumEntry {
+/// The medium: exactly one of `coefficients`, `preset`, `skin`; and what it emits.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["coefficients"] }, { "required": ["preset"] }, { "required": ["skin"] }]))]
+pub struct MediumEntry {
     /// Explicit coefficients.
-    Coefficients(Coefficients),
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coefficients: Option<Coefficients>,
     /// A built-in measured material (`scatterproof list`), rgb bands only.
-    Preset {
-        /// Name of the built-in entry.
-        name: String,
-        /// Multiplies both coefficients: 2 is a body twice as large.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        scale: f64,
-        /// Mean cosine; sigma_s = sigma_s' / (1 - g). Without it g = 0 and sigma_s = sigma_s'.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 1))]
-        g: Option<f64>,
-    },
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub preset: Option<PresetMedium>,
     /// Skin by its constituents (Donner & Jensen 2006), spectral bands within 380 to 780 nm.
-    Skin(SkinFractions),
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skin: Option<SkinFractions>,
+    /// Radiance that a ray gains per length by emission, W/(mm^2 sr) per mm; none without it.
+    ///
+    /// The same in every direction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub emission_per_mm: Option<Spectrum>,
+}
+
+/// A built-in measured material.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PresetMedium {
+    /// Name of the built-in entry.
+    pub name: String,
+    /// Multiplies both coefficients: 2 is a body twice as large.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub scale: f64,
+    /// Mean cosine; sigma_s = sigma_s' / (1 - g). Without it g = 0 and sigma_s = sigma_s'.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 1))]
+    pub g: Option<f64>,
 }
 
 /// Coefficients: exactly one of the pairs (`sigma_t_per_mm`, `albedo`), (`sigma_a_per_mm`,

@@ -11,7 +11,8 @@ use crate::geometry::{Ray, Shape};
 use crate::math::{DVec3, Frame, tan};
 use crate::scene::Sensor;
 use crate::scene::sensor::{
-    Accepting, BodyFlux, FaceFlux, FluxFace, Orthographic, Perspective, Probe, Rings, Screen, Vertex,
+    Accepting, Ball, BodyFlux, FaceFlux, FluxFace, Orthographic, PathLength, Perspective, Probe, Rings,
+    Screen, Vertex,
 };
 
 /// What is measured. Light that reaches the sensor without meeting the body is not scored.
@@ -110,6 +111,31 @@ pub enum SensorEntry {
         #[schemars(range(min = 1, max = 1048576))]
         paths_per_pass: usize,
     },
+    /// Path length in a finite body.
+    ///
+    /// Observables: `incident`, the radiance that falls onto the surface from outside, light from other
+    /// parts of the body included, as a mean over surface and cosine; `path_length`, the same times the
+    /// length of the light's path in the medium, mm W/(mm^2 sr), all of it light that leaves the body.
+    PathLength {
+        /// Only lengths within a ball in the body count; all without it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        ball: Option<BallEntry>,
+        /// Independent paths whose mean is one pass.
+        #[serde(default = "default_paths_per_pass")]
+        #[schemars(range(min = 1, max = 1048576))]
+        paths_per_pass: usize,
+    },
+}
+
+/// A ball.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BallEntry {
+    /// Centre, mm.
+    pub center_mm: [f64; 3],
+    /// Radius, mm.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius_mm: f64,
 }
 
 fn yes() -> bool {
@@ -199,8 +225,32 @@ impl SensorEntry {
                 let (reach, edges) = (outside(shape), edges_mm.clone());
                 Sensor::Rings(Rings { reach, edges, paths: *paths_per_pass })
             }
+            SensorEntry::PathLength { ball, paths_per_pass } => {
+                let (Some(bounds), Some(area)) = (shape.bounds(), shape.area()) else {
+                    return Err(Error::input_help(
+                        "the sensor `path_length` needs a body of finite size",
+                        "use it with a body other than a half-space or a slab",
+                    ));
+                };
+                let flux =
+                    BodyFlux { bounds, frame: Frame::about(DVec3::Z), bins: 1, paths: *paths_per_pass };
+                let ball = ball.as_ref().map(|words| within(shape, words)).transpose()?;
+                Sensor::PathLength(PathLength { flux, area, ball })
+            }
         })
     }
+}
+
+/// A ball that is wholly inside the body.
+fn within(shape: &Shape, words: &BallEntry) -> Result<Ball> {
+    let ball = Ball { center: DVec3::from(words.center_mm), radius: words.radius_mm };
+    if shape.contains(ball.center) && shape.clearance(ball.center) >= ball.radius {
+        return Ok(ball);
+    }
+    Err(Error::input_help(
+        format!("the ball of `path_length` at {} mm is not known to be inside the body", ball.center),
+        "move it or make it smaller; on a mesh it needs a margin of a fifteenth of the longest side",
+    ))
 }
 
 fn ray(point_mm: [f64; 3], toward: &Direction) -> Ray {

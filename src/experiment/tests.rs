@@ -108,4 +108,5 @@ mod claims;
 mod objects;
 mod pictures;
 mod robust;
+mod units;
 mod walk;

@@ -134,6 +134,13 @@ impl Mesh {
         self.normals.as_ref()
     }
 
+    /// Volume, mm^3, by the divergence theorem for the field x / 3: the signed tetrahedra from the middle of the
+    /// bounding sphere, so that a body far from the origin loses no digits, to the triangles.
+    pub fn volume(&self) -> f64 {
+        let corners = |t: &[u32; 3]| t.map(|i| self.vertices[i as usize] - self.bounds.center);
+        self.triangles.iter().map(corners).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+    }
+
     /// A sphere that holds all vertices.
     pub fn bounds(&self) -> BoundingSphere {
         self.bounds

@@ -8,6 +8,7 @@ mod audit;
 mod body_surface;
 mod clearance;
 mod lines;
+mod measure;
 mod mesh;
 mod normals;
 mod obj;
@@ -214,6 +215,18 @@ impl Shape {
     /// Whether the body is known to be convex: then all its points see each other.
     pub fn is_convex(&self) -> bool {
         !matches!(self, Shape::Mesh(_))
+    }
+
+    /// Estimate of the memory that making the shape needs for a moment beside what it holds, bytes.
+    ///
+    /// For a mesh 200 a triangle: the file's numbers, its sides in the order of edges, and what the
+    /// hierarchy is made from. Measured by the peak of the process less its 21 MiB: 129 and 151 with
+    /// 327,680 and 1,310,720 triangles of a bumpy sphere, 197 with 869,178 from a file.
+    pub fn building_bytes(&self) -> usize {
+        match self {
+            Shape::Mesh(mesh) => 200 * mesh.triangles().len(),
+            _ => 0,
+        }
     }
 
     /// Estimate of the memory that the shape holds, bytes.

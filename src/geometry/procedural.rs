@@ -58,6 +58,40 @@ pub fn bumpy_sphere(
     MeshParts { vertices, triangles }.into_mesh(None, interpolated)
 }
 
+/// Octaves of a lumpy sphere, waves in each, wavenumber of the first.
+const OCTAVES: u32 = 4;
+const WAVES: u32 = 3;
+const COARSEST: f64 = 4.0;
+
+/// An icosphere displaced along its radius by irregular detail of four scales, as a scanned body has it:
+/// `radius (1 + amplitude h(n)) n`, h being in [-1, 1] the mean, in proportion 1, 1/2, 1/4, 1/8, of
+/// octaves of wavenumber 4, 8, 16, 32, each the mean of three plane waves sin(k d.n + phase). Their
+/// directions d and phases are spaced by the golden angle. All octaves are about equally steep.
+///
+/// # Errors
+/// As [`Mesh::new`].
+pub fn lumpy_sphere(radius: f64, subdivisions: u32, amplitude: f64, interpolated: bool) -> Result<Mesh> {
+    let golden_angle = PI * (3.0 - 5.0f64.sqrt());
+    let count = OCTAVES * WAVES;
+    let waves = (0..count).map(|index| {
+        let octave = f64::from(1u32 << (index / WAVES));
+        let height = 1.0 - (2.0 * f64::from(index) + 1.0) / f64::from(count);
+        let across = (1.0 - height * height).sqrt();
+        let turn = f64::from(index) * golden_angle;
+        let direction = DVec3::new(across * cos(turn), across * sin(turn), height);
+        (direction * (COARSEST * octave), turn, 1.0 / octave)
+    });
+    let waves: Vec<(DVec3, f64, f64)> = waves.collect();
+    let total: f64 = waves.iter().map(|(.., share)| share).sum();
+    let MeshParts { vertices, triangles } = unit_icosphere(subdivisions);
+    let displaced = |n: DVec3| {
+        let sum: f64 = waves.iter().map(|(k, phase, share)| share * sin(k.dot(n) + phase)).sum();
+        n * (radius * (1.0 + amplitude * sum / total))
+    };
+    let vertices = vertices.into_iter().map(displaced).collect();
+    MeshParts { vertices, triangles }.into_mesh(None, interpolated)
+}
+
 /// A sphere with a concentric empty cavity, both icospheres of the same subdivisions.
 ///
 /// # Errors
@@ -207,37 +241,40 @@ mod tests {
     use super::*;
     use crate::geometry::triangle;
 
-    fn volume(mesh: &Mesh) -> f64 {
-        let corners = |t: &[u32; 3]| t.map(|i| mesh.vertices()[i as usize]);
-        mesh.triangles().iter().map(corners).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
-    }
-
     #[test]
     fn volumes_and_counts_are_those_of_the_bodies() {
         let sphere = icosphere(2.0, 5, false).expect("closed");
         assert_eq!(sphere.triangles().len(), 20 * 4usize.pow(5));
-        assert!((volume(&sphere) / (4.0 / 3.0 * PI * 8.0) - 1.0).abs() < 2e-3);
+        assert!((sphere.volume() / (4.0 / 3.0 * PI * 8.0) - 1.0).abs() < 2e-3);
 
         let cavity = cavity_sphere(2.0, 1.0, 5, true).expect("closed");
-        assert!((volume(&cavity) / (4.0 / 3.0 * PI * 7.0) - 1.0).abs() < 2e-3);
+        assert!((cavity.volume() / (4.0 / 3.0 * PI * 7.0) - 1.0).abs() < 2e-3);
 
         // Meridian and tube polygons: their areas per circle's are sin(2 pi / n) / (2 pi / n).
         let ring = torus(2.0, 0.5, [256, 128], true).expect("closed");
         assert_eq!(ring.triangles().len(), 2 * 256 * 128);
-        assert!((volume(&ring) / (2.0 * PI * PI * 2.0 * 0.25) - 1.0).abs() < 1e-3);
+        assert!((ring.volume() / (2.0 * PI * PI * 2.0 * 0.25) - 1.0).abs() < 1e-3);
 
         // Holes of side 0.4 * min(3 / 3, 2 / 2) = 0.4.
         let plate = drilled_box(DVec3::new(3.0, 2.0, 0.5), [3, 2], 0.4).expect("closed");
-        assert!((volume(&plate) - 0.5 * (6.0 - 6.0 * 0.16)).abs() < 1e-12);
+        assert!((plate.volume() - 0.5 * (6.0 - 6.0 * 0.16)).abs() < 1e-12);
 
         let smooth = bumpy_sphere(2.0, 5, 0.0, 9.0, false).expect("closed");
         assert_eq!(smooth.vertices(), sphere.vertices());
+        let smooth = lumpy_sphere(2.0, 5, 0.0, false).expect("closed");
+        assert_eq!(smooth.vertices(), sphere.vertices());
+        // Within its amplitude, and using most of it.
+        let lumpy = lumpy_sphere(2.0, 5, 0.25, false).expect("closed");
+        let heights = lumpy.vertices().iter().map(|v| (v.length() / 2.0 - 1.0) / 0.25);
+        let (low, high) = heights.fold((0.0f64, 0.0f64), |(low, high), h| (low.min(h), high.max(h)));
+        assert!((-1.0..-0.5).contains(&low) && (0.5..1.0).contains(&high), "{low} {high}");
     }
 
     #[test]
     fn extremes_of_the_parameters_are_manifolds() {
         for subdivisions in 0..=6 {
             bumpy_sphere(1.0, subdivisions, 0.5, 1000.0, true).expect("closed");
+            lumpy_sphere(1.0, subdivisions, 0.5, true).expect("closed");
             cavity_sphere(1.0, 0.999, subdivisions, true).expect("closed");
         }
         torus(1.0, 0.999, [3, 3], true).expect("closed");
@@ -253,6 +290,7 @@ mod tests {
             cavity_sphere(1.0, 0.5, 4, true),
             torus(2.0, 0.7, [96, 48], true),
             bumpy_sphere(1.0, 6, 0.1, 6.0, true),
+            lumpy_sphere(1.0, 7, 0.1, true),
         ];
         for mesh in meshes.map(|mesh| mesh.expect("closed")) {
             let normals = mesh.normals().expect("interpolated");

@@ -120,7 +120,7 @@ impl SurfaceSampler {
     }
 }
 
-fn triangles(mesh: &Mesh) -> impl Iterator<Item = Triangle> {
+pub(super) fn triangles(mesh: &Mesh) -> impl Iterator<Item = Triangle> {
     mesh.triangles().iter().map(|t| Triangle(t.map(|i| mesh.vertices()[i as usize])))
 }
 

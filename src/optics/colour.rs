@@ -60,10 +60,15 @@ pub fn display_rgb(bands: BandColours) -> Vec<[f64; 3]> {
 
 /// Linear sRGB of a band of spectral radiance 1 between two wavelengths in nm.
 pub fn band_rgb(from_nm: f64, to_nm: f64) -> [f64; 3] {
-    let luminous = integral(FROM_NM, TO_NM);
-    let cones = apply(&BRADFORD, integral(from_nm, to_nm));
-    let adapted = cones / apply(&BRADFORD, luminous) * apply(&BRADFORD, white());
-    xyz_to_linear_srgb(apply(&inverse(&BRADFORD), adapted).to_array())
+    let adapted = adapt(integral(from_nm, to_nm), integral(FROM_NM, TO_NM), white());
+    xyz_to_linear_srgb(adapted.to_array())
+}
+
+/// XYZ under one white as seen under another, by the Bradford transform: cone responses are scaled from
+/// those of the first white to those of the second.
+fn adapt(xyz: DVec3, from: DVec3, to: DVec3) -> DVec3 {
+    let cones = apply(&BRADFORD, xyz);
+    apply(&inverse(&BRADFORD), cones / apply(&BRADFORD, from) * apply(&BRADFORD, to))
 }
 
 /// Linear sRGB of CIE XYZ with the white of D65 at Y = 1.
@@ -148,11 +153,43 @@ mod tests {
         assert_eq!(largest(band_rgb(440.0, 480.0)), 2);
     }
 
+    /// Columns of the matrix from XYZ to linear sRGB, CSS Color Module Level 4, section 18, and of its
+    /// inverse: Y of the primaries is 0.2126, 0.7152, 0.0722.
     #[test]
     fn the_matrix_is_that_of_the_standard() {
-        close(xyz_to_linear_srgb([1.0, 0.0, 0.0]), [3.2406, -0.9689, 0.0557], 2e-3);
-        close(xyz_to_linear_srgb([0.0, 1.0, 0.0]), [-1.5372, 1.8758, -0.2040], 2e-3);
-        close(xyz_to_linear_srgb([0.0, 0.0, 1.0]), [-0.4986, 0.0415, 1.0570], 2e-3);
+        let columns = [
+            ([1.0, 0.0, 0.0], [3.2409699419045226, -0.9692436362808796, 0.05563007969699366]),
+            ([0.0, 1.0, 0.0], [-1.537383177570094, 1.8759675015077202, -0.20397695888897652]),
+            ([0.0, 0.0, 1.0], [-0.4986107602930034, 0.04155505740717559, 1.0569715142428786]),
+        ];
+        for (xyz, expected) in columns {
+            close(xyz_to_linear_srgb(xyz), expected, 1e-12);
+        }
+        close(
+            rgb_to_xyz()[1].to_array(),
+            [0.21263900587151027, 0.715168678767756, 0.0721923153607337],
+            1e-12,
+        );
+        for rgb in [DVec3::X, DVec3::Y, DVec3::Z] {
+            close(xyz_to_linear_srgb(apply(&rgb_to_xyz(), rgb).to_array()), rgb.to_array(), 1e-14);
+        }
+    }
+
+    /// From D65 to D50, B. Lindbloom, "Chromatic Adaptation" (columns of his matrix, to 7 digits, for
+    /// the whites of ASTM E308-01), and back again.
+    #[test]
+    fn whites_are_adapted_as_published() {
+        let (d65, d50) = (DVec3::new(0.95047, 1.0, 1.08883), DVec3::new(0.96422, 1.0, 0.82521));
+        let columns = [
+            (DVec3::X, [1.0478112, 0.0295424, -0.0092345]),
+            (DVec3::Y, [0.0228866, 0.9904844, 0.0150436]),
+            (DVec3::Z, [-0.0501270, -0.0170491, 0.7521316]),
+        ];
+        for (xyz, expected) in columns {
+            close(adapt(xyz, d65, d50).to_array(), expected, 1e-7);
+            close(adapt(adapt(xyz, d65, d50), d50, d65).to_array(), xyz.to_array(), 1e-14);
+        }
+        close(adapt(d65, d65, d50).to_array(), d50.to_array(), 1e-14);
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //!   baseline       0.0244 + 8.53 e^(-(l - 154)/66.2)
 //!   scattering     sigma_s' = 14.74 l^-0.22 + 2.2e11 l^-4
 //! and haemoglobin (150 g/l of blood, 64500 g/mol) from its molar extinction: ln 10 * eps * 150/64500
-//! /10 per mm.
+//! /10 per mm, linear between the 2 nm of its table.
 //!   sigma_a = m (b eu + (1 - b) pheo) + h (o HbO2 + (1 - o) Hb) + (1 - m - h) baseline
 //! with the volume fractions m of melanosomes and h of blood, the share b of eumelanin, and the
 //! oxygenation o. Real skin has its melanin above its blood; mixing them in one layer keeps the colours
@@ -42,23 +42,22 @@ pub struct SkinFractions {
 }
 
 /// Rows of wavelength, HbO2 and Hb.
-const TABLE: &str = include_str!("skin_chromophores.csv");
+const TABLE: &str = include_str!("haemoglobin.csv");
 
 static HAEMOGLOBIN: LazyLock<Vec<[f64; 3]>> = LazyLock::new(|| {
     let rows = TABLE.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit()));
     rows.map(|row| {
         let mut numbers = row.split(',').map(|n| n.parse().expect("the table holds numbers"));
-        std::array::from_fn(|_| numbers.next().expect("a row has four columns"))
+        std::array::from_fn(|_| numbers.next().expect("a row has three columns"))
     })
     .collect()
 });
 
-/// The wavelengths of the table, nm.
+/// The wavelengths that the model is used at, nm: the visible ones. The table of haemoglobin is wider.
 pub const RANGE_NM: [f64; 2] = [380.0, 780.0];
 
 impl SkinFractions {
-    /// Absorption and reduced scattering, 1/mm, at a wavelength in [`RANGE_NM`]; outside it the table's
-    /// ends hold.
+    /// Absorption and reduced scattering, 1/mm, at a wavelength in [`RANGE_NM`].
     pub fn at(&self, nm: f64) -> (f64, f64) {
         let [oxygenated, deoxygenated] = haemoglobin(nm);
         let melanin = self.eumelanin_share * 6.6e10 * pow(nm, -3.33)
@@ -70,13 +69,13 @@ impl SkinFractions {
         (absorption, 14.74 * pow(nm, -0.22) + 2.2e11 / (nm * nm * nm * nm))
     }
 
-    /// The means over a band, nm.
+    /// The means over a band, nm, by midpoints at most 0.5 nm apart: the table has a row each 2 nm.
     pub fn band(&self, [from, to]: [f64; 2]) -> (f64, f64) {
-        const STEPS: usize = 16;
-        let middle = |k: usize| from + (to - from) * (k as f64 + 0.5) / STEPS as f64;
+        let steps = (2.0 * (to - from)).ceil().max(16.0);
+        let middle = |k: usize| from + (to - from) * (k as f64 + 0.5) / steps;
         let add = |(a, s): (f64, f64), (b, t): (f64, f64)| (a + b, s + t);
-        let (a, s) = (0..STEPS).map(|k| self.at(middle(k))).fold((0.0, 0.0), add);
-        (a / STEPS as f64, s / STEPS as f64)
+        let (a, s) = (0..steps as usize).map(|k| self.at(middle(k))).fold((0.0, 0.0), add);
+        (a / steps, s / steps)
     }
 }
 
@@ -127,8 +126,80 @@ mod tests {
         let skin = pure(0.02, 0.7, 0.03, 0.7);
         let (narrow, at) = (skin.band([559.999, 560.001]), skin.at(560.0));
         assert!((narrow.0 / at.0 - 1.0).abs() < 1e-4 && (narrow.1 / at.1 - 1.0).abs() < 1e-4);
-        let (wide, halves) = (skin.band([400.0, 700.0]), [[400.0, 550.0], [550.0, 700.0]]);
-        let mean = halves.map(|half| skin.band(half).0).iter().sum::<f64>() / 2.0;
-        assert!((wide.0 / mean - 1.0).abs() < 0.03, "{wide:?} {mean}");
+        // Split where neither part's midpoints are the whole's.
+        let wide = skin.band([400.0, 700.0]);
+        let parts = [[400.0, 412.3], [412.3, 700.0]];
+        let mean =
+            parts.map(|[from, to]| (to - from) * skin.band([from, to]).0).iter().sum::<f64>() / 300.0;
+        assert!((wide.0 / mean - 1.0).abs() < 1e-4, "{wide:?} {mean}");
     }
+
+    /// Blood alone, from 415 to 430 and from 595 to 610 nm: the integral of the linear interpolant is
+    /// that of the trapezoid rule on the table's rows, of which 415 and 595 lie between two. By another
+    /// program.
+    #[test]
+    fn bands_of_blood_are_the_table_s() {
+        for (band, expected) in BLOOD_BANDS {
+            for (oxygenation, expected) in [1.0, 0.0].into_iter().zip(expected) {
+                let found = pure(0.0, 0.0, 1.0, oxygenation).band(band).0;
+                assert!((found / expected - 1.0).abs() < 5e-4, "{band:?}: {found} {expected}");
+            }
+        }
+    }
+
+    /// The whole table: every 2 nm from 250 to 1000, the sums of its columns, and those of wavelength
+    /// times column, computed from the source. A changed or exchanged number moves one of them.
+    #[test]
+    fn the_table_is_whole() {
+        let rows = &*HAEMOGLOBIN;
+        assert_eq!(rows.len(), 376);
+        assert!(rows.iter().enumerate().all(|(i, row)| row[0] == 250.0 + 2.0 * i as f64));
+        let sum = |of: &dyn Fn(&[f64; 3]) -> f64| rows.iter().map(of).sum::<f64>();
+        let sums = [sum(&|r| r[1]), sum(&|r| r[2]), sum(&|r| r[0] * r[1]), sum(&|r| r[0] * r[2])];
+        let expected = [18249467.999999996, 20888640.543999992, 7226230190.400001, 8439039291.9920025];
+        for (found, expected) in sums.into_iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12 * expected, "{found} {expected}");
+        }
+    }
+
+    /// Wavelengths of peaks and of steep flanks, and odd ones between two rows: HbO2 and Hb, 1/(cm M).
+    #[test]
+    fn extinctions_at_and_between_the_peaks() {
+        for (nm, expected) in EXTINCTIONS {
+            let per_mm = ln(10.0) * 150.0 / 645_000.0;
+            let found = haemoglobin(nm).map(|absorption| absorption / per_mm);
+            for (found, expected) in found.into_iter().zip(expected) {
+                assert!((found / expected - 1.0).abs() < 1e-12, "{nm}: {found} {expected}");
+            }
+        }
+    }
+
+    const BLOOD_BANDS: [([f64; 2], [f64; 2]); 4] = [
+        ([415.0, 430.0], [218.360463, 235.077267]),
+        ([535.0, 550.0], [26.9720534, 25.9470282]),
+        ([595.0, 610.0], [1.61496536, 7.48144168]),
+        ([400.0, 700.0], [34.9846276, 43.0397303]),
+    ];
+
+    const EXTINCTIONS: [(f64, [f64; 2]); 19] = [
+        (380.0, [109564.0, 145232.0]),
+        (390.0, [167748.0, 167780.0]),
+        (420.0, [480360.0, 407560.0]),
+        (421.0, [456120.0, 418720.0]),
+        (450.0, [62816.0, 103292.0]),
+        (453.0, [56208.0, 49405.0]),
+        (480.0, [26629.2, 14550.0]),
+        (510.0, [20035.2, 25773.6]),
+        (540.0, [53236.0, 46592.0]),
+        (541.0, [53264.0, 47370.0]),
+        (570.0, [44496.0, 45072.0]),
+        (580.0, [50104.0, 37020.0]),
+        (600.0, [3200.0, 14677.2]),
+        (601.0, [2932.0, 14149.8]),
+        (630.0, [610.0, 5148.8]),
+        (660.0, [319.6, 3226.56]),
+        (690.0, [276.0, 2051.96]),
+        (750.0, [518.0, 1405.24]),
+        (780.0, [710.0, 1075.44]),
+    ];
 }

@@ -45,6 +45,8 @@ pub(crate) mod table;
 pub(crate) mod tables;
 /// Tables for the terminal.
 pub(crate) mod terminal;
+/// What would decide verdicts that are neither green nor failed.
+pub(crate) mod undecided;
 /// Viewers that compare pictures.
 pub(crate) mod viewer;
 

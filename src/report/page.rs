@@ -213,7 +213,7 @@ fn efficiency(data: &ReportData) -> Vec<PageBlock> {
     }
     let text = "Variance of a pass times its cost, of the first estimator over the other: above 1 the other is the \
                 better. In brackets the 95 % interval. By counters the cost is a weighted sum of counts, the same on \
-                every machine; by CPU time it is this machine's, and fair only where the two were timed side by side. \
+                every machine; by CPU time it is this machine's, and fair only where the estimators of a cell were interleaved. \
                 A ratio is quoted where the two means agree; it is not resolved where more passes could still \
                 change it or where a single pass may dominate it.";
     let table = named("efficiency-by-class", comparison_table(&data.comparisons));

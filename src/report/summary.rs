@@ -3,6 +3,8 @@
 use super::document::TableBlock;
 use super::number::{significant, with_error};
 use super::table::Table;
+use super::tables::at_least;
+use crate::results::counted_work;
 use crate::results::measurements::Measurement;
 use crate::results::record::{Cell, CostMeasure, PIXELS};
 use crate::results::store::Stored;
@@ -47,7 +49,7 @@ pub(crate) fn efficiency(
     cost: CostMeasure,
 ) -> Option<TableBlock> {
     let rows = chosen(stored, rows, cost);
-    let quoted = rows.iter().find(|row| row.quoted().is_some())?;
+    let quoted = rows.iter().find(|row| row.quoted().is_some() || row.at_least.is_some())?;
     let name = |row: &EfficiencyRow| format!("{} / {}", row.candidate, row.baseline);
     let entries = rows.iter().map(|row| PivotEntry {
         cell: row.cell.clone(),
@@ -57,11 +59,9 @@ pub(crate) fn efficiency(
     });
     let table = pivot(stored, &["band"], entries.collect());
     let what = metric_words(quoted);
-    let is_timed_together = || rows.iter().all(|row| row.side_by_side || row.quoted().is_none());
     let (cost, how) = match cost {
-        CostMeasure::Counters => ("counted work", "the same on every machine"),
-        CostMeasure::Cpu if is_timed_together() => ("CPU time", "of this machine, side by side"),
-        CostMeasure::Cpu => ("CPU time", "of this machine, one after the other"),
+        CostMeasure::Counters => ("counted work", counters_words(stored, &rows)),
+        CostMeasure::Cpu => ("CPU time", format!("of this machine, {}", clock_words(&rows))),
     };
     let mut caption = format!(
         "Efficiency: A / B is the variance of {what} times {cost} ({how}) of B over that of A; above 1 A is the \
@@ -70,15 +70,57 @@ pub(crate) fn efficiency(
     if rows.iter().any(|row| row.quoted().is_some() && !row.resolved) {
         caption += " An asterisk: not resolved, more passes may move the ratio out of its interval.";
     }
-    if rows.iter().any(|row| row.quoted().is_none()) {
+    if rows.iter().any(|row| row.quoted().is_none() && row.at_least.is_some()) {
+        caption += " \"At least\": the tail of B is not resolved, and the ratio is above this number with 97.5 % \
+                    confidence, if the means agree, which such a tail leaves open.";
+    }
+    if rows.iter().any(|row| row.quoted().is_none() && row.at_least.is_none()) {
         caption += " Where there is none, comparisons.csv has the whole reason.";
     }
     let file = if quoted.cost == CostMeasure::Cpu { "efficiency" } else { "efficiency-counters" };
     Some(TableBlock::new(file, caption, table))
 }
 
+/// How CPU times came about.
+fn clock_words(rows: &[&EfficiencyRow]) -> String {
+    let controls = || rows.iter().filter_map(|row| row.control_ratio);
+    let number = |x: f64| significant(x, 4);
+    match rows.iter().filter(|row| row.interleaved).count() {
+        0 => "not interleaved: what the machine did between two estimators is in their ratio".into(),
+        some if some < rows.len() => "interleaved in a part of the cells: see comparisons.csv".into(),
+        _ => format!(
+            "interleaved: the estimators of a cell by turns, A B B A, and the first of them against itself {} to {}",
+            number(controls().fold(f64::INFINITY, f64::min)),
+            number(controls().fold(0.0, f64::max))
+        ),
+    }
+}
+
+/// What counted work says.
+fn counters_words(stored: &Stored, rows: &[&EfficiencyRow]) -> String {
+    let cell = |row: &EfficiencyRow| stored.record.cells.iter().find(|cell| cell.label == row.cell);
+    let kind = |row: &EfficiencyRow, name: &str| {
+        Some(cell(row)?.runs.iter().find(|run| run.estimator == name)?.kind.clone())
+    };
+    let factor = |row: &&EfficiencyRow| {
+        let (a, b) = kind(row, &row.candidate).zip(kind(row, &row.baseline))?;
+        counted_work::factor(&a, &b).ok()
+    };
+    let same = "the same on every machine";
+    match rows.iter().map(factor).collect::<Option<Vec<f64>>>() {
+        Some(factors) => {
+            let most = factors.into_iter().fold(1.0, f64::max);
+            format!("{same}; CPU time may give up to {} times more or less", significant(most, 2))
+        }
+        None => format!("{same}; never compared with CPU time for some of these kinds"),
+    }
+}
+
 fn ratio(row: &EfficiencyRow) -> String {
     let Some(numbers) = row.quoted() else {
+        if let Some(bound) = row.at_least {
+            return at_least(bound);
+        }
         let reason = row.note.strip_prefix("no mean test: ").unwrap_or(&row.note);
         return format!("none: {}", reason.split([':', ',']).next().unwrap_or_default());
     };
@@ -204,6 +246,21 @@ mod tests {
         assert!(block.table.rows[0][1].ends_with(']'), "{:?}", block.table.rows);
         assert!(block.caption.contains("a pixel") && block.caption.contains("counted work"));
         assert!(efficiency(&stored, &rows, CostMeasure::Cpu).is_none(), "no time was measured");
+    }
+
+    #[test]
+    fn heads_say_how_times_came_about() {
+        let row = |interleaved, control_ratio| EfficiencyRow {
+            at_least: Some(2.0),
+            interleaved,
+            control_ratio,
+            ..EfficiencyRow::default()
+        };
+        let (with, other, apart) = (row(true, Some(0.9981)), row(true, Some(1.0042)), row(false, None));
+        assert!(clock_words(&[&with, &other]).ends_with("against itself 0.9981 to 1.004"));
+        assert!(clock_words(&[&apart]).starts_with("not interleaved"));
+        assert!(clock_words(&[&with, &apart]).contains("a part of the cells"));
+        assert_eq!(ratio(&with), "at least 1.99");
     }
 
     #[test]

@@ -5,6 +5,8 @@
 pub mod atomic;
 /// A canvas for pictures.
 pub mod canvas;
+/// How far counted work may be from CPU time.
+pub mod counted_work;
 /// Comma-separated text.
 pub mod csv_text;
 /// OpenEXR files.

@@ -322,8 +322,38 @@ pub enum ExpectedOutcome {
     Differs,
     /// The claim is found not to hold.
     Fails,
-    /// The test is refused as statistically invalid.
-    Invalid,
+    /// The test is refused as statistically invalid, for this reason and no other.
+    Invalid(InvalidReason),
+}
+
+/// Reasons for which a test of means is refused and that a control may expect. Whatever else voids a
+/// test, such as lost rays or missing passes, is a defect, and no control is green by it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InvalidReason {
+    /// The scores have a heavy tail: known beforehand, or by their skewness, or by one batch's share.
+    HeavyTail,
+    /// The mean rests on fewer passes than the test needs.
+    TooFewPasses,
+    /// An estimator states a bias and is claimed to agree.
+    Biased,
+    /// The estimators estimate different integrals.
+    DifferentModels,
+    /// Neither side scored anything.
+    NothingScored,
+}
+
+impl InvalidReason {
+    /// As a phrase.
+    pub fn words(self) -> &'static str {
+        match self {
+            InvalidReason::HeavyTail => "heavy tail",
+            InvalidReason::TooFewPasses => "too few passes",
+            InvalidReason::Biased => "bias",
+            InvalidReason::DifferentModels => "different models",
+            InvalidReason::NothingScored => "nothing scored",
+        }
+    }
 }
 
 /// A sampler that a claim speaks of.
@@ -334,8 +364,15 @@ pub struct SamplerComparison {
     pub claim: usize,
     /// The sampler's name.
     pub sampler: String,
-    /// The largest relative error of the density that may go unseen; a coarser test is underpowered.
+    /// The largest relative error of the density that coarse bins may miss; a weaker test is
+    /// underpowered.
     pub detect: Option<f64>,
+    /// The same for fine bins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detect_fine: Option<f64>,
+    /// The same for bins of pairs of consecutive draws.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detect_serial: Option<f64>,
 }
 
 /// One elementary statement of a claim.
@@ -391,7 +428,7 @@ pub enum CostMeasure {
     /// Counts of rays, events and paths with fixed weights: the same on every machine.
     #[default]
     Counters,
-    /// CPU time. The estimators are run side by side, and the baseline twice, so that what the
-    /// machine adds is seen.
+    /// CPU time. The estimators of a cell are interleaved, and the baseline is run twice, so that what
+    /// the machine adds is seen.
     Cpu,
 }

@@ -141,6 +141,20 @@ pub fn claim(name: &str, kind: ClaimKind) -> Claim {
     Claim { label: name.into(), kind, expects: ExpectedOutcome::Pass, each: false }
 }
 
+/// The record with one claim, of this kind and expectation, that makes one comparison.
+pub fn with_claim(
+    mut stored: Stored,
+    kind: ClaimKind,
+    expects: ExpectedOutcome,
+    against: Against,
+    detect: Option<f64>,
+) -> Stored {
+    stored.record.statements = vec![Claim { expects, ..claim("c", kind) }];
+    let quantity = quantity("mis", 0);
+    stored.record.comparisons = vec![Comparison { claim: 0, quantity, against, detect }];
+    stored
+}
+
 /// A record whose estimator `mis`, band 0, is compared with exact values, each a claim with a name.
 pub fn judged(claims: &[(&str, f64)]) -> Stored {
     let mut stored = stored(0.1);

@@ -23,9 +23,14 @@ pub struct Batches {
     pub processes: u64,
     /// CPU seconds of a batch.
     pub cpu_seconds: Vec<f64>,
-    /// Was the whole batch timed side by side with its rivals, by a worker that was warm? A claim on CPU
-    /// time rests on such batches alone.
+    /// Was the whole batch interleaved with its rivals, by a worker that was warm? A ratio of CPU times
+    /// that is called interleaved rests on such batches alone.
     pub settled: Vec<bool>,
+    /// Of the batch's passes that were run twice, the CPU seconds of the run that counts and of the
+    /// other: the same work at another place in the order, so that their ratio is the machine's alone.
+    /// Zeros where there are none.
+    #[serde(default)]
+    pub twice: Vec<[f64; 2]>,
 }
 
 /// Time spent on one estimator in one cell, all bands together.

@@ -138,6 +138,7 @@ fn batches(finished: &Finished) -> timing::Batches {
         processes: finished.tally.processes,
         cpu_seconds: finished.work.iter().map(|work| work.cpu_seconds).collect(),
         settled: finished.work.iter().zip(passes).map(|(work, n)| work.settled == n).collect(),
+        twice: finished.work.iter().map(|work| work.twice).collect(),
     }
 }
 

@@ -225,7 +225,12 @@ mod tests {
     use crate::estimators::Cost;
 
     fn work(pass: u64) -> Work {
-        Work { cost: [pass; Cost::ALL.len()], cpu_seconds: 0.25 * pass as f64, settled: pass % 2 }
+        Work {
+            cost: [pass; Cost::ALL.len()],
+            cpu_seconds: 0.25 * pass as f64,
+            settled: pass % 2,
+            twice: [0.5, pass as f64],
+        }
     }
 
     fn block(passes: u64, keep_level: u32) -> Block {

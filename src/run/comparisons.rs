@@ -4,19 +4,22 @@
 use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
-use crate::experiment::schema::{Agree, ClaimEntry, Differs, Equals, Expect, Faster, SamplerClaim};
+use crate::experiment::schema::{
+    Agree, ClaimEntry, Differs, Equals, Expect, Faster, MeanPathLength, SamplerClaim,
+};
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::record::{
     self, Against, Band, Claim, ClaimKind, Comparison, ExpectedOutcome, Observable, Quantity,
     SamplerComparison,
 };
 use crate::results::sampler::SamplerRun;
+use crate::scene::Scene;
 
 /// Names every observable, or every class.
 const EACH: &str = "each";
 
 /// All comparisons of an experiment, in the order of its claims, cells, estimators and bands.
-/// `observables` are those of each cell.
+/// `observables` are those of each cell, `scenes` their scenes.
 ///
 /// # Errors
 /// A claim that names an observable the sensor does not have; a table's cell that is not a number.
@@ -24,9 +27,10 @@ pub(crate) fn expand(
     experiment: &Experiment,
     bands: &[Band],
     observables: &[Vec<Observable>],
+    scenes: &[&Scene],
 ) -> Result<Vec<Comparison>> {
     let claims = experiment.file.claim.iter().enumerate();
-    let scope = Scope { experiment, bands, observables };
+    let scope = Scope { experiment, bands, observables, scenes };
     let lists = claims.map(|(index, claim)| scope.claim(index, claim)).collect::<Result<Vec<_>>>()?;
     Ok(lists.into_iter().flatten().collect())
 }
@@ -42,6 +46,8 @@ pub(crate) fn expand_samplers(claims: &[ClaimEntry], drawn: &[SamplerRun]) -> Ve
             claim,
             sampler: run.sampler.clone(),
             detect: words.detect,
+            detect_fine: words.detect_fine,
+            detect_serial: words.detect_serial,
         };
         drawn.iter().filter(is_meant).map(sampler).collect::<Vec<_>>()
     };
@@ -65,29 +71,25 @@ pub(crate) fn statements(claims: &[ClaimEntry]) -> Vec<Claim> {
             ClaimEntry { sampler: Some(_), .. } => (ClaimKind::Sampler, false),
             ClaimEntry { faster: Some(_), .. } => (ClaimKind::Faster, false),
             ClaimEntry { not_slower: Some(_), .. } => (ClaimKind::NotSlower, false),
-            // Validation has found exactly one kind.
+            // Validation has found exactly one kind: `equals`, or `mean_path_length`, which states values.
             ClaimEntry { .. } => (ClaimKind::Equals, false),
         };
-        statement(index, kind, entry.name.as_ref(), entry.expect, each)
+        statement(index, kind, entry, each)
     };
     claims.iter().enumerate().map(of_claim).collect()
 }
 
-fn statement(
-    index: usize,
-    kind: ClaimKind,
-    name: Option<&String>,
-    expect: Option<Expect>,
-    each: bool,
-) -> Claim {
-    let expects = match expect {
-        Some(Expect::Differs) => ExpectedOutcome::Differs,
-        Some(Expect::Fails) => ExpectedOutcome::Fails,
-        Some(Expect::Invalid) => ExpectedOutcome::Invalid,
-        None if kind == ClaimKind::Differs => ExpectedOutcome::Differs,
-        None => ExpectedOutcome::Pass,
+fn statement(index: usize, kind: ClaimKind, entry: &ClaimEntry, each: bool) -> Claim {
+    let expects = match (entry.expect, entry.because) {
+        // Validation has found a reason exactly where invalidity is expected.
+        (_, Some(reason)) => ExpectedOutcome::Invalid(reason),
+        (Some(Expect::Differs), _) => ExpectedOutcome::Differs,
+        (Some(Expect::Fails), _) => ExpectedOutcome::Fails,
+        (Some(Expect::Invalid), None) => unreachable!("invalidity is expected for a reason"),
+        (None, _) if kind == ClaimKind::Differs => ExpectedOutcome::Differs,
+        (None, _) => ExpectedOutcome::Pass,
     };
-    let label = name.cloned().unwrap_or_else(|| format!("{} #{}", kind.name(), index + 1));
+    let label = entry.name.clone().unwrap_or_else(|| format!("{} #{}", kind.name(), index + 1));
     Claim { label, kind, expects, each }
 }
 
@@ -103,12 +105,16 @@ struct Scope<'a> {
     experiment: &'a Experiment,
     bands: &'a [Band],
     observables: &'a [Vec<Observable>],
+    scenes: &'a [&'a Scene],
 }
 
 impl Scope<'_> {
     fn claim(&self, index: usize, claim: &ClaimEntry) -> Result<Vec<Comparison>> {
         if let Some(equals) = &claim.equals {
             return self.equals(index, equals);
+        }
+        if let Some(words) = &claim.mean_path_length {
+            return self.mean_path_length(index, words);
         }
         if let Some(duel) = claim.duel() {
             return self.duel(index, &duel);
@@ -151,6 +157,32 @@ impl Scope<'_> {
                         against: Against::Value { value, error, source: words.source.clone() },
                         detect: words.detect,
                     });
+                }
+            }
+        }
+        Ok(comparisons)
+    }
+
+    /// Both means against their values in a sky without losses.
+    fn mean_path_length(&self, claim: usize, words: &MeanPathLength) -> Result<Vec<Comparison>> {
+        let all = || self.experiment.file.estimator.iter().map(|entry| entry.name.clone()).collect();
+        let names: Vec<String> = words.estimators.clone().unwrap_or_else(all);
+        let source = "4 eta^2 V / S (Blanco & Fournier 2003; Martelli et al. 2021)";
+        let mut comparisons = Vec::new();
+        for cell in self.cells(&words.only) {
+            for name in &names {
+                for band in self.bands_of(&words.band) {
+                    let means = self.scenes[cell].lossless_means(band).into_iter().flatten();
+                    for (value, observable) in means.zip(["path_length", "incident"]) {
+                        let observable =
+                            self.observable(claim, cell, &Some(observable.into()), &None)?;
+                        comparisons.push(Comparison {
+                            claim,
+                            quantity: quantity(cell, name, &observable, band),
+                            against: Against::Value { value, error: 0.0, source: source.into() },
+                            detect: words.detect,
+                        });
+                    }
                 }
             }
         }
@@ -348,7 +380,7 @@ mod tests {
         let claims: Vec<ClaimEntry> = serde_json::from_value(json!([
             {"agree": {"estimators": ["a", "b"], "class": "each", "detect": 0.1}},
             {"name": "apart", "differs": {"estimators": ["a", "b"]}},
-            {"expect": "invalid", "equals": {"value": 1.0, "source": "by hand"}},
+            {"expect": "invalid", "because": "heavy_tail", "equals": {"value": 1.0, "source": "by hand"}},
             {"reproduces": {"passes": 4, "numbers": "ff"}},
         ]))
         .expect("claims");
@@ -358,7 +390,12 @@ mod tests {
         let expected = [
             claim("agree #1", ClaimKind::Agree, ExpectedOutcome::Pass, true),
             claim("apart", ClaimKind::Differs, ExpectedOutcome::Differs, false),
-            claim("equals #3", ClaimKind::Equals, ExpectedOutcome::Invalid, false),
+            claim(
+                "equals #3",
+                ClaimKind::Equals,
+                ExpectedOutcome::Invalid(record::InvalidReason::HeavyTail),
+                false,
+            ),
             claim("reproduces #4", ClaimKind::Reproduces { numbers }, ExpectedOutcome::Pass, false),
         ];
         assert_eq!(statements(&claims), expected);

@@ -57,8 +57,6 @@ pub(crate) struct Arm {
     pub name: String,
     /// A second arm of the same estimator, on streams of its own.
     pub is_control: bool,
-    /// Whether it is timed side by side with other arms of its cell.
-    pub is_timed: bool,
 }
 
 /// A built estimator in a cell, with its streams.
@@ -132,8 +130,11 @@ pub(crate) struct Work {
     pub cost: [u64; Cost::ALL.len()],
     /// CPU time of the passes alone, seconds.
     pub cpu_seconds: f64,
-    /// How many passes were timed side by side with their rivals, by a worker that was warm.
+    /// How many passes were interleaved with those of their rivals, by a worker that was warm.
     pub settled: u64,
+    /// CPU time of those passes that were run twice for the sake of the clock, seconds: of the run that
+    /// counts, and of the other.
+    pub twice: [f64; 2],
 }
 
 impl Merge for Work {
@@ -141,6 +142,7 @@ impl Merge for Work {
         self.cost.iter_mut().zip(later.cost).for_each(|(a, b)| *a += b);
         self.cpu_seconds += later.cpu_seconds;
         self.settled += later.settled;
+        self.twice.iter_mut().zip(later.twice).for_each(|(a, b)| *a += b);
         self
     }
 }
@@ -225,11 +227,15 @@ impl Block {
         self.moments.next_pass()
     }
 
-    /// Marks all passes as timed side by side with their rivals; `keep_level` is the block's own.
-    pub(crate) fn settle(&mut self, keep_level: u32) {
+    /// Marks all passes as interleaved with those of their rivals; `keep_level` is the block's own, and
+    /// `again` holds the same passes run a second time.
+    pub(crate) fn settle(&mut self, keep_level: u32, again: Option<&Block>) {
         let mut settled = Counter::new(self.work.start(), keep_level);
-        for node in self.work.nodes() {
-            settled.push_node(node.level, Work { settled: 1 << node.level, ..node.value });
+        for (index, node) in self.work.nodes().iter().enumerate() {
+            let second = again.and_then(|block| block.work.nodes().get(index));
+            let twice =
+                second.map_or([0.0; 2], |other| [node.value.cpu_seconds, other.value.cpu_seconds]);
+            settled.push_node(node.level, Work { settled: 1 << node.level, twice, ..node.value });
         }
         self.work = settled;
     }
@@ -287,11 +293,6 @@ impl Block {
 }
 
 impl Passes {
-    /// Number of the group of jobs that are timed side by side, where the job belongs to one.
-    pub(crate) fn side_by_side(&self) -> Option<usize> {
-        self.arm.is_timed.then_some(self.cell)
-    }
-
     /// Columns and rows of the image, where the record has one.
     pub(crate) fn image_size(&self) -> Option<(usize, usize)> {
         self.layout.image().filter(|_| self.stage == Stage::Main)
@@ -328,7 +329,7 @@ impl Passes {
             block.work.push(Work {
                 cost: std::array::from_fn(|i| scores.cost[i] - counted[i]),
                 cpu_seconds: spent.as_secs_f64(),
-                settled: 0,
+                ..Work::default()
             });
             // Blocks are appended to each other, so that those without an image hold empty ones.
             let image = if stage == Stage::Main { scores.pixels.clone() } else { Vec::new() };
@@ -347,7 +348,13 @@ impl Passes {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
+    use crate::experiment::registry::Registry;
+    use crate::experiment::{self, LoadOptions};
+    use crate::run::plan;
+    use crate::sampling::stream::PassKey;
 
     fn image(pass: u64) -> Vec<f64> {
         (0..6).map(|i| ((pass * 6 + i) as f64 * 0.618_033_988_749_895).fract().powi(3)).collect()
@@ -363,6 +370,36 @@ mod tests {
             block.work.push(Work::default());
         }
         block
+    }
+
+    /// Takes 2 ms of CPU time for each band.
+    struct Spinning;
+
+    impl Estimator for Spinning {
+        fn pass(&self, bands: &[usize], _: &PassKey, _: &mut Scores) {
+            let until = thread_cpu_time() + Duration::from_millis(2) * bands.len() as u32;
+            while thread_cpu_time() < until {}
+        }
+    }
+
+    // The time of a pass is that of all its groups of bands: 2 ms each at least, and all passes together
+    // at most what the thread's clock shows around them.
+    #[test]
+    fn every_group_of_bands_is_timed() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/experiments/compare/nine-cells.toml");
+        let options = LoadOptions { sets: vec!["bands = { rgb = {} }".into()], setting: None };
+        let registry = Registry::builtin();
+        let experiment = experiment::load(file.as_ref(), &options, &registry).expect("an experiment");
+        let mut plan = plan(&experiment, &registry).expect("a plan");
+        let Task::Estimate(passes) = &mut plan.jobs[0].task else { panic!("passes") };
+        passes.estimator = Box::new(Spinning);
+        assert_eq!(passes.groups.len(), 3);
+        let begun = thread_cpu_time();
+        let block = passes.run(Stage::Main, 0, 4, 0, &|| false).expect("four passes");
+        let all = (thread_cpu_time() - begun).as_secs_f64();
+        let each: Vec<f64> = block.work.nodes().iter().map(|node| node.value.cpu_seconds).collect();
+        assert!(each.len() == 4 && each.iter().all(|seconds| *seconds >= 6e-3), "{each:?}");
+        assert!(block.cpu_seconds() <= all, "{each:?} of {all} s");
     }
 
     // (1 - 3)^2 / 2 = 2 and (0 - 1)^2 / 2 in the first band of two pixels, 0 and 8 in the second.

@@ -34,15 +34,16 @@ pub(crate) struct Plan {
     pub comparisons: Vec<Comparison>,
     /// Stage that the passes belong to.
     pub stage: Stage,
-    scene_bytes: usize,
+    /// What the scenes hold, and what making the largest takes beside it, bytes.
+    scene_bytes: [usize; 2],
     /// Passes per job, where the budget states them.
     passes: Option<u64>,
 }
 
 impl Plan {
-    /// Estimate of the run's memory.
-    pub(crate) fn memory(&self, threads: usize) -> MemoryEstimate {
-        MemoryEstimate::new(&self.jobs, self.scene_bytes, threads, self.passes)
+    /// Estimate of the run's memory, where the estimators of a cell are interleaved or not.
+    pub(crate) fn memory(&self, threads: usize, is_interleaved: bool) -> MemoryEstimate {
+        MemoryEstimate::new(&self.jobs, self.scene_bytes, threads, self.passes, is_interleaved)
     }
 }
 
@@ -70,7 +71,8 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
     let bands = builder.bands().to_vec();
     let cells = cells(experiment, &mut builder)?;
     let observables: Vec<Vec<Observable>> = cells.iter().map(|cell| named(&cell.layout)).collect();
-    let comparisons = comparisons::expand(experiment, &bands, &observables)?;
+    let scenes: Vec<&Scene> = cells.iter().map(|cell| &*cell.scene).collect();
+    let comparisons = comparisons::expand(experiment, &bands, &observables, &scenes)?;
     let inputs = json!(build::inputs(experiment));
     let planner = Planner { experiment, registry, bands: &bands, inputs, stage };
     let arms = Duels::new(experiment);
@@ -90,7 +92,8 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
         Some(Budget::Passes(passes)) => Some(passes),
         _ => None,
     };
-    Ok(Plan { jobs, comparisons, stage, scene_bytes: builder.memory_bytes(), passes, bands })
+    let scene_bytes = [builder.memory_bytes(), builder.building_bytes()];
+    Ok(Plan { jobs, comparisons, stage, scene_bytes, passes, bands })
 }
 
 /// A cell with its scene.
@@ -250,8 +253,8 @@ pub(crate) fn build_all(experiment: &Experiment, registry: &Registry) -> Result<
     experiment.file.sampler.iter().try_for_each(|words| build_sampler(words, registry).map(|_| ()))
 }
 
-/// Arms that claims compare by CPU time: estimators that run side by side, and baselines that run twice,
-/// because the same estimator against itself shows what the machine adds.
+/// Claims of efficiency by CPU time: their baselines run twice, on streams of their own, because the same
+/// estimator against itself shows whether clock and jackknife can be trusted.
 struct Duels(Vec<Faster>);
 
 impl Duels {
@@ -262,11 +265,10 @@ impl Duels {
 
     /// The runs of an estimator in a cell.
     fn of(&self, cell: &CellSpec, name: &str) -> Vec<Arm> {
-        let here = || self.0.iter().filter(|duel| comparisons::is_in(cell, &duel.only));
-        let is_timed = here().any(|duel| duel.candidate == name || duel.baseline == name);
-        let mut arms = vec![Arm { name: name.into(), is_control: false, is_timed }];
-        if here().any(|duel| duel.baseline == name) {
-            arms.push(Arm { name: format!("{name}{CONTROL}"), is_control: true, is_timed });
+        let mut here = self.0.iter().filter(|duel| comparisons::is_in(cell, &duel.only));
+        let mut arms = vec![Arm { name: name.into(), is_control: false }];
+        if here.any(|duel| duel.baseline == name) {
+            arms.push(Arm { name: format!("{name}{CONTROL}"), is_control: true });
         }
         arms
     }

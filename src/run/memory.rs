@@ -8,6 +8,8 @@ use crate::error::{Error, Result};
 pub(crate) struct MemoryEstimate {
     /// Meshes and maps, bytes.
     pub shapes: usize,
+    /// Additional memory while the largest mesh is made, before anything runs, bytes.
+    pub building: usize,
     /// Moments of observables and images of everything measured, kept until the record is written.
     pub results: usize,
     /// Additional memory of the threads and the collector during the run, bytes.
@@ -15,31 +17,35 @@ pub(crate) struct MemoryEstimate {
 }
 
 impl MemoryEstimate {
-    /// Estimate for jobs on a number of threads, whose scenes hold `shapes` bytes.
+    /// Estimate for jobs on a number of threads, whose scenes hold `shapes` bytes, and take `building`
+    /// more while they are made.
     ///
     /// An image keeps mean and M2, 16 bytes a pixel and band. A finished job holds one, and the record's
     /// array beside it; and 128 batches of 5 moments per observable, likewise twice. A job under way
     /// holds one image per bit of its passes, and as much again while its state is written. Each thread
     /// holds the images of its block (sized by time: large images have blocks of a few passes) and one
-    /// more waits to be collected. Jobs that are timed side by side are under way together, and two
-    /// batches of each may wait for the turn of those before them. What an estimator needs for a pass it
+    /// more waits to be collected. Where the estimators of a cell are interleaved, they are under way
+    /// together, and two blocks of each may wait for the turn of those before them. What an estimator needs for a pass it
     /// needs on each thread.
     pub(crate) fn new(
         jobs: &[Job],
-        shapes: usize,
+        [shapes, building]: [usize; 2],
         threads: usize,
         passes: Option<u64>,
+        is_interleaved: bool,
     ) -> MemoryEstimate {
         let jobs: Vec<&Passes> = jobs.iter().filter_map(Job::passes).collect();
         let image = |job: &Passes| 16 * job.layout.pixels() * job.layout.bands();
         let moments = |job: &Passes| 128 * 40 * job.layout.observables().len() * job.layout.bands();
         let largest = jobs.iter().map(|job| image(job)).max().unwrap_or(0);
         let own = jobs.iter().map(|job| job.estimator.working_bytes()).max().unwrap_or(0);
-        let side_by_side = |group| jobs.iter().filter(|job| job.side_by_side() == Some(group)).count();
-        let arms = jobs.iter().filter_map(|job| job.side_by_side()).map(side_by_side).max().unwrap_or(1);
+        let of_cell = |cell| jobs.iter().filter(|job| job.cell == cell).count();
+        let arms =
+            jobs.iter().map(|job| of_cell(job.cell)).max().filter(|_| is_interleaved).unwrap_or(1);
         let bits = passes.map_or(20, |passes| passes.max(1).ilog2() as usize + 1);
         MemoryEstimate {
             shapes,
+            building,
             results: jobs.iter().map(|job| 2 * (image(job) + moments(job))).sum(),
             working: (2 * bits * arms + (3 + 2 * arms) * threads) * largest + threads * own,
         }
@@ -47,16 +53,21 @@ impl MemoryEstimate {
 
     /// Total, bytes.
     pub(crate) fn total(&self) -> usize {
-        self.shapes + self.results + self.working
+        self.shapes + self.building.max(self.results + self.working)
     }
 
-    /// Refuses what does not fit into the memory that the system has to give.
+    /// Whether it fits into nine tenths of the memory that the system has to give.
+    pub(crate) fn fits(&self, available: Option<usize>) -> bool {
+        available.is_none_or(|available| self.total() <= available / 10 * 9)
+    }
+
+    /// Refuses what does not fit.
     ///
     /// # Errors
     /// More than nine tenths of the memory available.
     pub(crate) fn check(&self, available: Option<usize>) -> Result<()> {
         match available {
-            Some(available) if self.total() > available / 10 * 9 => Err(Error::input_help(
+            Some(available) if !self.fits(Some(available)) => Err(Error::input_help(
                 format!(
                     "the run would need {} of memory and {} are available",
                     readable(self.total()),
@@ -96,10 +107,14 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused() {
-        let estimate = MemoryEstimate { shapes: 0, results: 950, working: 0 };
+        let estimate = MemoryEstimate { results: 950, ..MemoryEstimate::default() };
         assert!(estimate.check(Some(1000)).is_err());
         assert!(estimate.check(Some(2000)).is_ok());
         assert!(estimate.check(None).is_ok());
+        // What makes a mesh is gone when passes run: the larger of the two counts.
+        let mesh = MemoryEstimate { shapes: 300, building: 500, results: 200, working: 100 };
+        assert_eq!(mesh.total(), 800);
+        assert_eq!(MemoryEstimate { building: 250, ..mesh }.total(), 600);
     }
 
     #[test]

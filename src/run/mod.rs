@@ -134,10 +134,18 @@ fn execute(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<(RecordFolder, Stored)> {
-    plan.memory(options.threads).check(memory::available())?;
+    let available = memory::available();
+    let is_interleaved = plan.memory(options.threads, true).fits(available);
+    plan.memory(options.threads, is_interleaved).check(available)?;
     checkpoint::prepare(root)?;
     let name = experiment.file.name.as_str();
     let progress = Progress::new(plan.jobs.len(), options.quiet);
+    if !is_interleaved {
+        progress.say(&format!(
+            "note: `{name}` has no memory for all estimators of a cell at once: they run one after the other, and \
+             ratios of their CPU times are marked as not interleaved"
+        ));
+    }
     let show = options.live.as_deref();
     let show = show.map(|live| Show { live, experiment: name, bands: &plan.bands, jobs: &plan.jobs });
     if show.is_some_and(|show| !show.has_images()) {
@@ -146,6 +154,7 @@ fn execute(
     let settings = workers::Settings {
         threads: options.threads.max(1),
         block_passes: options.block_passes,
+        is_interleaved,
         interrupt,
         root,
         progress: &progress,

@@ -5,10 +5,16 @@
 //! finished blocks in the order of their passes, whatever the order in which they arrive. Blocks are
 //! sized by the time they take; the fixed tree over passes makes results independent of that size.
 //!
-//! Jobs that are timed side by side run by quadruples: one worker runs two batches of every arm in the
-//! order A B .. B A, so that whatever drifts steadily (clock rate, temperature, other load) adds the
-//! same to each arm. A worker's first quadruple of a group warms it up, and one of which an earlier
-//! process had run a part is not in that order: neither counts as timed (`Work::settled`).
+//! The estimators of a cell are interleaved, so that their CPU times can be compared: one worker runs a
+//! turn of about a second, the same part of every arm's passes in the order A B .. B A, and whatever
+//! drifts steadily (clock rate, temperature, other load) adds the same to each arm. Arms may have
+//! different numbers of passes: a turn is a part of the run, [f, f') of each. A worker's first turn in a
+//! cell warms it up, and one of which an earlier process had run a part is not in that order: neither
+//! counts as timed (`Work::settled`).
+//!
+//! In every eighth turn the first arm's passes run twice, A C B .. B C A: C is the same work as A at
+//! another place in the order, so that the ratio of their times is 1 but for the machine. Its scores are
+//! dropped; its time is kept (`Work::twice`).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,6 +25,7 @@ use super::checkpoint;
 use super::chi_square::{Draws, Sampled};
 use super::interrupt::Interrupt;
 use super::job::{Block, Finished, Job, Passes, Start, Task};
+use super::keys::Stage;
 use super::live::Show;
 use super::pilot;
 use super::progress::Progress;
@@ -33,6 +40,8 @@ pub(crate) struct Settings<'a> {
     pub threads: usize,
     /// Passes per block, where the user sets them.
     pub block_passes: Option<u64>,
+    /// Whether the estimators of a cell run by turns.
+    pub is_interleaved: bool,
     /// Flag that asks to stop.
     pub interrupt: &'a Interrupt,
     /// Folder of the experiment's results.
@@ -75,6 +84,10 @@ impl Completed {
 
 /// Wall time that a block should take, seconds.
 const BLOCK_SECONDS: f64 = 0.25;
+/// Wall time that a turn of all arms should take, seconds.
+const TURN_SECONDS: f64 = 1.0;
+/// One turn in so many runs passes of the first arm twice.
+const CONTROL_EVERY: u64 = 8;
 /// Time between checkpoints of a job under way.
 const CHECKPOINT_EVERY: Duration = Duration::from_secs(5);
 
@@ -92,12 +105,16 @@ struct Queue {
     active: Option<Active>,
 }
 
-/// The group of jobs under way: one, or the arms that are timed side by side.
+/// The group of jobs under way: one, or the arms of a cell.
 struct Active {
     group: usize,
     lanes: Vec<Lane>,
-    /// Number of the next quadruple of batches.
-    quadruple: u64,
+    /// Passes of the longest lane that turns have been given.
+    given: u64,
+    /// Number of the next turn.
+    turn: u64,
+    /// Wall time of a pass; of interleaved arms, of a pass of the longest lane with its part of the
+    /// others.
     seconds_per_pass: Option<f64>,
 }
 
@@ -115,6 +132,16 @@ struct Span {
     start: u64,
     end: u64,
     keep_level: u32,
+    twice: Option<Second>,
+}
+
+/// When passes run a second time for the sake of the clock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Second {
+    /// Before the run that counts.
+    Before,
+    /// After it.
+    After,
 }
 
 /// Unit of work of a worker.
@@ -129,7 +156,9 @@ enum Unit {
 struct Turn {
     group: usize,
     spans: Vec<Span>,
-    /// They are whole batches of rivals in an order that cancels drift.
+    /// Passes of the longest lane.
+    passes: u64,
+    /// They are passes of rivals in an order that cancels drift.
     is_balanced: bool,
 }
 
@@ -148,7 +177,7 @@ struct Pool<'a> {
 pub(crate) fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed>> {
     let queue = Mutex::new(Queue { next_group: 0, active: None });
     let samplers = jobs.iter().filter(|job| job.draws().is_some()).count();
-    let pool = Pool { jobs, groups: groups(jobs), samplers, settings, queue };
+    let pool = Pool { jobs, groups: groups(jobs, settings.is_interleaved), samplers, settings, queue };
     // Bounded: blocks with images wait with their workers, not in memory.
     let (sender, receiver) = mpsc::sync_channel(settings.threads);
     std::thread::scope(|scope| {
@@ -165,14 +194,13 @@ pub(crate) fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed
     })
 }
 
-/// Jobs that are timed side by side, together; the others one by one.
-fn groups(jobs: &[Job]) -> Vec<Vec<usize>> {
+/// The jobs of a cell together, where they are interleaved; the others one by one.
+fn groups(jobs: &[Job], is_interleaved: bool) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
-    let side_by_side = |job: &Job| job.passes().and_then(Passes::side_by_side);
-    for (index, job) in jobs.iter().enumerate() {
-        let own = side_by_side(job);
-        let same = |group: &&mut Vec<usize>| side_by_side(&jobs[group[0]]) == own;
-        match groups.iter_mut().find(same).filter(|_| own.is_some()) {
+    let cell = |index: usize| jobs[index].passes().map(|passes| passes.cell).filter(|_| is_interleaved);
+    for index in 0..jobs.len() {
+        let own = cell(index);
+        match groups.iter_mut().find(|group| own.is_some() && cell(group[0]) == own) {
             Some(group) => group.push(index),
             None => groups.push(vec![index]),
         }
@@ -180,19 +208,33 @@ fn groups(jobs: &[Job]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Two batches of every arm in the order A B .. B A, except what is done already; and whether nothing
-/// of it was.
-fn quadruple(lanes: &[Lane], number: u64) -> (Vec<Span>, bool) {
-    let span = |lane: &Lane, batch: u64| {
+/// Whole batches of the longest lane of whose part every lane has done all.
+fn done_everywhere(lanes: &[Lane]) -> u64 {
+    let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
+    let part =
+        |lane: &Lane| u128::from(lane.next) * u128::from(longest) / u128::from(lane.passes.max(1));
+    let level = batch_level(longest);
+    (lanes.iter().map(part).min().unwrap_or(0) as u64 >> level) << level
+}
+
+/// The passes [from, from + length) of the longest lane and the same part of every other, in the order
+/// A B .. B A, except what is done already; and whether nothing of it was. A last pass has no way back.
+fn turn(lanes: &[Lane], from: u64, length: u64, has_control: bool) -> (Vec<Span>, bool) {
+    let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
+    let [middle, end] = [length.div_ceil(2), length].map(|passes| longest.min(from + passes));
+    let span = |lane: &Lane, (from, to): (u64, u64), second: Second| {
+        let part = u128::from(lane.passes);
+        let at = |pass: u64| (u128::from(pass) * part / u128::from(longest)) as u64;
         let keep_level = batch_level(lane.passes);
-        let at = |batch: u64| lane.passes.min(batch << keep_level);
-        Span { job: lane.job, start: at(batch).max(lane.next), end: at(batch + 1), keep_level }
+        let twice = (has_control && lane.job == lanes[0].job).then_some(second);
+        Span { job: lane.job, start: at(from), end: at(to), keep_level, twice }
     };
-    let there = lanes.iter().map(|lane| span(lane, 2 * number));
-    let back = lanes.iter().rev().map(|lane| span(lane, 2 * number + 1));
-    let spans: Vec<Span> = there.chain(back).collect();
-    let is_whole = spans.iter().all(|span| span.end == span.start + (1 << span.keep_level));
-    (spans.into_iter().filter(|span| span.start < span.end).collect(), is_whole)
+    let there = lanes.iter().map(|lane| (lane, span(lane, (from, middle), Second::After)));
+    let back = lanes.iter().rev().map(|lane| (lane, span(lane, (middle, end), Second::Before)));
+    let spans: Vec<(&Lane, Span)> = there.chain(back).collect();
+    let is_whole = length > 1 && spans.iter().all(|(lane, span)| span.start >= lane.next);
+    let left = |(lane, span): (&Lane, Span)| Span { start: span.start.max(lane.next), ..span };
+    (spans.into_iter().map(left).filter(|span| span.start < span.end).collect(), is_whole)
 }
 
 /// Stops the other threads where one panics: the run is lost, and they should not continue to its end.
@@ -230,15 +272,17 @@ impl Pool<'_> {
         let begun = Instant::now();
         for span in &turn.spans {
             let job = self.jobs[span.job].passes()?;
-            let mut block = job.run(job.stage, span.start, span.end, span.keep_level, &stop)?;
+            let run = || job.run(job.stage, span.start, span.end, span.keep_level, &stop);
+            let before = if span.twice == Some(Second::Before) { Some(run()?) } else { None };
+            let mut block = run()?;
+            let after = if span.twice == Some(Second::After) { Some(run()?) } else { None };
             if turn.is_balanced && is_warm {
-                block.settle(span.keep_level);
+                block.settle(span.keep_level, before.or(after).as_ref());
             }
             // Sent before the lock is asked for, which another worker's pilot may hold for long.
             sender.send(Message::Block { job: span.job, block: Box::new(block) }).ok()?;
         }
-        let passes: u64 = turn.spans.iter().map(|span| span.end - span.start).sum();
-        let seconds = begun.elapsed().as_secs_f64() / passes as f64;
+        let seconds = begun.elapsed().as_secs_f64() / turn.passes as f64;
         if let Some(active) = self.lock().active.as_mut().filter(|a| a.group == turn.group) {
             active.seconds_per_pass = Some(seconds);
         }
@@ -293,7 +337,8 @@ impl Pool<'_> {
                     Task::Estimate(passes) => lanes.push(self.begin(index, passes, sender)?),
                 }
             }
-            queue.active = Some(Active { group, lanes, quadruple: 0, seconds_per_pass: None });
+            let given = done_everywhere(&lanes);
+            queue.active = Some(Active { group, lanes, given, turn: 0, seconds_per_pass: None });
         }
     }
 
@@ -304,19 +349,37 @@ impl Pool<'_> {
             let start = lane.next;
             let end = lane.passes.min(start + self.block_length(active));
             active.lanes[0].next = end;
-            let span = Span { job: lane.job, start, end, keep_level: batch_level(lane.passes) };
-            return (start < end).then(|| Turn { group, spans: vec![span], is_balanced: false });
+            let (keep_level, twice) = (batch_level(lane.passes), None);
+            let span = Span { job: lane.job, start, end, keep_level, twice };
+            let passes = end - start;
+            return (passes > 0).then(|| Turn { group, spans: vec![span], passes, is_balanced: false });
         }
-        let batches = |lane: &Lane| lane.passes.div_ceil(1 << batch_level(lane.passes));
-        let most = active.lanes.iter().map(batches).max();
-        while 2 * active.quadruple < most? {
-            let (spans, is_balanced) = quadruple(&active.lanes, active.quadruple);
-            active.quadruple += 1;
+        let longest = active.lanes.iter().map(|lane| lane.passes).max()?;
+        while active.given < longest {
+            let passes = self.turn_length(active, longest);
+            let is_main = self.jobs[active.lanes[0].job].passes()?.stage == Stage::Main;
+            let has_control = is_main && active.turn % CONTROL_EVERY == CONTROL_EVERY - 1;
+            let (spans, is_balanced) = turn(&active.lanes, active.given, passes, has_control);
+            active.given += passes;
             if !spans.is_empty() {
-                return Some(Turn { group, spans, is_balanced });
+                active.turn += 1;
+                return Some(Turn { group, spans, passes, is_balanced });
             }
         }
         None
+    }
+
+    /// Passes of the longest lane in the next turn: a power of two, so that turns fill batches, and at
+    /// most a batch of passes, so that a warm-up costs no more.
+    fn turn_length(&self, active: &Active, longest: u64) -> u64 {
+        let left = longest - active.given;
+        if let Some(passes) = self.settings.block_passes {
+            return left.min(passes.saturating_mul(2));
+        }
+        let fair = left / (2 * self.settings.threads as u64);
+        let timed = active.seconds_per_pass.map_or(0, |s| (TURN_SECONDS / s.max(1e-9)) as u64);
+        let power = timed.min(fair).max(2).ilog2().min(active.given.trailing_zeros());
+        left.min(1 << power.min(batch_level(longest)).max(1))
     }
 
     fn block_length(&self, active: &Active) -> u64 {
@@ -488,18 +551,17 @@ impl<'a> Collector<'a> {
 mod tests {
     use super::*;
 
-    /// (job, first pass, last) of a quadruple.
-    fn order(lanes: &[Lane], number: u64) -> (Vec<(usize, u64, u64)>, bool) {
-        let (spans, is_whole) = quadruple(lanes, number);
+    /// (job, first pass, last) of a turn.
+    fn order(lanes: &[Lane], from: u64, length: u64) -> (Vec<(usize, u64, u64)>, bool) {
+        let (spans, is_whole) = turn(lanes, from, length, false);
         (spans.iter().map(|s| (s.job, s.start, s.end)).collect(), is_whole)
     }
 
     #[test]
     fn rivals_run_in_an_order_that_cancels_drift() {
-        let lane = |job, next| Lane { job, passes: 300, next };
-        // 300 passes: batches of 4.
-        let lanes = [lane(3, 0), lane(5, 0), lane(8, 0)];
-        let (spans, is_whole) = order(&lanes, 1);
+        let lane = |job| Lane { job, passes: 300, next: 0 };
+        let lanes = [lane(3), lane(5), lane(8)];
+        let (spans, is_whole) = order(&lanes, 8, 8);
         assert!(is_whole);
         let expected = [(3, 8, 12), (5, 8, 12), (8, 8, 12), (8, 12, 16), (5, 12, 16), (3, 12, 16)];
         assert_eq!(spans, expected);
@@ -508,17 +570,36 @@ mod tests {
             let places = spans.iter().enumerate().filter(|(_, s)| s.0 == job).map(|(i, _)| i);
             assert_eq!(places.sum::<usize>(), 5);
         }
+        // The first arm's second run stands next to its first, outwards of the others: A C B .. B C A.
+        let (spans, _) = turn(&lanes, 8, 8, true);
+        let twice: Vec<Option<Second>> = spans.iter().map(|span| span.twice).collect();
+        assert_eq!(twice, [Some(Second::After), None, None, None, None, Some(Second::Before)]);
+    }
+
+    #[test]
+    fn arms_of_different_lengths_run_the_same_part() {
+        let lanes = [Lane { job: 0, passes: 300, next: 0 }, Lane { job: 1, passes: 1000, next: 0 }];
+        let turns: Vec<_> = (0..250).flat_map(|i| order(&lanes, 4 * i, 4).0).collect();
+        for (job, passes) in [(0, 300), (1, 1000)] {
+            let mut own: Vec<(u64, u64)> =
+                turns.iter().filter(|s| s.0 == job).map(|s| (s.1, s.2)).collect();
+            assert!(own.windows(2).all(|pair| pair[0].1 == pair[1].0), "no pass is missed or run twice");
+            assert_eq!((own.remove(0).0, own.pop().map(|last| last.1)), (0, Some(passes)));
+        }
+        // 150.6 passes of the first arm end in this turn's way back.
+        assert_eq!(order(&lanes, 500, 4).0, [(1, 500, 502), (1, 502, 504), (0, 150, 151)]);
     }
 
     #[test]
     fn what_was_run_is_not_run_again() {
         let lane = |job, next| Lane { job, passes: 300, next };
         let lanes = [lane(0, 10), lane(1, 16)];
-        assert_eq!(order(&lanes, 0), (vec![], false));
-        assert_eq!(order(&lanes, 1), (vec![(0, 10, 12), (0, 12, 16)], false));
-        assert!(order(&lanes, 2).1);
-        // 75 batches: the last quadruple is a half.
-        assert_eq!(order(&lanes, 37), (vec![(0, 296, 300), (1, 296, 300)], false));
-        assert!(order(&lanes, 38).0.is_empty());
+        assert_eq!(done_everywhere(&lanes), 8);
+        assert_eq!(order(&lanes, 0, 8), (vec![], false));
+        assert_eq!(order(&lanes, 8, 8), (vec![(0, 10, 12), (0, 12, 16)], false));
+        assert!(order(&lanes, 16, 8).1);
+        // A last pass has no way back.
+        assert_eq!(order(&lanes, 299, 1), (vec![(0, 299, 300), (1, 299, 300)], false));
+        assert!(order(&lanes, 300, 8).0.is_empty());
     }
 }

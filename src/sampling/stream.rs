@@ -83,13 +83,40 @@ impl PassKey {
     /// one of its inputs, must both collide before two streams are the same.
     #[inline]
     pub fn stream(&self, index: u64, purpose: Purpose) -> Stream {
+        #[cfg(test)]
+        OPENED.with_borrow_mut(|opened| {
+            opened.iter_mut().for_each(|all| all.push((*self, index, purpose)))
+        });
         let purpose = purpose as u64;
         let x = mix(self.lanes[0] ^ index.wrapping_mul(INDEX[0]).wrapping_add(purpose << 56));
         let y = mix(self.lanes[1] ^ index.rotate_left(32).wrapping_mul(INDEX[1]).wrapping_sub(purpose));
         let state = [x ^ self.tail[0], mix(y ^ self.tail[1])];
         let increment = [mix(x.wrapping_add(self.tail[1])), y.wrapping_sub(self.tail[0])];
-        Stream { generator: Pcg64Dxsm::new(join(state), join(increment)), draws: 0 }
+        Stream {
+            generator: Pcg64Dxsm::new(join(state), join(increment)),
+            draws: 0,
+            #[cfg(test)]
+            script: Default::default(),
+        }
     }
+}
+
+/// A stream by its name: pass, index, purpose.
+#[cfg(test)]
+type OpenedStream = (PassKey, u64, Purpose);
+
+#[cfg(test)]
+thread_local! {
+    /// Streams that this thread has opened, while an audit asks for them.
+    static OPENED: std::cell::RefCell<Option<Vec<OpenedStream>>> = const { std::cell::RefCell::new(None) };
+}
+
+/// The streams that the calling thread opens in `work`.
+#[cfg(test)]
+pub(crate) fn opened_by(work: impl FnOnce()) -> Vec<OpenedStream> {
+    OPENED.set(Some(Vec::new()));
+    work();
+    OPENED.take().expect("set above")
 }
 
 fn join([high, low]: [u64; 2]) -> u128 {
@@ -101,6 +128,9 @@ fn join([high, low]: [u64; 2]) -> u128 {
 pub struct Stream {
     generator: Pcg64Dxsm,
     draws: u64,
+    /// Numbers that come before the generator's.
+    #[cfg(test)]
+    script: std::collections::VecDeque<f64>,
 }
 
 impl Stream {
@@ -108,6 +138,10 @@ impl Stream {
     #[inline]
     pub fn draw(&mut self) -> f64 {
         self.draws += 1;
+        #[cfg(test)]
+        if let Some(number) = self.script.pop_front() {
+            return number;
+        }
         (self.generator.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
@@ -134,6 +168,14 @@ impl Stream {
     pub fn draws(&self) -> u64 {
         self.draws
     }
+
+    /// A stream that begins with these numbers.
+    #[cfg(test)]
+    pub(crate) fn scripted(numbers: &[f64]) -> Stream {
+        let mut stream = StreamKey::named("scripted").pass(0).stream(0, Purpose::Connection);
+        stream.script = numbers.iter().copied().collect();
+        stream
+    }
 }
 
 #[cfg(test)]
@@ -152,6 +194,15 @@ mod tests {
     const FROZEN: [u64; 4] =
         [4607173566107404283, 4606326434038641471, 4605347230709447812, 4601066195608706346];
 
+    const PURPOSES: [Purpose; 6] = [
+        Purpose::Sensor,
+        Purpose::Walk,
+        Purpose::Light,
+        Purpose::Connection,
+        Purpose::Hero,
+        Purpose::Cloud,
+    ];
+
     /// The audit: neighbouring passes, pixels and purposes, k-th draw against k-th draw.
     #[test]
     fn neighbouring_streams_are_independent() {
@@ -162,8 +213,8 @@ mod tests {
             ("passes", |j| StreamKey::named("passes").pass(j).stream(9, Purpose::Walk)),
             ("high pixels", |j| StreamKey::named("high pixels").pass(0).stream(j << 24, Purpose::Light)),
             ("purposes", |j| {
-                let purpose = [Purpose::Sensor, Purpose::Walk, Purpose::Light, Purpose::Light];
-                StreamKey::named("purposes").pass(j / 4).stream(j % 4 / 3, purpose[(j % 4) as usize])
+                let purpose = PURPOSES[(j % 6) as usize];
+                StreamKey::named("purposes").pass(j / 12).stream(j % 12 / 6, purpose)
             }),
         ];
         let mut tests = 0;
@@ -212,8 +263,8 @@ mod tests {
     fn no_two_streams_of_a_run_start_alike() {
         let mut starts: Vec<(u64, u64)> = (0..300_000u64)
             .map(|j| {
-                let purpose = if j % 2 == 0 { Purpose::Walk } else { Purpose::Light };
-                let mut stream = StreamKey::named("pixels").pass(j / 4096).stream(j % 4096 / 2, purpose);
+                let purpose = PURPOSES[(j % 6) as usize];
+                let mut stream = StreamKey::named("pixels").pass(j / 6144).stream(j % 6144 / 6, purpose);
                 (stream.draw().to_bits(), stream.draw().to_bits())
             })
             .collect();

@@ -1,5 +1,6 @@
 //! The immutable scene: a body in vacuum, lights, a sensor.
 
+mod invariants;
 mod latlong;
 mod light;
 pub mod sensor;
@@ -30,8 +31,23 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Name of the medium's emission among the sources of light, as in `mean@emission`.
+    pub const EMISSION: &str = "emission";
+
     /// Number of bands.
     pub fn bands(&self) -> usize {
         self.medium.len()
+    }
+
+    /// Whether the medium emits in any band.
+    pub fn emits(&self) -> bool {
+        self.medium.iter().any(|medium| medium.emission > 0.0)
+    }
+
+    /// Names of the sources of light: the lights in their order, and after them the medium where it
+    /// emits.
+    pub fn sources(&self) -> impl Iterator<Item = &str> {
+        let lights = self.lights.iter().map(|light| light.name.as_str());
+        lights.chain(self.emits().then_some(Scene::EMISSION))
     }
 }

@@ -8,6 +8,8 @@ pub(crate) mod evidence;
 pub(crate) mod goodness;
 /// Significance tests of means, and the smallest difference that they detect.
 pub mod hypothesis;
+/// What a mean is at least, without a word about its tail.
+pub(crate) mod lower_bound;
 /// Mergeable moments of scalars and images.
 pub mod moments;
 /// Many tests under one error rate.
@@ -21,7 +23,7 @@ pub mod tree;
 
 /// Every test under hypotheses that are true by construction.
 #[cfg(test)]
-mod calibration;
+pub(crate) mod calibration;
 /// Whether p-values are uniform.
 #[cfg(test)]
-mod kolmogorov;
+pub(crate) mod kolmogorov;

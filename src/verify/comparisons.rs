@@ -7,21 +7,26 @@
 //! resolved is judged as for claims (`verify::efficiency`). The metric is the sensor's first observable,
 //! by class; where it has pixels, `pixels` beside it: the variance of a pixel, averaged over the image.
 //! Controls are in the table as candidates, by CPU time alone.
+//!
+//! Where there is no ratio because of the baseline's tail alone, its variance has a lower bound all the
+//! same, and so has the ratio (`stats::lower_bound`). Whether the means agree is then open: a mean with
+//! such a tail has no interval. But where scores are never negative it has a lower bound, too, and a
+//! candidate whose mean lies below that misses light: then there is no bound of the ratio.
 
 use serde::Serialize;
 
-use super::efficiency::{contest, mean_of};
-use super::evidence::{CONFIDENCE, Evidence};
-use super::means::evidence_of_means;
+use super::efficiency::{contest, control_ratio, mean_of};
+use super::evidence::{CONFIDENCE, Evidence, SHOWN};
+use super::means::{QuantityMean, evidence_of_means};
 use super::verdict::known;
 use super::weights;
 use crate::results::csv_text;
 use crate::results::record::{Cell, CostMeasure, EstimatorRun, Observable, Quantity, StatedBias};
 use crate::results::store::Stored;
+use crate::stats::hypothesis::Estimate;
+use crate::stats::lower_bound::mean_at_least;
+use crate::stats::tails::critical_value;
 use crate::stats::tree::total;
-
-/// Confidence of the intervals shown.
-pub(crate) const SHOWN: f64 = 0.95;
 
 /// The probability that any efficiency of a table is withheld although the means are equal.
 const LEVEL: f64 = 1e-3;
@@ -51,6 +56,9 @@ pub(crate) struct EfficiencyRow {
     pub ci_high: Option<f64>,
     /// Confidence of the interval.
     pub confidence: f64,
+    /// What the ratio is at least, where only the baseline's tail is not resolved, at the one-sided
+    /// confidence that goes with the interval: 97.5 %.
+    pub at_least: Option<f64>,
     /// Variance of a pass, baseline over candidate.
     pub variance_ratio: Option<f64>,
     /// CPU time of a pass, baseline over candidate; over the whole run.
@@ -62,8 +70,10 @@ pub(crate) struct EfficiencyRow {
     pub resolved: bool,
     /// What counts as cost.
     pub cost: CostMeasure,
-    /// Whether the two were timed side by side; by counters it does not matter.
-    pub side_by_side: bool,
+    /// Whether the two were interleaved and timed with a control; by counters it does not matter.
+    pub interleaved: bool,
+    /// CPU time of the control: passes of the cell's first estimator over that of the same passes.
+    pub control_ratio: Option<f64>,
     /// Kurtosis of a pass of the baseline.
     pub kurtosis_baseline: Option<f64>,
     /// Kurtosis of a pass of the candidate.
@@ -148,9 +158,13 @@ fn is_silent(stored: &Stored, quantity: &Quantity) -> bool {
 fn row(stored: &Stored, subject: &RowSubject, level: f64) -> EfficiencyRow {
     let RowSubject { cell, baseline, candidate, cost } = subject;
     let Observable { name, class } = &baseline.1.observable;
-    let note = bias_objection(&[baseline.0, candidate.0])
-        .or_else(|| means_objection(stored, &candidate.1, &baseline.1, level))
-        .unwrap_or_default();
+    let biased = bias_objection(&[baseline.0, candidate.0]).map(|note| (note, false));
+    let (note, is_bounded) =
+        biased.or_else(|| means_objection(stored, &candidate.1, &baseline.1, level)).unwrap_or_default();
+    let control_ratio = match cost {
+        CostMeasure::Counters => None,
+        CostMeasure::Cpu => control_ratio(stored, &candidate.1, &baseline.1),
+    };
     let row = EfficiencyRow {
         experiment: stored.record.experiment.clone(),
         cell: cell.label.clone(),
@@ -163,27 +177,33 @@ fn row(stored: &Stored, subject: &RowSubject, level: f64) -> EfficiencyRow {
         cpu_cost_ratio: ratio(cpu(stored, cell, baseline.0), cpu(stored, cell, candidate.0)),
         ray_cost_ratio: ratio(rays(stored, baseline.0), rays(stored, candidate.0)),
         cost: *cost,
-        side_by_side: *cost == CostMeasure::Counters,
+        interleaved: *cost == CostMeasure::Counters || control_ratio.is_some(),
+        control_ratio,
         note,
         ..EfficiencyRow::default()
     };
-    if !row.note.is_empty() {
+    if !row.note.is_empty() && !is_bounded {
         return row;
     }
     let contest = match contest(stored, &candidate.1, &baseline.1, *cost) {
         Ok(contest) => contest,
+        Err(_) if is_bounded => return row,
         Err(note) => return EfficiencyRow { note, ..row },
     };
+    let at_least = contest.at_least.and_then(known);
+    if is_bounded {
+        return EfficiencyRow { at_least, ..row };
+    }
     let efficiency = contest.efficiency;
-    let (low, high) = efficiency.work.interval(SHOWN);
+    let (low, high) = contest.ratio.interval(SHOWN);
     let resolved = efficiency.is_resolved(CONFIDENCE);
     EfficiencyRow {
+        at_least: at_least.filter(|_| !resolved),
         efficiency_ratio: known(efficiency.work.ratio()),
         ci_low: known(low),
         ci_high: known(high),
         variance_ratio: known(efficiency.variance.ratio()),
         resolved,
-        side_by_side: contest.side_by_side,
         kurtosis_baseline: known(efficiency.a.kurtosis),
         kurtosis_candidate: known(efficiency.b.kurtosis),
         note: if resolved { String::new() } else { "not resolved".into() },
@@ -204,22 +224,38 @@ fn bias_objection(runs: &[&EstimatorRun]) -> Option<String> {
     })
 }
 
-/// Why the two cannot be taken to estimate one number.
+/// Why the two cannot be taken to estimate one number, and whether that leaves a bound of the ratio.
 fn means_objection(
     stored: &Stored,
     candidate: &Quantity,
     baseline: &Quantity,
     level: f64,
-) -> Option<String> {
+) -> Option<(String, bool)> {
     let held = evidence_of_means(stored, &mean_of(stored, candidate), &mean_of(stored, baseline));
     match held.evidence {
         Evidence::Difference { difference, .. } => {
             let p = difference.test_zero().p_value;
-            (p < level || p.is_nan()).then(|| format!("the means differ, p = {p:.1e}"))
+            (p < level || p.is_nan()).then(|| (format!("the means differ, p = {p:.1e}"), false))
         }
-        Evidence::Nothing(reason) => Some(format!("no mean test: {reason}")),
-        _ => Some("zero variance".into()),
+        Evidence::Nothing(_)
+            if held.other_tail_alone && misses_light(stored, candidate, baseline, level) =>
+        {
+            Some(("the means differ: the candidate's is too small".into(), false))
+        }
+        Evidence::Nothing(reason) => Some((format!("no mean test: {reason}"), held.other_tail_alone)),
+        _ => Some(("zero variance".into(), false)),
     }
+}
+
+/// Whether the candidate's mean is shown to be below that of the baseline, whose tail allows no t test;
+/// also where scores are negative, so that nothing can be shown.
+fn misses_light(stored: &Stored, candidate: &Quantity, baseline: &Quantity, level: f64) -> bool {
+    let mean = |quantity| QuantityMean::of(stored, &mean_of(stored, quantity));
+    let Some((candidate, baseline)) = mean(candidate).zip(mean(baseline)) else { return true };
+    let batches: Vec<f64> = baseline.batches.iter().map(|batch| batch.mean).collect();
+    let Some(least) = mean_at_least(&batches, 0.5 * level) else { return true };
+    let Estimate { value, std_error, dof } = candidate.mean;
+    least > value + critical_value(level, dof) * std_error
 }
 
 /// CPU time of a pass, seconds, where it was measured.
@@ -285,6 +321,29 @@ mod tests {
             rows.iter().all(|r| r.note.contains("the means differ") && r.efficiency_ratio.is_none())
         );
         assert!(rows.iter().all(|r| r.variance_ratio.is_none() && !r.resolved));
+    }
+
+    /// One batch of `mis` holds most of its variance: no mean test and no ratio, but a bound. Scores of
+    /// `mis` are never negative.
+    #[test]
+    fn a_baseline_with_a_tail_leaves_a_bound() {
+        let mut stored = sample::stored(0.1);
+        let heavy = |i: u64| if i % 16 == 3 { 1.0 + 0.2 * uniform(i).abs() } else { 0.9 };
+        let spiked = move |i: u64, _: usize, _: usize| if i == 77 { 9.0 } else { heavy(i) };
+        set_observables(&mut stored, "mis", spiked);
+        set_observables(&mut stored, "snee", |i, _, _| 0.94 + 0.001 * uniform(i + 7000));
+        let rows = comparisons(&stored);
+        let row = rows.iter().find(|r| r.metric == "mean" && r.cost == CostMeasure::Counters);
+        let row = row.expect("a row");
+        assert!(row.note.contains("heavy tail") && row.efficiency_ratio.is_none(), "{row:?}");
+        assert!(row.at_least.is_some_and(|bound| bound > 10.0), "{row:?}");
+        // A candidate that misses light has no bound, nor has one with a tail of its own.
+        let mut dark = stored.clone();
+        set_observables(&mut dark, "snee", |i, _, _| 0.5 + 0.001 * uniform(i + 7000));
+        assert!(comparisons(&dark).iter().all(|r| r.at_least.is_none()), "{:?}", comparisons(&dark));
+        set_observables(&mut stored, "snee", spiked);
+        let own = comparisons(&stored);
+        assert!(own.iter().filter(|r| r.metric == "mean").all(|r| r.at_least.is_none()), "{own:?}");
     }
 
     #[test]

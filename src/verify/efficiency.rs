@@ -16,10 +16,15 @@
 //! Before any number is quoted
 //!   the two means agree: the test that an `agree` claim would make. An objection to it voids the claim;
 //!   E is resolved: it moved by no more than its 99.9 % interval when the passes doubled, and no pass
-//!   may hold more than 5 % of an arm's sum of squares; by CPU time, the blocks are quadruples run side
-//!   by side, A B .. B A, and the baseline against its own control arm has 1 in the 99.9 % intervals of
-//!   both E and the cost ratio. Quadruples that warmed a worker up or were run in parts are left out
-//!   whole: which ones these are does not depend on the scores.
+//!   may hold more than 5 % of an arm's sum of squares; by CPU time, the blocks are parts of a run that
+//!   interleaved the arms of the cell, A B .. B A (`run::workers`), the interval contains what the clock's
+//!   control shows of the machine (`stats::efficiency`), and the baseline against its own control arm has
+//!   1 in the 99.9 % intervals of both E and the cost ratio. Parts that warmed a worker up or were run in
+//!   pieces are left out whole: which ones these are does not depend on the scores.
+//!
+//! By counted work E may be off by the factor f of the two kinds of estimators
+//! (`results::counted_work`), so that the claim must hold whatever the clock says within it: e f stands
+//! for e where it must be exceeded, e / f where it is rejected.
 //!
 //! Then the claim
 //!   fails, where the p-value 2 min(p_mean, p_slow) is rejected in the family of all tests (Holm), with
@@ -30,27 +35,37 @@
 //!   otherwise. `detectable` is the smallest shortfall of E below e, relative to e, that would have
 //!   failed with 99 % probability.
 
-use super::evidence::{CONFIDENCE, EfficiencyTest, Evidence, kurtosis_words};
+use super::evidence::{CONFIDENCE, EfficiencyTest, Evidence, SHOWN, kurtosis_words};
 use super::family::Finding;
 use super::means::{MeanTest, evidence_of_means};
 use super::verdict::{TestKind, Verdict};
 use super::weights;
+use crate::math::{exp, ln};
+use crate::results::counted_work;
 use crate::results::record::{CostMeasure, EstimatorRun, Quantity};
 use crate::results::store::Stored;
-use crate::stats::efficiency::{Efficiency, JackknifeBlock, LogRatio, Values, compare};
+use crate::stats::efficiency::{Efficiency, JackknifeBlock, LogRatio, Values, compare, machine};
 use crate::stats::hypothesis::{Estimate, Test};
 use crate::stats::moments::Moments;
 use crate::stats::tree::Merge;
 
-/// The fewest quadruples that a ratio of CPU times may rest on.
-const LEAST_QUADRUPLES: usize = 16;
+/// The fewest parts of a run that a ratio of CPU times may rest on.
+const LEAST_PARTS: usize = 16;
 
 /// Two arms at equal cost.
 pub(crate) struct Contest {
-    /// Baseline over candidate: above 1 where the candidate is the better.
+    /// Baseline over candidate: above 1 where the candidate is the better. Its intervals are those of
+    /// the scores and costs alone.
     pub efficiency: Efficiency,
-    /// Whether they were timed side by side; always true by counters.
-    pub side_by_side: bool,
+    /// The efficiency ratio with the error that the clock's control shows.
+    pub ratio: LogRatio,
+    /// Of interleaved arms by CPU time: the time of the first arm's control over its own.
+    pub control: Option<f64>,
+    /// Whether the arms were interleaved, and timed with a control; always true by counters.
+    pub is_interleaved: bool,
+    /// What the ratio is at least, with [`SHOWN`] confidence from below and above together, where only
+    /// the tail of the baseline is not resolved.
+    pub at_least: Option<f64>,
 }
 
 /// Compares two quantities of a record.
@@ -65,23 +80,51 @@ pub(crate) fn contest(
 ) -> Result<Contest, String> {
     let a = CostedBatches::of(stored, candidate, measure)?;
     let b = CostedBatches::of(stored, baseline, measure)?;
-    let (side_by_side, a, b) = match measure {
-        CostMeasure::Counters => (true, a.blocks(), b.blocks()),
-        CostMeasure::Cpu => {
-            let (a_quadruples, b_quadruples) = quadruples(&a, &b);
-            if a_quadruples.len() >= LEAST_QUADRUPLES {
-                (true, a_quadruples, b_quadruples)
-            } else {
-                (false, a.blocks(), b.blocks())
-            }
-        }
+    let control = match measure {
+        CostMeasure::Counters => None,
+        CostMeasure::Cpu => control_log(stored, candidate.cell),
     };
+    let parts = control.map(|_| parts(&a, &b)).filter(|(a, _)| a.len() >= LEAST_PARTS);
+    let control = control.filter(|_| parts.is_some());
+    let (a, b) = parts.unwrap_or_else(|| (a.blocks(), b.blocks()));
     let values = match baseline.observable.is_pixels() {
         true => Values::Variances,
         false => Values::Scores,
     };
     let efficiency = compare(&b, &a, values).map_err(|why| why.to_string())?;
-    Ok(Contest { efficiency, side_by_side })
+    let machine = machine_of(stored, control);
+    let at_least = efficiency.at_least(&b, values, &machine, 0.5 * (1.0 + SHOWN));
+    Ok(Contest {
+        ratio: efficiency.work.with_control(&machine),
+        is_interleaved: measure == CostMeasure::Counters || control.is_some(),
+        at_least,
+        control: control.map(exp),
+        efficiency,
+    })
+}
+
+/// The time of the control over that of its first run, where the CPU times of two quantities are of
+/// interleaved passes.
+pub(super) fn control_ratio(stored: &Stored, candidate: &Quantity, baseline: &Quantity) -> Option<f64> {
+    let costed = |quantity| CostedBatches::of(stored, quantity, CostMeasure::Cpu).ok();
+    let (a, _) = parts(&costed(candidate)?, &costed(baseline)?);
+    control_log(stored, candidate.cell).filter(|_| a.len() >= LEAST_PARTS).map(exp)
+}
+
+/// What the controls of a record's cells show of the machine, where a cell has one of its own.
+fn machine_of(stored: &Stored, own: Option<f64>) -> Estimate {
+    let all = || (0..stored.record.cells.len()).filter_map(|cell| control_log(stored, cell));
+    own.map_or(Estimate::known(0.0, 0.0), |own| machine(own, &all().collect::<Vec<_>>()))
+}
+
+/// The time of passes that were run a second time over that of their first run, in the arm of the cell
+/// that has them: the logarithm of the control's ratio to itself.
+fn control_log(stored: &Stored, cell: usize) -> Option<f64> {
+    let label = &stored.record.cells.get(cell)?.label;
+    let arms = stored.timing.as_ref()?.batches.get(label)?.values();
+    let twice = arms.flat_map(|arm| &arm.twice);
+    let [first, second] = twice.fold([0.0; 2], |sum, times| [sum[0] + times[0], sum[1] + times[1]]);
+    (first > 0.0 && second > 0.0).then(|| ln(second / first))
 }
 
 /// The quantity whose mean is reported for that of `quantity`: itself, or the sensor's first observable
@@ -165,21 +208,31 @@ impl CostedBatches {
         blocks.map(|(&moments, &cost)| JackknifeBlock { moments, cost }).collect()
     }
 
-    /// Batches 2q and 2q + 1, where both were timed side by side.
-    fn quadruple(&self, q: usize) -> Option<JackknifeBlock> {
-        let (i, j) = (2 * q, 2 * q + 1);
-        let is_settled = self.settled.get(i).zip(self.settled.get(j)) == Some((&true, &true));
-        is_settled.then(|| JackknifeBlock {
-            moments: self.batches[i].merge(self.batches[j]),
-            cost: self.costs[i] + self.costs[j],
-        })
+    /// The batches that began in each of `count` equal parts of the run; nothing for a part in which one
+    /// was not timed with its rivals.
+    fn parts(&self, count: usize) -> Vec<Option<JackknifeBlock>> {
+        let all: u64 = self.batches.iter().map(|batch| batch.n).sum();
+        let mut parts: Vec<(bool, Option<JackknifeBlock>)> = vec![(true, None); count];
+        let mut start = 0;
+        for (index, block) in self.blocks().into_iter().enumerate() {
+            let (is_settled, part) = &mut parts[(start as u128 * count as u128 / all as u128) as usize];
+            *is_settled &= self.settled[index];
+            let join = |sum: JackknifeBlock| JackknifeBlock {
+                moments: sum.moments.merge(block.moments),
+                cost: sum.cost + block.cost,
+            };
+            *part = Some(part.map_or(block, join));
+            start += block.moments.n;
+        }
+        parts.into_iter().map(|(is_settled, part)| part.filter(|_| is_settled)).collect()
     }
 }
 
-/// The quadruples of both arms in which both were timed.
-fn quadruples(a: &CostedBatches, b: &CostedBatches) -> (Vec<JackknifeBlock>, Vec<JackknifeBlock>) {
-    let count = a.batches.len().min(b.batches.len()) / 2;
-    (0..count).filter_map(|q| a.quadruple(q).zip(b.quadruple(q))).unzip()
+/// The parts of the run in which both arms were timed: two batches or more of each, which ran by turns.
+/// Arms may have different numbers of passes.
+fn parts(a: &CostedBatches, b: &CostedBatches) -> (Vec<JackknifeBlock>, Vec<JackknifeBlock>) {
+    let count = (a.batches.len().min(b.batches.len()) / 2).max(1);
+    a.parts(count).into_iter().zip(b.parts(count)).filter_map(|(a, b)| a.zip(b)).unzip()
 }
 
 /// A candidate against a baseline.
@@ -207,7 +260,7 @@ pub(super) fn finding(
             verdict.set_value(ratio, ratio * shown.ratio.log.std_error);
             Evidence::Efficiency(Box::new(shown))
         }
-        Err(reason) => Evidence::Nothing(reason),
+        Err(reason) => Evidence::Nothing(reason.into()),
     };
     // Streams anew would be timed under other conditions.
     Finding { one_look: true, ..Finding::new(verdict, evidence) }
@@ -227,8 +280,8 @@ fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<Effici
     };
     let contest = contest(stored, candidate, baseline, cost)?;
     if cost == CostMeasure::Cpu {
-        if !contest.side_by_side {
-            return Err("the arms were not timed side by side".into());
+        if !contest.is_interleaved {
+            return Err("the arms were not interleaved: play them in one run, from its start".into());
         }
         control_objection(stored, baseline).map_or(Ok(()), Err)?;
     }
@@ -244,8 +297,13 @@ fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<Effici
             kurtosis_words(kurtosis, 3)
         ));
     }
-    let ratio = efficiency.work;
-    let two_sided = ratio.test(bound);
+    let ratio = contest.ratio;
+    let kind = |quantity: &Quantity| stored.run(quantity).map_or("", |run| run.kind.as_str());
+    let factor = match cost {
+        CostMeasure::Cpu => 1.0,
+        CostMeasure::Counters => counted_work::factor(kind(candidate), kind(baseline))?,
+    };
+    let two_sided = ratio.test(bound / factor);
     let half = 0.5 * two_sided.p_value;
     let slow = if two_sided.statistic < 0.0 { half } else { 1.0 - half };
     let of_means = difference.test_zero().p_value;
@@ -256,6 +314,7 @@ fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<Effici
     Ok(EfficiencyTest {
         ratio,
         bound,
+        factor,
         kurtosis,
         difference: Estimate {
             value: relative(difference.value),
@@ -277,12 +336,13 @@ fn control_objection(stored: &Stored, baseline: &Quantity) -> Option<String> {
     };
     let control = Quantity { estimator: control.estimator.clone(), ..baseline.clone() };
     let contest = match contest(stored, &control, baseline, CostMeasure::Cpu) {
-        Ok(contest) if contest.side_by_side => contest,
-        Ok(_) => return Some("no control: it was not timed side by side".into()),
+        Ok(contest) if contest.is_interleaved => contest,
+        Ok(_) => return Some("no control: it was not interleaved".into()),
         Err(reason) => return Some(format!("no control: {reason}")),
     };
     let excludes_one = |ratio: &LogRatio| ratio.log.value.abs() > ratio.half_width(CONFIDENCE);
-    let (cost, work) = (contest.efficiency.cost, contest.efficiency.work);
+    let machine = machine_of(stored, contest.control.map(ln));
+    let (cost, work) = (contest.efficiency.cost.with_control(&machine), contest.ratio);
     (excludes_one(&cost) || excludes_one(&work)).then(|| {
         format!(
             "machine too noisy: {} against itself has {:.3} times the cost and {:.3} times the efficiency, and \

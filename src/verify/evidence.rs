@@ -1,7 +1,8 @@
 //! What the numbers of one test show by themselves, before they are adjusted for those of other tests.
 
 use super::levels::POWER;
-use super::verdict::{Outcome, Verdict};
+use super::verdict::{Objection, Outcome, Verdict};
+use crate::math::ln;
 use crate::stats::efficiency::LogRatio;
 use crate::stats::goodness::{Goodness, Proportion};
 use crate::stats::hypothesis::{Estimate, Test};
@@ -10,11 +11,14 @@ use crate::stats::signs;
 /// Confidence of the intervals of efficiencies that decide.
 pub(super) const CONFIDENCE: f64 = 0.999;
 
+/// Confidence of the intervals of efficiencies that are shown.
+pub(super) const SHOWN: f64 = 0.95;
+
 /// What the numbers of one test show.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Evidence {
     /// No evidence, for this reason.
-    Nothing(String),
+    Nothing(Objection),
     /// An exact statement: it holds, or it does not.
     Exact { holds: bool, said: String },
     /// A difference with its error; its p-value is this many times that of Student's t.
@@ -128,6 +132,8 @@ pub(super) struct EfficiencyTest {
     pub ratio: LogRatio,
     /// The bound e that E must exceed.
     pub bound: f64,
+    /// The factor by which E may be off because its cost is counted work; 1 by CPU time.
+    pub factor: f64,
     /// Kurtosis of a pass: candidate, baseline.
     pub kurtosis: (f64, f64),
     /// The difference of the means, relative to the larger.
@@ -154,13 +160,24 @@ impl EfficiencyTest {
         match adjusted_p {
             None => Outcome::Invalid("the test has no p-value".into()),
             Some(p) if p < level && self.fails && self.blames_means => {
-                Outcome::Invalid(self.means_differ())
+                Outcome::Invalid(self.means_differ().into())
             }
             Some(p) if p < level => Outcome::Fail,
-            _ if self.ratio.interval(CONFIDENCE).0 <= self.bound => Outcome::Underpowered,
-            _ if detect.is_some_and(|d| self.unseen(own_level) > d) => Outcome::Underpowered,
-            _ => Outcome::Pass,
+            // What is not a number is not above the bound, and nothing is known to be seen.
+            _ if !self.is_shown() => Outcome::Underpowered,
+            _ if detect.is_none_or(|d| self.unseen(own_level) <= d) => Outcome::Pass,
+            _ => Outcome::Underpowered,
         }
+    }
+
+    /// Whether the whole interval lies above the bound.
+    fn is_shown(&self) -> bool {
+        self.ratio.interval(CONFIDENCE).0 > self.must_exceed()
+    }
+
+    /// What the interval of E must lie above.
+    fn must_exceed(&self) -> f64 {
+        self.bound * self.factor
     }
 
     fn means_differ(&self) -> String {
@@ -172,26 +189,39 @@ impl EfficiencyTest {
         self.difference.detectable(own_level, POWER)
     }
 
+    /// Passes over those that there are at which the interval would lie above the bound, and a
+    /// difference of the means as large as `detect` would be seen; none where E itself is too small.
+    pub(super) fn passes_factor(&self, own_level: f64, detect: Option<f64>) -> Option<f64> {
+        let above = self.ratio.log.value - ln(self.must_exceed());
+        let shown = self.ratio.half_width(CONFIDENCE) / above;
+        let seen = detect.map_or(0.0, |d| self.unseen(own_level) / d);
+        (above > 0.0).then(|| (shown * shown).max(seen * seen))
+    }
+
     /// The smallest shortfall of E below e, relative to e, that would have failed: 1 - exp(-d) with d
     /// that of ln E. The p-value is twice the one-sided one, so that its level is that of a two-sided
     /// test.
     fn detectable(&self, own_level: f64) -> f64 {
         let log = Estimate::known(-self.ratio.log.detectable(own_level, POWER), 0.0);
-        1.0 - LogRatio { log }.ratio()
+        1.0 - LogRatio { log }.ratio() / self.factor
     }
 
     /// The reason for an outcome.
     pub(super) fn note(&self, found: &Outcome, own_level: f64) -> String {
         let (low, high) = self.ratio.interval(CONFIDENCE);
+        let counted = match self.factor {
+            1.0 => String::new(),
+            factor => format!(", counted work may be off by {factor:.2} times"),
+        };
         let numbers = format!(
-            "{:.3} times the efficiency, 99.9 % interval {low:.3} to {high:.3}{}",
+            "{:.3} times the efficiency, 99.9 % interval {low:.3} to {high:.3}{counted}{}",
             self.ratio.ratio(),
             kurtosis_words(self.kurtosis, 1)
         );
         match found {
-            Outcome::Invalid(reason) => reason.clone(),
+            Outcome::Invalid(objection) => objection.to_string(),
             Outcome::Fail if self.blames_means => self.means_differ(),
-            Outcome::Underpowered if low <= self.bound => {
+            Outcome::Underpowered if !self.is_shown() => {
                 format!("not shown to exceed {:.3}: {numbers}", self.bound)
             }
             Outcome::Underpowered => format!(
@@ -206,4 +236,32 @@ impl EfficiencyTest {
 /// Two kurtoses at the end of a sentence; nothing where there are none, as of pixels.
 pub(super) fn kurtosis_words((a, b): (f64, f64), decimals: usize) -> String {
     if a.is_nan() { String::new() } else { format!("; kurtosis {a:.decimals$} and {b:.decimals$}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three times the efficiency to 1 %, and means equal to `error`.
+    fn shown(low: f64, error: f64) -> EfficiencyTest {
+        EfficiencyTest {
+            ratio: LogRatio { log: Estimate { value: 1.1, std_error: low, dof: 60.0 } },
+            bound: 1.0,
+            factor: 1.0,
+            kurtosis: (3.0, 3.0),
+            difference: Estimate { value: 0.0, std_error: error, dof: 60.0 },
+            blames_means: false,
+            fails: false,
+            test: Test { statistic: 100.0, dof: 60.0, p_value: 1.0 },
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_number_shows_nothing() {
+        let found = |shown: EfficiencyTest| shown.outcome(Some(1.0), 1e-6, 1e-6, Some(0.1));
+        assert_eq!(found(shown(0.01, 1e-3)), Outcome::Pass);
+        assert_eq!(found(shown(0.01, 0.1)), Outcome::Underpowered);
+        assert_eq!(found(shown(0.01, f64::NAN)), Outcome::Underpowered);
+        assert_eq!(found(shown(f64::NAN, 1e-3)), Outcome::Underpowered);
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::evidence::Evidence;
 use super::levels::{FIRST_LOOK, Looks, SECOND_LOOK};
-use super::verdict::{Outcome, Verdict, known};
+use super::verdict::{Objection, Outcome, Verdict, known};
 use crate::stats::multiplicity::holm;
 
 /// One test of a family.
@@ -52,7 +52,7 @@ enum SecondLook {
     /// Not taken yet.
     Missing,
     /// Void, for this reason.
-    Invalid(String),
+    Invalid(Objection),
     /// Taken, with this adjusted p-value.
     Taken(f64),
 }
@@ -90,7 +90,7 @@ fn second_looks(seconds: BTreeMap<usize, Option<Evidence>>) -> BTreeMap<usize, S
     let look = |((index, second), adjusted_p)| {
         let look = match second {
             None => SecondLook::Missing,
-            Some(Evidence::Nothing(reason)) => SecondLook::Invalid(reason),
+            Some(Evidence::Nothing(objection)) => SecondLook::Invalid(objection),
             Some(Evidence::Exact { holds, .. }) => SecondLook::Taken(if holds { 1.0 } else { 0.0 }),
             Some(evidence) if evidence.p_value().is_none() => {
                 SecondLook::Invalid("the test has no p-value".into())
@@ -122,14 +122,16 @@ fn state(
         verdict.second_p = Some(p);
     }
     let found = match (&evidence, &second) {
-        (Evidence::Nothing(reason), _) => Outcome::Invalid(reason.clone()),
+        (Evidence::Nothing(objection), _) => Outcome::Invalid(objection.clone()),
         (Evidence::Exact { holds: true, .. }, _) => Outcome::Pass,
         (Evidence::Exact { holds: false, .. }, _) => Outcome::Fail,
         (Evidence::Efficiency(shown), _) => {
             shown.outcome(adjusted_p, looks.at_once(), own_level, detect)
         }
         (_, Some(SecondLook::Missing)) => Outcome::Fail,
-        (_, Some(SecondLook::Invalid(reason))) => Outcome::Invalid(format!("second look: {reason}")),
+        (_, Some(SecondLook::Invalid(objection))) => {
+            Outcome::Invalid(format!("second look: {objection}").into())
+        }
         (_, Some(SecondLook::Taken(p))) if *p < SECOND_LOOK => Outcome::Fail,
         _ => match adjusted_p {
             None => Outcome::Invalid("the test has no p-value".into()),
@@ -140,6 +142,15 @@ fn state(
             }
             _ => Outcome::Pass,
         },
+    };
+    verdict.passes_factor = match (&found, &evidence) {
+        (Outcome::Invalid(objection), _) => objection.passes_factor,
+        (Outcome::Underpowered, Evidence::Efficiency(shown)) => shown.passes_factor(own_level, detect),
+        // Errors fall with the root of the passes.
+        (Outcome::Underpowered, _) => {
+            detect.zip(verdict.detectable).map(|(wanted, found)| (found / wanted) * (found / wanted))
+        }
+        (Outcome::Pass | Outcome::Fail, _) => None,
     };
     let mut reason = match &evidence {
         Evidence::Efficiency(shown) => shown.note(&found, own_level),
@@ -165,7 +176,7 @@ fn state(
 /// The reason for an outcome.
 fn reason(found: &Outcome, evidence: &Evidence, detect: Option<f64>, verdict: &Verdict) -> String {
     match (found, evidence) {
-        (Outcome::Invalid(reason), _) => reason.clone(),
+        (Outcome::Invalid(objection), _) => objection.to_string(),
         (Outcome::Pass | Outcome::Fail, Evidence::Exact { said, .. })
         | (Outcome::Fail, Evidence::Counts { said, .. }) => said.clone(),
         (Outcome::Fail, Evidence::Sum(_)) => "the table as a whole deviates".into(),

@@ -202,6 +202,7 @@ fn expect(verdict: &mut Verdict, main: &Stored, claim: usize) {
     if main.record.post_hoc.contains(&claim) {
         let reason = "post hoc: claimed when passes had been run; another seed makes it evidence";
         verdict.note = reason.into();
+        verdict.passes_factor = None;
         verdict.outcome = Outcome::Invalid(reason.into());
     }
 }
@@ -209,15 +210,18 @@ fn expect(verdict: &mut Verdict, main: &Stored, claim: usize) {
 fn expected_outcome(expects: ExpectedOutcome, found: Outcome, note: &mut String) -> Outcome {
     let (wanted, green) = match expects {
         ExpectedOutcome::Pass => return found,
-        ExpectedOutcome::Differs => ("a difference", found == Outcome::Fail),
-        ExpectedOutcome::Fails => ("a failure", found == Outcome::Fail),
-        ExpectedOutcome::Invalid => ("an invalid test", matches!(found, Outcome::Invalid(_))),
+        ExpectedOutcome::Differs => ("a difference".into(), found == Outcome::Fail),
+        ExpectedOutcome::Fails => ("a failure".to_string(), found == Outcome::Fail),
+        ExpectedOutcome::Invalid(reason) => {
+            let is_it = matches!(&found, Outcome::Invalid(why) if why.reason == Some(reason));
+            (format!("an invalid test by {}", reason.words()), is_it)
+        }
     };
     let said = if note.is_empty() { "no difference found".to_string() } else { std::mem::take(note) };
     *note = format!("control, expects {wanted}: {said}");
     match found {
         _ if green => Outcome::Pass,
-        Outcome::Invalid(reason) => Outcome::Invalid(reason),
+        Outcome::Invalid(objection) => Outcome::Invalid(objection),
         _ => Outcome::Fail,
     }
 }

@@ -5,22 +5,11 @@ use serde_json::json;
 use super::super::verdict::{exit_code, to_csv};
 use super::*;
 use crate::results::record::{
-    Against, Claim, ClaimKind, Comparison, ExpectedOutcome, Quantity, StatedBias,
+    Against, ClaimKind, Comparison, ExpectedOutcome, InvalidReason, Quantity, StatedBias, StatedTail,
 };
-use crate::results::sample::{PASSES, claim, judged, quantity, set_observables, stored, uniform};
+use crate::results::sample::{PASSES, judged, quantity, set_observables, stored, uniform, with_claim};
 
-/// A record with one claim, of this kind and expectation, and one comparison.
-fn with_claim(
-    mut s: Stored,
-    kind: ClaimKind,
-    expects: ExpectedOutcome,
-    against: Against,
-    detect: Option<f64>,
-) -> Stored {
-    s.record.statements = vec![Claim { expects, ..claim("c", kind) }];
-    s.record.comparisons = vec![Comparison { claim: 0, quantity: quantity("mis", 0), against, detect }];
-    s
-}
+const INVALID: ExpectedOutcome = ExpectedOutcome::Invalid(InvalidReason::HeavyTail);
 
 fn value(value: f64, error: f64) -> Against {
     Against::Value { value, error, source: "by hand".into() }
@@ -41,7 +30,7 @@ fn equals(s: Stored, v: f64, error: f64, detect: Option<f64>) -> Verdict {
 }
 
 fn assert_invalid(v: &Verdict, what: &str) {
-    assert!(matches!(&v.outcome, Outcome::Invalid(why) if why.contains(what)), "{v:?}");
+    assert!(matches!(&v.outcome, Outcome::Invalid(why) if why.said.contains(what)), "{v:?}");
     assert_eq!(exit_code(std::slice::from_ref(v)), 3);
 }
 
@@ -63,8 +52,7 @@ fn a_claim_made_after_the_run_is_not_green() {
     s.record.post_hoc = vec![0];
     assert_invalid(&one(&s), "post hoc");
     // Nor is a control that expects invalidity.
-    let mut s =
-        with_claim(stored(0.1), ClaimKind::Equals, ExpectedOutcome::Invalid, value(1.0, 0.0), None);
+    let mut s = with_claim(stored(0.1), ClaimKind::Equals, INVALID, value(1.0, 0.0), None);
     s.record.post_hoc = vec![0];
     assert_invalid(&one(&s), "post hoc");
 }
@@ -213,7 +201,7 @@ fn a_biased_estimator_agrees_with_nothing() {
         one(&with_claim(s.clone(), ClaimKind::Agree, expects, other(false), Some(0.1)))
     };
     assert_invalid(&agree(&s, ExpectedOutcome::Pass), "diffusion");
-    assert_eq!(agree(&s, ExpectedOutcome::Invalid).outcome, Outcome::Pass);
+    assert_eq!(agree(&s, ExpectedOutcome::Invalid(InvalidReason::Biased)).outcome, Outcome::Pass);
     set_observables(&mut s, "snee", |i, _, _| 2.0 + 0.1 * uniform(i));
     assert_eq!(agree(&s, ExpectedOutcome::Differs).outcome, Outcome::Pass);
 }
@@ -225,7 +213,84 @@ fn controls_are_green_when_they_find_what_they_expect() {
     assert_eq!(control(ExpectedOutcome::Differs, 1.2).outcome, Outcome::Pass);
     assert_eq!(control(ExpectedOutcome::Differs, 1.0).outcome, Outcome::Fail);
     assert!(control(ExpectedOutcome::Differs, 1.0).note.contains("no difference found"));
-    assert_eq!(control(ExpectedOutcome::Invalid, 1.0).outcome, Outcome::Fail);
+    assert_eq!(control(INVALID, 1.0).outcome, Outcome::Fail);
+}
+
+/// Every record whose test is void, beside the reason that a control may name, if there is one.
+fn void_records() -> Vec<(Stored, Option<InvalidReason>)> {
+    let agreeing =
+        || with_claim(stored(0.1), ClaimKind::Agree, ExpectedOutcome::Pass, other(false), None);
+    let changed = |change: &dyn Fn(&mut Stored)| {
+        let mut s = agreeing();
+        change(&mut s);
+        s
+    };
+    let cut = |s: &mut Stored| {
+        for run in &mut s.record.cells[0].runs {
+            let array = s.arrays.get_mut(&run.moments).expect("moments");
+            array.shape[0] = 63;
+            array.data.truncate(63 * 20);
+            run.passes = 252;
+        }
+    };
+    let tail = StatedTail { class: "all".into(), band: 0, reason: "index 1.5".into() };
+    vec![
+        (
+            changed(&|s| set_observables(s, "mis", |i, _, _| if i == 100 { 256.0 } else { 0.0 })),
+            Some(InvalidReason::HeavyTail),
+        ),
+        (
+            changed(&|s| s.record.cells[0].runs[1].heavy_tails = vec![tail.clone()]),
+            Some(InvalidReason::HeavyTail),
+        ),
+        (changed(&cut), Some(InvalidReason::TooFewPasses)),
+        (
+            changed(&|s| s.record.cells[0].runs[1].bias = StatedBias::Biased("diffusion".into())),
+            Some(InvalidReason::Biased),
+        ),
+        (
+            changed(&|s| s.record.cells[0].runs[1].model = Some("dipole".into())),
+            Some(InvalidReason::DifferentModels),
+        ),
+        (
+            changed(&|s| {
+                ["mis", "snee"].iter().for_each(|e| set_observables(s, e, |_, _, _| 0.0));
+            }),
+            Some(InvalidReason::NothingScored),
+        ),
+        (changed(&|s| set_observables(s, "mis", |i, _, _| if i == 7 { f64::NAN } else { 1.0 })), None),
+        (
+            changed(&|s| {
+                s.record.cells[0].runs[0].anomalies.insert("lost_ray".into(), 1);
+            }),
+            None,
+        ),
+        (changed(&|s| s.record.cells[0].runs[0].passes = PASSES + 4), None),
+        (changed(&|s| s.record.comparisons[0].quantity.estimator = "nobody".into()), None),
+        (changed(&|s| s.record.post_hoc = vec![0]), None),
+    ]
+}
+
+#[test]
+fn a_control_takes_the_reason_that_it_names_and_no_other() {
+    use InvalidReason::{Biased, DifferentModels, HeavyTail, NothingScored, TooFewPasses};
+    for (mut void, reason) in void_records() {
+        assert_invalid(&one(&void), "");
+        for named in [HeavyTail, TooFewPasses, Biased, DifferentModels, NothingScored] {
+            void.record.statements[0].expects = ExpectedOutcome::Invalid(named);
+            let v = one(&void);
+            if reason == Some(named) {
+                assert_eq!(v.outcome, Outcome::Pass, "{v:?}");
+                let head = format!("control, expects an invalid test by {}: ", named.words());
+                assert!(v.note.starts_with(&head), "{v:?}");
+            } else {
+                assert_invalid(&v, "");
+            }
+        }
+    }
+    // A sound test is not what such a control expects.
+    let sound = with_claim(stored(0.1), ClaimKind::Equals, INVALID, value(1.0, 0.0), None);
+    assert_eq!(one(&sound).outcome, Outcome::Fail);
 }
 
 #[test]

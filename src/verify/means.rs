@@ -2,9 +2,9 @@
 
 use super::evidence::Evidence;
 use super::levels::SHARED_ERROR;
-use super::verdict::TestKind;
+use super::verdict::{Objection, TestKind};
 use crate::results::record::{
-    Claim, ClaimKind, EstimatorRun, ExpectedOutcome, Quantity, StatedBias, StatedTail,
+    Claim, ClaimKind, EstimatorRun, ExpectedOutcome, InvalidReason, Quantity, StatedBias, StatedTail,
 };
 use crate::results::store::Stored;
 use crate::stats::hypothesis::{Estimate, Spread};
@@ -47,50 +47,58 @@ impl<'a> QuantityMean<'a> {
     }
 
     /// Why every statement about it is void.
-    pub(super) fn objection(&self) -> Option<String> {
+    pub(super) fn objection(&self) -> Option<Objection> {
         let name = &self.run.estimator;
         let anomaly =
             self.run.anomalies.iter().find(|(kind, n)| **n > 0 && !STATED.contains(&kind.as_str()));
         if let Some((kind, count)) = anomaly {
-            return Some(format!("{name} counted {count} of `{kind}`"));
+            return Some(format!("{name} counted {count} of `{kind}`").into());
         }
         if self.all.n != self.run.passes {
-            return Some(format!("{name} holds {} passes of {}", self.all.n, self.run.passes));
+            return Some(format!("{name} holds {} passes of {}", self.all.n, self.run.passes).into());
         }
         if self.all.n < 2 {
-            return Some(format!("too few passes: {name} has {}", self.all.n));
+            let said = format!("too few passes: {name} has {}", self.all.n);
+            let few = Objection::new(InvalidReason::TooFewPasses, said);
+            return Some(few.until(MIN_BATCHES as f64 / self.all.n.max(1) as f64));
         }
         let finite = self.all.to_array().iter().all(|x| x.is_finite());
-        (!finite).then(|| format!("{name} has a mean or moment that is not finite"))
+        (!finite).then(|| format!("{name} has a mean or moment that is not finite").into())
     }
 
     /// Why it is known beforehand not to be nearly normal.
-    fn known_tail(&self, quantity: &Quantity) -> Option<String> {
+    fn known_tail(&self, quantity: &Quantity) -> Option<Objection> {
         let class = &quantity.observable.class;
         let concerns =
             |tail: &&StatedTail| tail.band == quantity.band && (class == "all" || *class == tail.class);
         let tail = self.run.heavy_tails.iter().find(concerns)?;
-        Some(format!("heavy tail, known beforehand: {}: {}", self.run.estimator, tail.reason))
+        let said = format!("heavy tail, known beforehand: {}: {}", self.run.estimator, tail.reason);
+        Some(Objection::new(InvalidReason::HeavyTail, said))
     }
 
     /// Why it is not nearly normal.
-    pub(super) fn tail_objection(&self) -> Option<String> {
+    pub(super) fn tail_objection(&self) -> Option<Objection> {
         let name = &self.run.estimator;
         if self.batches.len() < MIN_BATCHES {
             let n = self.batches.len();
-            return Some(format!(
-                "too few passes: {name} has {n} batches, a t test needs {MIN_BATCHES}"
-            ));
+            let said = format!("too few passes: {name} has {n} batches, a t test needs {MIN_BATCHES}");
+            // From 64 passes on there are at least as many batches.
+            let few = Objection::new(InvalidReason::TooFewPasses, said);
+            return Some(few.until(MIN_BATCHES as f64 / self.all.n as f64));
         }
         let skewness = self.all.skewness().abs() / (self.all.n as f64).sqrt();
         if skewness >= SKEWNESS_LIMIT {
-            return Some(format!(
+            let said = format!(
                 "heavy tail: {name} has |skewness| / sqrt(passes) = {skewness:.2}, limit {SKEWNESS_LIMIT}"
-            ));
+            );
+            let factor = (skewness / SKEWNESS_LIMIT) * (skewness / SKEWNESS_LIMIT);
+            return Some(Objection::new(InvalidReason::HeavyTail, said).until(factor));
         }
         let share = Spread::of(self.batches.iter().map(|b| (b.n as f64, b.mean))).largest_share;
         (share > SHARE_LIMIT).then(|| {
-            format!("heavy tail: one batch of {name} holds {:.0} % of the variance", 100.0 * share)
+            let said =
+                format!("heavy tail: one batch of {name} holds {:.0} % of the variance", 100.0 * share);
+            Objection::new(InvalidReason::HeavyTail, said)
         })
     }
 }
@@ -144,6 +152,8 @@ pub(super) struct MeanTest {
     pub expected: Option<Estimate>,
     /// A second look would share this one's errors.
     pub one_look: bool,
+    /// Whether there is no evidence for the tail of the other mean alone.
+    pub other_tail_alone: bool,
 }
 
 /// Whether two means of a record are equal.
@@ -172,6 +182,7 @@ pub(super) fn hold(
         value: a.as_ref().map(|a| a.mean),
         expected,
         one_look: a.as_ref().is_some_and(|a| stated_error > SHARED_ERROR * a.mean.std_error),
+        other_tail_alone: false,
     };
     let (Some(a), Some(expected)) = (&a, expected) else { return held };
     let means: Vec<&QuantityMean> = std::iter::once(a).chain(&b).collect();
@@ -199,6 +210,7 @@ pub(super) fn hold(
     }
     if let Some(objection) = means.iter().find_map(|mean| mean.tail_objection()) {
         held.evidence = Evidence::Nothing(objection);
+        held.other_tail_alone = a.tail_objection().is_none();
         return held;
     }
     held.test = Some(match (pair, stated) {
@@ -229,7 +241,7 @@ fn hold_exact(held: &mut MeanTest, difference: f64, scale: f64, stated_error: f6
 }
 
 /// Why the test would be void.
-fn objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Option<String> {
+fn objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Option<Objection> {
     means
         .iter()
         .find_map(|mean| mean.objection())
@@ -240,41 +252,48 @@ fn objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Opti
 }
 
 /// A biased estimator may not claim to agree; a control may state that it differs.
-fn bias_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
+fn bias_objection(means: &[&QuantityMean], asked: Asked) -> Option<Objection> {
     if !asked.agreement || asked.difference {
         return None;
     }
     means.iter().find_map(|mean| match &mean.run.bias {
-        StatedBias::Biased(why) => Some(format!("{} is biased: {why}", mean.run.estimator)),
+        StatedBias::Biased(why) => {
+            let said = format!("{} is biased: {why}", mean.run.estimator);
+            Some(Objection::new(InvalidReason::Biased, said))
+        }
         StatedBias::Unbiased | StatedBias::Consistent => None,
     })
 }
 
 /// Estimators of different integrals need not agree; a control may state that they differ.
-fn model_objection(means: &[&QuantityMean], asked: Asked) -> Option<String> {
+fn model_objection(means: &[&QuantityMean], asked: Asked) -> Option<Objection> {
     let [a, b] = means else { return None };
     if asked.difference || a.run.model == b.run.model {
         return None;
     }
     let name = |mean: &QuantityMean| mean.run.model.clone().unwrap_or_else(|| "light transport".into());
-    Some(format!(
+    let said = format!(
         "{} estimates {}, {} {}: their difference is a model error, which the report shows",
         a.run.estimator,
         name(a),
         b.run.estimator,
         name(b)
-    ))
+    );
+    Some(Objection::new(InvalidReason::DifferentModels, said))
 }
 
 /// Two estimators that both scored nothing agree on nothing: they may share the defect that makes them
 /// zero. A claim on each class is not void by one that does not occur, as long as their sum is not 0.
-fn silence_objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Option<String> {
+fn silence_objection(quantity: &Quantity, means: &[&QuantityMean], asked: Asked) -> Option<Objection> {
     if asked.each && quantity.observable.class != "all" {
         return None;
     }
     let is_silent = |mean: &&QuantityMean| mean.all.mean == 0.0 && mean.all.variance() == 0.0;
     let all = means.len() > 1 && means.iter().all(is_silent);
-    all.then(|| "neither side scored anything; claim `equals = { value = 0 }` if that is meant".into())
+    all.then(|| {
+        let said = "neither side scored anything; claim `equals = { value = 0 }` if that is meant";
+        Objection::new(InvalidReason::NothingScored, said.into())
+    })
 }
 
 /// The same numbers of passes, batch by batch.

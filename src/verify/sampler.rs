@@ -38,7 +38,7 @@ pub(super) fn trials(stored: &Stored, index: usize, comparison: &SamplerComparis
     let claim = &record.statements[comparison.claim];
     let verdict = Verdict { estimators: comparison.sampler.clone(), ..blank(record, claim) };
     let findings = match record.samplers.iter().find(|run| run.sampler == comparison.sampler) {
-        Some(run) => Tests { stored, run, verdict, findings: Vec::new() }.all(comparison.detect),
+        Some(run) => Tests { stored, run, verdict, findings: Vec::new() }.all(comparison),
         None => {
             let nothing = Evidence::Nothing("the record does not hold this sampler".into());
             vec![Finding::new(verdict, nothing)]
@@ -60,7 +60,7 @@ struct Tests<'a> {
 impl Tests<'_> {
     fn push(&mut self, test: TestKind, evidence: Evidence) -> &mut Finding {
         let evidence = match self.objection() {
-            Some(objection) => Evidence::Nothing(objection),
+            Some(objection) => Evidence::Nothing(objection.into()),
             None => evidence,
         };
         let verdict = Verdict { test: Some(test), ..self.verdict.clone() };
@@ -80,11 +80,11 @@ impl Tests<'_> {
         (values > 0).then(|| format!("{values} values of contrasts are not finite"))
     }
 
-    fn all(mut self, detect: Option<f64>) -> Vec<Finding> {
+    fn all(mut self, asked: &SamplerComparison) -> Vec<Finding> {
         let run = self.run;
-        self.bins(TestKind::Chi2Coarse, Some(&run.coarse), detect);
-        self.bins(TestKind::Chi2Fine, run.fine.as_ref(), None);
-        self.bins(TestKind::Serial, run.serial.as_ref(), None);
+        self.bins(TestKind::Chi2Coarse, Some(&run.coarse), asked.detect);
+        self.bins(TestKind::Chi2Fine, run.fine.as_ref(), asked.detect_fine);
+        self.bins(TestKind::Serial, run.serial.as_ref(), asked.detect_serial);
         run.contrasts.iter().for_each(|contrast| self.contrast(contrast));
         run.deltas.iter().for_each(|delta| self.delta(delta));
         self.null();
@@ -107,7 +107,7 @@ impl Tests<'_> {
         // Pairs with a draw that is in no bin are not counted.
         let is_everything = test != TestKind::Serial;
         let evidence = if is_everything && counted != self.run.samples as f64 {
-            Evidence::Nothing(format!("the bins hold {counted} draws of {}", self.run.samples))
+            Evidence::Nothing(format!("the bins hold {counted} draws of {}", self.run.samples).into())
         } else {
             fit(&bins)
         };
@@ -120,7 +120,7 @@ impl Tests<'_> {
         let expected = if run.expected.abs() <= run.bound { 0.0 } else { run.expected };
         let rounding = ROUNDING * moments.mean.abs().max(expected.abs());
         let evidence = if moments.n != self.run.samples {
-            Evidence::Nothing(format!("{} values for {} draws", moments.n, self.run.samples))
+            Evidence::Nothing(format!("{} values for {} draws", moments.n, self.run.samples).into())
         } else if moments.std_error() <= rounding {
             let holds = (moments.mean - expected).abs() <= run.bound + rounding;
             let said = format!("no sampling error: {:e}, expected {expected:e}", moments.mean);
@@ -128,7 +128,7 @@ impl Tests<'_> {
         } else {
             match contrast(&moments, expected, run.bound) {
                 Ok(found) => Evidence::of_difference(found.estimate),
-                Err(refusal) => Evidence::Nothing(refusal.to_string()),
+                Err(refusal) => Evidence::Nothing(refusal.to_string().into()),
             }
         };
         let finding = self.push(TestKind::Contrast(run.name.clone()), evidence);
@@ -167,7 +167,7 @@ impl Tests<'_> {
                 let said = format!("{count} of {n}, expected {:.1}", mass * n as f64);
                 Evidence::Counts { fit: CountsFit::Share(found), test, said }
             }
-            Err(refusal) => Evidence::Nothing(refusal.to_string()),
+            Err(refusal) => Evidence::Nothing(refusal.to_string().into()),
         };
         let share = count as f64 / n as f64;
         let verdict = &mut self.push(kind, evidence).verdict;
@@ -194,7 +194,7 @@ impl Tests<'_> {
         let evidence = if excess > bound || bound <= TOTAL_BOUND {
             Evidence::Exact { holds: excess <= bound, said }
         } else {
-            Evidence::Nothing(format!("quadrature unresolved: {said}"))
+            Evidence::Nothing(format!("quadrature unresolved: {said}").into())
         };
         let verdict = &mut self.push(TestKind::TotalMass, evidence).verdict;
         verdict.set_value(total, bound);
@@ -232,6 +232,6 @@ fn fit(bins: &Bins) -> Evidence {
             });
             Evidence::Counts { fit: CountsFit::Bins(found), test, said }
         }
-        Err(refusal) => Evidence::Nothing(refusal.to_string()),
+        Err(refusal) => Evidence::Nothing(refusal.to_string().into()),
     }
 }

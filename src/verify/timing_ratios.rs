@@ -91,7 +91,11 @@ mod tests {
             let cost = TimeSpent { cpu_seconds: all, wall_seconds: all, passes: PASSES, paths: 1 };
             timing.add("smooth", name, cost);
             let settled = vec![true; cpu_seconds.len()];
-            timing.set_batches("smooth", name, Batches { processes: 1, cpu_seconds, settled });
+            timing.set_batches(
+                "smooth",
+                name,
+                Batches { processes: 1, cpu_seconds, settled, twice: vec![] },
+            );
         }
         stored.timing = Some(timing);
         stored

@@ -81,7 +81,7 @@ fn of_mean(
     reference: Reference,
 ) -> Finding {
     let held = hold(stored, quantity, reference, Asked::by(claim));
-    let MeanTest { evidence, test, deviation, value, expected, one_look } = held;
+    let MeanTest { evidence, test, deviation, value, expected, one_look, .. } = held;
     let mut verdict = named(&stored.record, claim, quantity, other);
     (verdict.test, verdict.statistic) = (test, deviation);
     if let Some(value) = value {
@@ -119,3 +119,7 @@ fn named(record: &Record, claim: &Claim, a: &Quantity, b: &Quantity) -> Verdict 
         ..blank(record, claim)
     }
 }
+
+#[cfg(test)]
+#[path = "trial_tests.rs"]
+mod tests;

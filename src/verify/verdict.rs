@@ -5,10 +5,10 @@ use std::fmt;
 use serde::{Serialize, Serializer};
 
 use crate::results::csv_text;
-use crate::results::record::CostMeasure;
+use crate::results::record::{CostMeasure, InvalidReason};
 
 /// The verdict on one comparison. Only a pass is green.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Outcome {
     /// The claim holds, as far as the test can see.
     Pass,
@@ -17,7 +17,43 @@ pub(crate) enum Outcome {
     /// No defect was found, and one as large as the claim wants to see could have been missed.
     Underpowered,
     /// The test would be void, for this reason.
-    Invalid(String),
+    Invalid(Objection),
+}
+
+/// Why a test is void.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Objection {
+    /// The reason, where it is one that a control may expect.
+    pub reason: Option<InvalidReason>,
+    /// The same as a sentence.
+    pub said: String,
+    /// Passes that would probably remove it over those that there are, where any number would.
+    pub passes_factor: Option<f64>,
+}
+
+impl Objection {
+    /// That a control may expect.
+    pub(super) fn new(reason: InvalidReason, said: String) -> Objection {
+        Objection { reason: Some(reason), said, passes_factor: None }
+    }
+
+    /// That this many times the passes would probably remove.
+    pub(super) fn until(self, passes_factor: f64) -> Objection {
+        Objection { passes_factor: Some(passes_factor), ..self }
+    }
+}
+
+/// That no control may expect.
+impl<S: Into<String>> From<S> for Objection {
+    fn from(said: S) -> Objection {
+        Objection { reason: None, said: said.into(), passes_factor: None }
+    }
+}
+
+impl fmt::Display for Objection {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.said)
+    }
 }
 
 impl Default for Outcome {
@@ -196,6 +232,10 @@ pub(crate) struct Verdict {
     pub second_p: Option<f64>,
     /// The reason for the outcome, as a sentence.
     pub note: String,
+    /// Passes that would probably decide it over those that it rests on; none where it is decided, or
+    /// where no number is known to.
+    #[serde(skip)]
+    pub passes_factor: Option<f64>,
     /// Whether it is a control, which expects something other than agreement.
     #[serde(skip)]
     pub control: bool,

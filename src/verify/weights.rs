@@ -9,11 +9,12 @@ use crate::results::store::Stored;
 /// which this prints:
 ///
 /// ```text
-/// cargo test --release --test integration -- --ignored --nocapture cpu_time_follows_the_counters
+/// cargo test --release --test integration -- --ignored --nocapture weights_are_those_of_path_tracing
 /// ```
 ///
-/// Accuracy: they predicted the CPU time of each of those 27 runs to 15 %; a rough boundary
+/// Accuracy: they predicted the CPU time of each of those 27 runs of `path` to 15 %; a rough boundary
 /// under a sky costs more than they predict, because light samples below the horizon are not counted.
+/// Between kinds of estimators they may be off by the factors of [`crate::results::counted_work`].
 /// They predict together; one by one they mean little, because in a path tracer rays are paths, medium
 /// events and boundary events together: of the fits that are equally good this one charges the rays.
 /// They are those of the unit sphere: a ray costs more in a mesh of many triangles. The last five are

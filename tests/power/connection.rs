@@ -152,7 +152,7 @@ impl Model<'_> {
         let [kj, light_side] = [-w_jk, to_light].map(|w| frame.to_local(w));
         let through = through(self.boundary, kj, light_side, self.defect)?;
 
-        let Medium { sigma_t, albedo, phase } = self.medium;
+        let Medium { sigma_t, albedo, phase, .. } = self.medium;
         let (t_ij, t_jk) = (transmittance(sigma_t, d_ij), transmittance(sigma_t, d_jk));
         let (h_i, h_j) = (phase.pdf(start.travel.dot(w_ij)), phase.pdf(w_ij.dot(w_jk)));
         let at_j = 1.0 / (d_ij * d_ij);

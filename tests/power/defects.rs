@@ -641,6 +641,46 @@ pub const UNIT_TESTED: &[(&str, &str)] = &[
         "a false alarm is more frequent than its level",
         "stats::hypothesis::tests::false_alarms_have_their_level",
     ),
+    (
+        "Welch's test has the error of one arm alone",
+        "verify::trial::tests::two_means_are_tested_by_welch",
+    ),
+    (
+        "the limit of skewness is three times as high",
+        "verify::trial::tests::skewness_has_the_stated_limit",
+    ),
+    (
+        "a control that expects an invalid test takes any reason",
+        "verify::judge::tests::a_control_takes_the_reason_that_it_names_and_no_other",
+    ),
+    (
+        "one number of the haemoglobin table is ten times too small",
+        "optics::skin::tests::the_table_is_whole",
+    ),
+    (
+        "two numbers of the Bradford transform are exchanged",
+        "optics::colour::tests::whites_are_adapted_as_published",
+    ),
+    (
+        "pixels look half a pixel aside",
+        "experiment::tests::units::pixels_of_a_pinhole_look_where_they_have_to",
+    ),
+    (
+        "a wide disc's irradiance is that of a small one",
+        "experiment::tests::units::lights_have_the_irradiance_that_they_state",
+    ),
+    (
+        "light enters a point of a cloud by the geometric cosine",
+        "estimators::point_cloud::tests::points_take_in_the_flux_of_their_shading_normals",
+    ),
+    (
+        "boxes of the hierarchy are rounded to nearest",
+        "sampling::thinning::tree::tests::boxes_hold_their_points",
+    ),
+    (
+        "the weight of a rarely accepted point has a limit",
+        "sampling::thinning::tests::rare_acceptances_weigh_as_much_as_they_have_to",
+    ),
 ];
 
 /// No defect: everything has to be green.

@@ -42,6 +42,7 @@ use acceptance::{Acceptance, AcceptanceOptions};
 use alone::{TwoBounce, TwoBounceOptions};
 use cloud::{Cloud, CloudOptions};
 use defects::{Defect, Family, Planted, planted};
+use runs::Extent;
 use scatterproof::estimators::{EstimatorKind, Serves, read_options};
 use scatterproof::experiment::registry::Registry;
 use scatterproof::samplers::SamplerKind;
@@ -171,7 +172,7 @@ fn tests(words: &[String]) -> ExitCode {
     }
     let runs: Vec<_> = rows.iter().map(|row| (*row, 0)).collect();
     let mut survived = 0;
-    runs::all(&runs, |row, _, outcome| {
+    runs::all(&runs, Extent::UntilCaught, |row, _, outcome| {
         let found = matrix::judge(row, outcome);
         survived += usize::from(found.is_err());
         let (verdict, text) = match found {

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use super::defects::{self, Planted, UNIT_TESTED};
 use super::is_sham;
-use super::runs::{self, Outcome};
+use super::runs::{self, Extent, Outcome};
 
 /// Whether an outcome is the expected one. A defect is caught where the program does not exit with 0,
 /// and one of the tests that are expected to see it has seen it; the sham has to be green.
@@ -73,7 +73,7 @@ pub fn main(words: &[String]) -> ExitCode {
         (0..seeds).flat_map(|seed| rows.iter().map(move |row| (*row, seed))).collect();
     let mut tallies: BTreeMap<&str, Tally> = BTreeMap::new();
     let mut busy = 0.0;
-    runs::all(&runs, |row, seed, outcome| {
+    runs::all(&runs, Extent::Whole, |row, seed, outcome| {
         tallies.entry(row.name).or_default().add(row, outcome);
         busy += outcome.seconds;
         if let Err(why) = judge(row, outcome) {

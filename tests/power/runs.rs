@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
@@ -88,8 +88,23 @@ fn write_sky(path: &Path) {
     write_exr(path, &Picture::new(&bands, &Array::new(vec![2, 4, 8, 1], texels)), &[]).expect("a sky");
 }
 
+/// How many experiments of its family a defect is shown to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// All of them: what does each test see?
+    Whole,
+    /// One after the other until an expected test has failed beyond doubt: is the defect caught?
+    UntilCaught,
+}
+
+/// The first look at all experiments of a family has fewer tests than this many times those of one.
+const FAMILY_SIZE: f64 = 1000.0;
+
+/// The family-wise level below which a first look decides by itself (`verify`).
+const AT_ONCE: f64 = 5e-7;
+
 /// Runs every pair (defect, number of the seed) and reports each as it ends.
-pub fn all(runs: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcome)) {
+pub fn all(runs: &[(Planted, u64)], extent: Extent, mut tell: impl FnMut(&Planted, u64, &Outcome)) {
     let folder = tempfile::tempdir().expect("a folder");
     for (_, name, text) in EXPERIMENTS {
         fs::write(folder.path().join(name), text).expect("an experiment");
@@ -107,7 +122,7 @@ pub fn all(runs: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcome
                 loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     let Some((row, seed)) = runs.get(index) else { return };
-                    let outcome = run(row, *seed, folder, index);
+                    let outcome = run(row, *seed, extent, folder, index);
                     send.send((index, outcome)).expect("a receiver");
                 }
             });
@@ -120,23 +135,29 @@ pub fn all(runs: &[(Planted, u64)], mut tell: impl FnMut(&Planted, u64, &Outcome
     });
 }
 
-/// One run: in a child process `verify` on the experiments of the defect's family, and its identities.
-fn run(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
+/// One run: in child processes `verify` on the experiments of the defect's family, and its identities.
+///
+/// Holm's adjusted p-value of a test is at most its p-value times the number of tests: where one
+/// experiment alone gives less than `AT_ONCE / FAMILY_SIZE`, the whole family would give less than `AT_ONCE`,
+/// and the other experiments cannot change the verdict.
+fn run(row: &Planted, number: u64, extent: Extent, folder: &Path, index: usize) -> Outcome {
     let out = folder.join(format!("run-{index}"));
-    let verdicts = out.with_extension("csv");
-    let mut command = Command::new(std::env::current_exe().expect("this program"));
-    command.args(["defect", row.name]);
-    if row.family != Family::Verifier {
-        command.args(["verify", "--quiet", "--no-report", "--threads", "1", "--out"]).arg(&out);
-        command.arg("--csv").arg(&verdicts).arg("--fresh-seed").arg(format!("{}/{number}", row.name));
-        let mine = |family| row.family == Family::Sham || row.family == family;
-        let files = EXPERIMENTS.iter().filter(|(family, ..)| mine(*family));
-        command.args(files.map(|(_, name, _)| folder.join(name)));
-    }
+    let mine = |family| row.family == Family::Sham || row.family == family;
+    let files: Vec<&str> =
+        EXPERIMENTS.iter().filter(|(family, ..)| mine(*family)).map(|(_, name, _)| *name).collect();
     let begun = Instant::now();
-    let output = command.stdin(Stdio::null()).output().expect("this program starts");
+    let expected_in = |file: &str| {
+        let experiment = file.trim_end_matches("toml");
+        extent == Extent::UntilCaught && row.expected.iter().any(|test| test.starts_with(experiment))
+    };
+    let parts = files.iter().copied().filter(|file| expected_in(file));
+    let caught = parts.map(|file| verify(row, number, folder, &out, &[file])).find(|(_, table)| {
+        let rows = csv_rows(table);
+        rows.iter().any(|found| row.expected.contains(&&*test_of(found)) && fails_beyond_doubt(found))
+    });
+    let (output, table) = caught.unwrap_or_else(|| verify(row, number, folder, &out, &files));
     let seconds = begun.elapsed().as_secs_f64();
-    let mut tests = seen_in(&fs::read_to_string(&verdicts).unwrap_or_default());
+    let mut tests = seen_in(&table);
     let seen = |broken| if broken { Seen::Defect } else { Seen::Green };
     tests.extend(super::identities(row).into_iter().map(|(name, broken)| (name, seen(broken))));
     let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
@@ -144,20 +165,53 @@ fn run(row: &Planted, number: u64, folder: &Path, index: usize) -> Outcome {
     Outcome { exit: output.status.code().unwrap_or(-1), tests, said: said.into_owned(), seconds }
 }
 
-/// Test -> the worst of its verdicts, from the table that `verify --csv` writes. A test is named
-/// `experiment.claim`; one claim on samplers is many tests, which are named `experiment.test`.
+/// What a child process printed that had the defect and verified these files, and its table of verdicts.
+fn verify(row: &Planted, number: u64, folder: &Path, out: &Path, files: &[&str]) -> (Output, String) {
+    let verdicts = out.with_extension("csv");
+    let mut command = Command::new(std::env::current_exe().expect("this program"));
+    command.args(["defect", row.name]);
+    if !files.is_empty() {
+        command.args(["verify", "--quiet", "--no-report", "--threads", "1", "--out"]).arg(out);
+        command.arg("--csv").arg(&verdicts).arg("--fresh-seed").arg(format!("{}/{number}", row.name));
+        command.args(files.iter().map(|file| folder.join(file)));
+    }
+    let output = command.stdin(Stdio::null()).output().expect("this program starts");
+    (output, fs::read_to_string(&verdicts).unwrap_or_default())
+}
+
+/// Whether a verdict would be the same as one of the whole family.
+fn fails_beyond_doubt(row: &Row) -> bool {
+    let is_certain = match row["adjusted_p"].as_str() {
+        "" => row["p_value"].is_empty(), // an identity, which takes part in no adjustment
+        p => p.parse::<f64>().is_ok_and(|p| FAMILY_SIZE * p < AT_ONCE),
+    };
+    row["outcome"] == "fail" && is_certain
+}
+
+type Row = BTreeMap<String, String>;
+
+fn csv_rows(table: &str) -> Vec<Row> {
+    let rows = csv::Reader::from_reader(table.as_bytes()).into_deserialize();
+    rows.map(|row| row.expect("a row of verdicts")).collect()
+}
+
+/// A test is named `experiment.claim`; one claim on samplers is many tests, which are named
+/// `experiment.test`.
+fn test_of(row: &Row) -> String {
+    let of = if ON_SAMPLERS.contains(&row["experiment"].as_str()) { "test" } else { "claim" };
+    format!("{}.{}", row["experiment"], row[of])
+}
+
+/// Test -> the worst of its verdicts, from the table that `verify --csv` writes.
 fn seen_in(table: &str) -> BTreeMap<String, Seen> {
-    let mut reader = csv::Reader::from_reader(table.as_bytes());
     let mut tests = BTreeMap::new();
-    for row in reader.deserialize::<BTreeMap<String, String>>() {
-        let row = row.expect("a row of verdicts");
+    for row in csv_rows(table) {
         let seen = match row["outcome"].as_str() {
             "pass" => Seen::Green,
             "underpowered" => Seen::Underpowered,
             _ => Seen::Defect,
         };
-        let of = if ON_SAMPLERS.contains(&row["experiment"].as_str()) { "test" } else { "claim" };
-        let worst = tests.entry(format!("{}.{}", row["experiment"], row[of])).or_insert(seen);
+        let worst = tests.entry(test_of(&row)).or_insert(seen);
         *worst = seen.max(*worst);
     }
     tests

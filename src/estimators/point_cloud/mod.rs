@@ -120,7 +120,7 @@ impl PointCloud {
     pub const KIND: EstimatorKind = EstimatorKind {
         kind: "point_cloud",
         doc: "a BSSRDF summed over points of the surface, accepted by distance; unbiased for the model",
-        serves: Serves { bodies: Bodies::Finite, ..Serves::BSSRDF },
+        serves: Serves { bodies: Bodies::Finite, emission: true, ..Serves::BSSRDF },
         options_schema: || schemars::schema_for!(PointCloudOptions),
         build: |options, scene| Ok(Box::new(PointCloud::new(scene, read_options(options)?)?)),
     };

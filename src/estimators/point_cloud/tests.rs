@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::*;
 use crate::estimators::Layout;
 use crate::geometry::Ray;
-use crate::geometry::Shape;
+use crate::geometry::{Mesh, Shape};
 use crate::math::{DVec3, Frame, integrate};
 use crate::optics::boundary::Boundary;
 use crate::optics::bssrdf::{MomentKind, Outgoing};
@@ -109,6 +109,77 @@ fn every_rule_has_the_mean_of_quadrature() {
             );
             assert!(error < 0.03 * expected, "{name} {band}: sees too little");
         }
+    }
+}
+
+/// int T12(cos) E cos dA over a convex mesh with interpolated normals, cos to the shading normal, where
+/// both normals face the light: midpoints of 4^6 equal parts of each triangle. The body is convex, so
+/// that nothing else is in shadow. Second, the same with the geometric cosine.
+fn entering(mesh: &Mesh, toward: DVec3, eta: f64) -> [f64; 2] {
+    const N: usize = 64;
+    let mut sums = [0.0; 2];
+    for (index, corners) in mesh.triangles().iter().enumerate() {
+        let [a, b, c] = corners.map(|i| mesh.vertices()[i as usize]);
+        let cross = (b - a).cross(c - a);
+        let (part, geometric) = (0.5 * cross.length() / (N * N) as f64, cross.normalize().dot(toward));
+        for i in 0..N {
+            for j in 0..2 * (N - i) - 1 {
+                // Parts of row i: upright and inverted ones in turns.
+                let inverted = j % 2;
+                let third = (1 + inverted) as f64 / 3.0;
+                let [x, y] = [(j / 2) as f64 + third, i as f64 + third].map(|x| x / N as f64);
+                let normal = mesh.normals().and_then(|n| n.at(index, [1.0 - x - y, x, y]));
+                let shading = normal.expect("a normal").dot(toward);
+                if geometric > 0.0 && shading > 0.0 {
+                    for (sum, cos) in sums.iter_mut().zip([shading, geometric]) {
+                        *sum += (1.0 - fresnel(cos, eta).reflectance) * cos * part;
+                    }
+                }
+            }
+        }
+    }
+    sums
+}
+
+/// A cube whose normals at corners point away from its middle: across a face they turn by up to 55
+/// degrees.
+fn cube() -> Mesh {
+    let sign = |bit: usize| if bit == 1 { RADIUS } else { -RADIUS };
+    let vertices = (0..8).map(|i| DVec3::new(sign(i & 1), sign(i >> 1 & 1), sign(i >> 2))).collect();
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    Mesh::new(vertices, triangles, None, true).expect("a mesh")
+}
+
+/// The flux that enters, all points together, under the shading normals' cosine and with every factor:
+/// 400 passes of 5000 points, within five standard errors of about 0.05 %. The geometric cosine would be
+/// off by more than ten.
+#[test]
+fn points_take_in_the_flux_of_their_shading_normals() {
+    let mesh = cube();
+    let toward = DVec3::new(0.3, -0.2, 0.9).normalize();
+    let [expected, geometric] = entering(&mesh, toward, ETA);
+    let emission = Emission::Directional { toward, irradiance: vec![1.0, 2.0, 3.0] };
+    let mut scene = Arc::into_inner(scene(vec![Light { name: "sun".into(), emission }])).expect("alone");
+    scene.shape = Arc::new(Shape::Mesh(mesh));
+    let scene = Arc::new(scene);
+    for faces in [FaceChoice::Area, FaceChoice::Index] {
+        let mut options = options(AcceptanceRule::All {}, Search::Scan);
+        options.faces = faces;
+        let estimator = PointCloud::new(scene.clone(), options).expect("an estimator");
+        let key = StreamKey::named("points_take_in_the_flux_of_their_shading_normals");
+        let (mut sum, mut squares, passes) = (0.0, 0.0, 400);
+        for pass in 0..passes {
+            let cloud = Cloud::new(&estimator.bssrdf, &estimator.sampler, 5000, &key.pass(pass));
+            let flux = (0..cloud.len()).map(|place| cloud.flux(place, 1)).sum::<f64>() / 2.0;
+            (sum, squares) = (sum + flux, squares + flux * flux);
+        }
+        let n = passes as f64;
+        let mean = sum / n;
+        let error = ((squares / n - mean * mean) / (n - 1.0)).sqrt();
+        println!("{faces:?}: {mean} +- {error}, expected {expected}, geometric {geometric}");
+        assert!((mean - expected).abs() < 5.0 * error, "{faces:?}: {mean} of {expected} +- {error}");
+        assert!(error < 0.002 * expected && (geometric - expected).abs() > 10.0 * error);
     }
 }
 

@@ -44,7 +44,7 @@ impl Bidirectional {
     pub const KIND: EstimatorKind = EstimatorKind {
         kind: "bidirectional",
         doc: "path tracing whose medium vertices connect to one light vertex inside the body; unbiased",
-        serves: Serves { bodies: Bodies::Finite, ..Serves::WITHOUT_ENTRIES },
+        serves: Serves { bodies: Bodies::Finite, emission: true, ..Serves::WITHOUT_ENTRIES },
         options_schema: || schemars::schema_for!(PathOptions),
         build: |options, scene| {
             let PathOptions { roulette } = read_options(options)?;

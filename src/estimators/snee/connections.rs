@@ -136,7 +136,10 @@ impl Rivals for Connections<'_> {
 }
 
 /// Scores an end that the light-guided last vertex has drawn at the walk's latest vertex.
-fn score_guided<B: WalkBands>(walk: &mut CameraWalk<'_, Connections<'_>, B>, found: &GuidedEnd<'_>) {
+pub(super) fn score_guided<B: WalkBands>(
+    walk: &mut CameraWalk<'_, Connections<'_>, B>,
+    found: &GuidedEnd<'_>,
+) {
     let GuidedEnd { guide, exit, leg, w_l, radiance } = found;
     let setup = walk.rivals.setup;
     let end = End::new(walk, guide, exit, *w_l, walk.rivals.unidirectional(), *radiance);
@@ -165,7 +168,7 @@ fn score_guided<B: WalkBands>(walk: &mut CameraWalk<'_, Connections<'_>, B>, fou
 
 /// Scores a path whose edge from the walk's latest vertex is subdivided; the leg along which x_j was
 /// drawn is known to be free.
-fn score_subdivided<B: WalkBands>(
+pub(super) fn score_subdivided<B: WalkBands>(
     walk: &mut CameraWalk<'_, Connections<'_>, B>,
     found: &Subdivided<'_>,
 ) {

@@ -27,7 +27,8 @@ mod two_bounce;
 use std::sync::Arc;
 
 use super::bands::{MAX_SHARED, OneBand, SharedBands};
-use super::walk::{CameraWalk, Field, Path, Unrivalled, unscattered_notes};
+use super::illumination::unscattered_notes;
+use super::walk::{CameraWalk, Field, Path, Unrivalled};
 use super::{BandUse, Estimator, EstimatorKind, Scores, Serves, read_options};
 use crate::error::{Error, Result};
 use crate::optics::boundary::Boundary;
@@ -69,7 +70,7 @@ impl Snee {
     pub const KIND: EstimatorKind = EstimatorKind {
         kind: "snee",
         doc: "path tracing with subdivision next-event estimation, as published or guided; unbiased",
-        serves: Serves::WITHOUT_ENTRIES,
+        serves: Serves { emission: true, ..Serves::WITHOUT_ENTRIES },
         options_schema: || schemars::schema_for!(SneeChoices),
         build: |options, scene| {
             let choices: SneeChoices = read_options(options)?;
@@ -210,4 +211,10 @@ impl Snee {
 }
 
 #[cfg(test)]
+mod draws_tests;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod weights_tests;

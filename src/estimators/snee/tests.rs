@@ -47,7 +47,12 @@ fn scene(boundary: Boundary, media: &[(f64, f64, f64)], light: Light) -> Arc<Sce
         boundary: vec![boundary; media.len()],
         medium: media
             .iter()
-            .map(|&(sigma_t, albedo, g)| Medium { sigma_t, albedo, phase: HenyeyGreenstein { g } })
+            .map(|&(sigma_t, albedo, g)| Medium {
+                sigma_t,
+                albedo,
+                phase: HenyeyGreenstein { g },
+                emission: 0.0,
+            })
             .collect(),
         lights: vec![light],
         sensor: Sensor::Probe(Probe { ray, paths: 256 }),

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use super::{At, ExperimentParts};
 use crate::experiment::schema::{
-    Budget, CONTROL, ClaimEntry, CostMeasure, Equals, Expect, Faster, SamplerClaim,
+    CONTROL, ClaimEntry, CostMeasure, Equals, EstimatorEntry, Expect, Faster, SamplerClaim,
 };
 use crate::experiment::suggest;
 use crate::experiment::sweep_point::SweepAxis;
+use crate::results::counted_work;
 
 /// The names that claims may use.
 pub(crate) struct Known<'a> {
@@ -15,18 +16,19 @@ pub(crate) struct Known<'a> {
     pub parts: ExperimentParts,
     /// Names that claims may refer to as estimators.
     pub estimators: Vec<&'a str>,
+    /// The estimators; none where they could not be read.
+    pub entries: Vec<EstimatorEntry>,
     /// Names that claims may refer to as samplers.
     pub samplers: Vec<&'a str>,
     /// Names of bands; none where they could not be read.
     pub bands: Option<Vec<String>>,
     /// The sweep; none where it could not be read.
     pub axes: Option<&'a [SweepAxis]>,
-    /// How much work; none where it could not be read.
-    pub budget: Option<Budget>,
 }
 
 /// The rules of one claim.
 pub(crate) fn claim(at: At, claim: &ClaimEntry, known: &Known) {
+    reason(at, claim);
     if let Some(words) = &claim.sampler {
         return samplers(at.to("sampler"), words, known);
     }
@@ -39,11 +41,20 @@ pub(crate) fn claim(at: At, claim: &ClaimEntry, known: &Known) {
     let equals = claim.equals.as_ref().and_then(|words| Some(("equals", words.band.as_ref()?)));
     let agree = claim.agree.as_ref().and_then(|words| Some(("agree", words.band.as_ref()?)));
     let differs = claim.differs.as_ref().and_then(|words| Some(("differs", words.band.as_ref()?)));
-    for (kind, name) in [equals, agree, differs].into_iter().flatten() {
+    let lengths = claim.mean_path_length.as_ref();
+    let length = lengths.and_then(|words| Some(("mean_path_length", words.band.as_ref()?)));
+    for (kind, name) in [equals, agree, differs, length].into_iter().flatten() {
         band(at.to(kind).to("band"), name, known);
     }
     if let Some(equals) = &claim.equals {
         expected(at.to("equals"), equals, known);
+    }
+    if let Some(words) = lengths {
+        let at = at.to("mean_path_length");
+        names(at.to("estimators"), words.estimators.as_deref().unwrap_or_default(), known);
+        if let Some(axes) = known.axes {
+            filter(at, &words.only, axes);
+        }
     }
     if let Some(agree) = &claim.agree {
         let (names, across, only) = (&agree.estimators, &agree.across, &agree.only);
@@ -70,6 +81,26 @@ pub(crate) fn claim(at: At, claim: &ClaimEntry, known: &Known) {
     }
 }
 
+/// A control that expects an invalid test of means names the reason, and no other claim does.
+fn reason(at: At, claim: &ClaimEntry) {
+    let is_of_means = claim.equals.is_some() || claim.agree.is_some();
+    match (claim.expect, claim.because) {
+        (Some(Expect::Invalid), _) if !is_of_means => at
+            .to("expect")
+            .report_help("`invalid` is about a test of means", "expect it of `equals` or `agree`"),
+        (Some(Expect::Invalid), None) => at.report_help(
+            "`expect = \"invalid\"` without the reason: lost rays would satisfy it as well",
+            "add `because = \"heavy_tail\"`, or `too_few_passes`, `biased`, `different_models`, \
+             `nothing_scored`",
+        ),
+        (Some(Expect::Differs | Expect::Fails) | None, Some(_)) => at.to("because").report_help(
+            "a reason for an invalid test, and none is expected",
+            "add `expect = \"invalid\"`, or remove `because`",
+        ),
+        _ => {}
+    }
+}
+
 /// The samplers are there, each named once.
 fn samplers(at: At, claim: &SamplerClaim, known: &Known) {
     if !known.parts.samplers {
@@ -90,7 +121,7 @@ fn samplers(at: At, claim: &SamplerClaim, known: &Known) {
     }
 }
 
-/// A candidate and a baseline; what is compared by CPU time runs side by side, pass for pass.
+/// A candidate and a baseline.
 fn duel(at: At, duel: &Faster, known: &Known) {
     estimator(at.to("candidate"), &duel.candidate, known);
     estimator(at.to("baseline"), &duel.baseline, known);
@@ -101,12 +132,6 @@ fn duel(at: At, duel: &Faster, known: &Known) {
         );
     }
     if duel.cost == CostMeasure::Cpu {
-        if known.budget.as_ref().is_some_and(|budget| !matches!(budget, Budget::Passes(_))) {
-            at.to("cost").report_help(
-                "CPU time is compared pass for pass, and this budget may give each estimator another number",
-                "state `budget.passes`, or compare by `counters`",
-            );
-        }
         for name in known.estimators.iter().filter(|name| name.ends_with(CONTROL)) {
             at.to("cost").report_help(
                 format!("`{name}` is the name of a control: comparing CPU time adds one of that ending"),
@@ -114,8 +139,33 @@ fn duel(at: At, duel: &Faster, known: &Known) {
             );
         }
     }
+    if duel.cost == CostMeasure::Counters {
+        counted(at, duel, known);
+    }
     if let Some(axes) = known.axes {
         filter(at, &duel.only, axes);
+    }
+}
+
+/// Counted work decides a claim only where it can: a ratio that must not fall below 1 by more than a
+/// margin is not shown by a measure that may be off by more.
+fn counted(at: At, duel: &Faster, known: &Known) {
+    let kind = |name: &str| {
+        let entry = known.entries.iter().find(|entry| entry.name == *name)?;
+        entry.choice().map(|(kind, _)| kind)
+    };
+    let Some((a, b)) = kind(&duel.candidate).zip(kind(&duel.baseline)) else { return };
+    let help = "let the clock decide: `cost = \"cpu\"`";
+    match counted_work::factor(a, b) {
+        Err(why) => at.report_help(format!("{why}, so that it decides no claim"), help),
+        Ok(factor) if duel.ratio * factor >= 1.0 && duel.ratio < 1.0 => at.report_help(
+            format!(
+                "the counted work of `{a}` and `{b}` may be off by {factor:.2} times, which is more than the margin of {:.2}",
+                1.0 / duel.ratio
+            ),
+            help,
+        ),
+        Ok(_) => {}
     }
 }
 
@@ -147,15 +197,9 @@ fn pairs(
     only: &BTreeMap<String, String>,
     known: &Known,
 ) {
-    let names = at.to("estimators");
-    for (i, name) in estimators.iter().enumerate() {
-        estimator(names.item(i), name, known);
-        if estimators[..i].contains(name) {
-            names.item(i).report(format!("`{name}` occurs twice"));
-        }
-    }
+    names(at.to("estimators"), estimators, known);
     if estimators.len() == 1 && across.is_none() {
-        names.report_help(
+        at.to("estimators").report_help(
             "one estimator agrees with itself",
             "name two or more, or the axis `across` which its cells are compared",
         );
@@ -169,6 +213,16 @@ fn pairs(
         }
     }
     filter(at, only, axes);
+}
+
+/// The estimators are there, each named once.
+fn names(at: At, estimators: &[String], known: &Known) {
+    for (i, name) in estimators.iter().enumerate() {
+        estimator(at.item(i), name, known);
+        if estimators[..i].contains(name) {
+            at.item(i).report(format!("`{name}` occurs twice"));
+        }
+    }
 }
 
 /// An estimator of this name is there.

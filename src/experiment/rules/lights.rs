@@ -6,9 +6,10 @@ use std::f64::consts::TAU;
 use super::sensor::direction;
 use super::{At, nonzero, spectrum};
 use crate::experiment::schema::{Environment, LightEntry, SolidAngle, Spectrum};
+use crate::scene::Scene;
 
-/// The rules of all lights in so many bands.
-pub(crate) fn lights(at: At, bands: usize) {
+/// The rules of all lights in so many bands, beside a medium that `emits` or does not.
+pub(crate) fn lights(at: At, bands: usize, emits: bool) {
     let mut names = BTreeSet::new();
     for i in 0..at.count() {
         let Some(light) = at.typed::<LightEntry>(&i.to_string()) else { continue };
@@ -16,6 +17,12 @@ pub(crate) fn lights(at: At, bands: usize) {
         let name = light.name.clone().unwrap_or_else(|| format!("light_{}", i + 1));
         if !names.insert(name.clone()) {
             at.to("name").report(format!("two lights are named `{name}`"));
+        }
+        if emits && name == Scene::EMISSION {
+            at.to("name").report_help(
+                format!("`@{name}` is the share of light that the medium emits"),
+                "give the light another `name`",
+            );
         }
         if let Some(directional) = &light.directional {
             let at = at.to("directional");

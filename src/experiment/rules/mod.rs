@@ -11,6 +11,7 @@ use crate::error::{Diagnostic, Place};
 mod bands;
 mod claims;
 mod entries;
+mod invariants;
 mod lights;
 mod object;
 mod pictures;
@@ -21,8 +22,9 @@ pub(super) use claims::{Known, claim};
 pub(super) use entries::{
     CELL_KEYS, ExperimentParts, SAMPLER_KEYS, SCENE_KEYS, experiment_name, names, pair, parts,
 };
+pub(super) use invariants::{CellPoint, mean_path_length};
 pub(super) use lights::lights;
-pub(super) use object::object;
+pub(super) use object::{emits, object};
 pub(super) use pictures::{has_pixels, picture};
 pub(super) use sensor::sensor;
 

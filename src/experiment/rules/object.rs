@@ -3,8 +3,8 @@
 use super::{At, one_per_band, spectrum, value_rule};
 use crate::experiment::resolve::{BandInterval, BandMedium, eta_materials};
 use crate::experiment::schema::{
-    BandsEntry, BoundaryEntry, Coefficients, Eta, EtaFormula, MediumEntry, ShapeEntry, SkinFractions,
-    Spectrum,
+    BandsEntry, BoundaryEntry, Coefficients, Eta, EtaFormula, MediumEntry, PresetMedium, ShapeEntry,
+    SkinFractions, Spectrum,
 };
 use crate::experiment::suggest;
 use crate::optics::materials;
@@ -23,8 +23,15 @@ pub(crate) fn object(at: At, bands: &BandsEntry) {
         medium(at.to("medium"), &inside, bands);
         if matches!(body, Some(ShapeEntry::HalfSpace {})) {
             conservative(at.to("medium"), &inside, &list);
+            bounded(at.to("medium"), &inside, &list);
         }
     }
+}
+
+/// Whether the medium of a body emits in some band.
+pub(crate) fn emits(at: At) -> bool {
+    let medium: Option<MediumEntry> = at.typed("medium");
+    medium.is_some_and(|medium| medium.emission(1).iter().any(|emission| *emission > 0.0))
 }
 
 fn shape(at: At, shape: &ShapeEntry) {
@@ -95,22 +102,26 @@ fn eta(at: At, index: &Eta, bands: &[BandInterval]) {
 }
 
 fn medium(at: At, medium: &MediumEntry, bands: &BandsEntry) {
-    match medium {
-        MediumEntry::Coefficients(given) => {
-            coefficients(at.to("coefficients"), given, bands.list().len())
+    let count = bands.list().len();
+    if let Some(given) = &medium.coefficients {
+        coefficients(at.to("coefficients"), given, count);
+    }
+    if let Some(words) = &medium.skin {
+        skin(at.to("skin"), words, &bands.list());
+    }
+    if let Some(PresetMedium { name, .. }) = &medium.preset {
+        let at = at.to("preset");
+        if materials::find(name).is_none() {
+            let help = suggest::help(name, &materials::names(), "materials");
+            at.to("name").report_help(format!("unknown material `{name}`"), help);
         }
-        MediumEntry::Skin(words) => skin(at.to("skin"), words, &bands.list()),
-        MediumEntry::Preset { name, .. } => {
-            let at = at.to("preset");
-            if materials::find(name).is_none() {
-                let help = suggest::help(name, &materials::names(), "materials");
-                at.to("name").report_help(format!("unknown material `{name}`"), help);
-            }
-            if !matches!(bands, BandsEntry::Rgb {}) {
-                let help = "use `bands = { rgb = {} }`, or `medium.coefficients` with numbers per band";
-                at.report_help("built-in materials are measured in rgb bands only", help);
-            }
+        if !matches!(bands, BandsEntry::Rgb {}) {
+            let help = "use `bands = { rgb = {} }`, or `medium.coefficients` with numbers per band";
+            at.report_help("built-in materials are measured in rgb bands only", help);
         }
+    }
+    if let Some(values) = &medium.emission_per_mm {
+        spectrum(at.to("emission_per_mm"), values, count, "at least 0", |x| x >= 0.0);
     }
 }
 
@@ -163,8 +174,8 @@ fn coefficients(at: At, given: &Coefficients, bands: usize) {
 
 /// Without absorption a walk in a half-space returns surely, but after infinitely many steps on average.
 fn conservative(at: At, medium: &MediumEntry, bands: &[BandInterval]) {
-    let key = match medium {
-        MediumEntry::Coefficients(given) if given.albedo.is_some() => "albedo",
+    let key = match &medium.coefficients {
+        Some(given) if given.albedo.is_some() => "albedo",
         _ => "sigma_a_per_mm",
     };
     let Some(coefficients) = medium.per_band(bands) else { return };
@@ -173,6 +184,19 @@ fn conservative(at: At, medium: &MediumEntry, bands: &[BandInterval]) {
         at.to("coefficients").to(key).report_help(
             "a conservative half-space has walks of infinite mean length",
             format!("band `{}` absorbs nothing: let it absorb a little, or use a slab", band.name),
+        );
+    }
+}
+
+/// What a half-space without extinction emits towards its surface adds up without end.
+fn bounded(at: At, medium: &MediumEntry, bands: &[BandInterval]) {
+    let Some(coefficients) = medium.per_band(bands) else { return };
+    let emission = medium.emission(bands.len());
+    let endless = |(c, emission): (&BandMedium, &f64)| c.sigma_a + c.sigma_s == 0.0 && *emission > 0.0;
+    if let Some(band) = coefficients.iter().zip(&emission).position(endless) {
+        at.to("emission_per_mm").report_help(
+            "a half-space that emits and does not absorb has infinite radiance",
+            format!("band `{}` absorbs nothing: let it absorb, or use a slab", bands[band].name),
         );
     }
 }

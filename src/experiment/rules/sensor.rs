@@ -46,6 +46,14 @@ pub(crate) fn sensor(at: At, sensor: &SensorEntry, shape: Option<&ShapeEntry>) {
                 at.report("the axis must be +z on a half_space and on a slab");
             }
         }
+        SensorEntry::PathLength { .. } => {
+            if is_planar {
+                at.to("path_length").report_help(
+                    "path lengths are measured in bodies of finite size, and a half_space or slab has no end",
+                    "take another shape, or another sensor",
+                );
+            }
+        }
         SensorEntry::Rings { edges_mm, .. } => {
             if shape.is_some() && !is_planar {
                 at.to("rings").report_help(

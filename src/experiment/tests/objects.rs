@@ -99,7 +99,7 @@ fn the_index_is_positive_and_real() {
     let message = errors(&spectral("eta = 1.3", "eta = { sellmeier = { b = [1.0], c_um2 = [] } }"));
     holds(&message, "`b` has 1 entries, `c_um2` has 0", "5:69", "");
     let message = errors(&spectral("eta = 1.3", "eta = { material = \"skin\" }"));
-    holds(&message, "unknown material `skin`", "5:47", "did you mean `skin1`?");
+    holds(&message, "unknown material `skin`", "5:47", "did you mean `skin2`?");
     let message = refused("smooth = { eta = 1.3 }", "matched = { eta = 1.3 }");
     holds(&message, "unknown key `eta`", "5:29", "there are no keys here");
 }
@@ -110,9 +110,49 @@ fn presets_need_rgb_and_a_known_name() {
     let old = format!("medium.coefficients = {COEFFICIENTS}");
     good(&GOOD.replace(&old, preset));
     let message = refused(&old, &preset.replace("skin1", "skin"));
-    holds(&message, "unknown material `skin`", "6:33", "did you mean `skin1`?");
+    holds(&message, "unknown material `skin`", "6:33", "did you mean `skin2`?");
     let message = errors(&spectral(&old, preset));
     holds(&message, "built-in materials are measured in rgb bands only", "6:24", "rgb = {}");
+}
+
+/// Emission stands beside every form of the medium, one number for all bands or one per band, and
+/// replaces the lights; the key of another form replaces the form, not the emission.
+#[test]
+fn a_medium_may_emit() {
+    let light = "[[light]]\ndirectional = { toward = [1, 1, 1], irradiance = 1.0 }\n";
+    let old = format!("object.medium.coefficients = {COEFFICIENTS}\n");
+    let with = |emission: &str| {
+        GOOD.replace(&old, &format!("{old}object.medium.emission_per_mm = {emission}\n"))
+    };
+    let emission =
+        |experiment: &crate::experiment::Experiment| experiment.cells[0].object.medium.emission(3);
+    let dark = good(&with("[1, 0, 2.5]").replace(light, ""));
+    assert_eq!((emission(&dark), dark.cells[0].light.len()), (vec![1.0, 0.0, 2.5], 0));
+    assert_eq!(emission(&good(GOOD)), [0.0; 3]);
+    let sets =
+        ["object.medium.preset={ name = \"skin1\", scale = 2 }", "object.medium.emission_per_mm=4"];
+    let preset = try_load(&with("[1, 0, 2.5]"), &sets).expect("a good file");
+    assert!(preset.cells[0].object.medium.coefficients.is_none());
+    assert_eq!(emission(&preset), [4.0; 3]);
+
+    for dark in [GOOD.replace(light, ""), with("0").replace(light, "")] {
+        assert!(errors(&dark).contains("missing key `light`"));
+    }
+    let message = errors(&with("[1, -1, 1]"));
+    holds(&message, "must be at least 0, is -1", "7:37", "");
+    let message = errors(&with("[1, 1]"));
+    holds(&message, "there are 3 bands, the list has 2 entries", "7:33", "one number per band");
+    let named = with("1").replace("[[light]]\n", "[[light]]\nname = \"emission\"\n");
+    holds(&errors(&named), "`@emission` is the share of light that the medium emits", "11:8", "another");
+    let clear = with("1").replace(COEFFICIENTS, "{ sigma_a_per_mm = 0, sigma_s_per_mm = 0, g = 0 }");
+    good(&clear);
+    let message = errors(&clear.replace("sphere = { radius_mm = 1.0 }", "half_space = {}"));
+    holds(
+        &message,
+        "a half-space that emits and does not absorb has infinite radiance",
+        "7:33",
+        "band `R`",
+    );
 }
 
 #[test]

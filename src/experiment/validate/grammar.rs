@@ -64,14 +64,20 @@ impl Grammar {
         path.iter().try_fold(&self.root, |schema, word| self.step(schema, word))
     }
 
-    /// Whether the last word of `path` names a variant of an enum, so that setting it as a whole
-    /// replaces the variant that was there.
-    pub(crate) fn is_variant(&self, path: &[&str]) -> bool {
-        let Some((last, parents)) = path.split_last() else { return false };
-        match self.at(parents).map(|parent| self.form(parent)) {
-            Some(SchemaForm::Variants(variants)) => variants.iter().any(|v| v.name == *last),
-            _ => false,
+    /// The names that cannot stand beside the last word of `path`, and are replaced where it is set as a
+    /// whole: the other variants of its enum, or the other keys of which its table has exactly one.
+    pub(crate) fn rivals(&self, path: &[&str]) -> Vec<&str> {
+        let Some((last, parents)) = path.split_last() else { return Vec::new() };
+        let mut names = match self.at(parents).map(|parent| self.form(parent)) {
+            Some(SchemaForm::Variants(variants)) => variants.iter().map(|v| v.name).collect(),
+            Some(SchemaForm::Plain(plain)) => one_of(plain),
+            _ => Vec::new(),
+        };
+        if !names.contains(last) {
+            return Vec::new();
         }
+        names.retain(|name| name != last);
+        names
     }
 
     /// The names that may follow a path: keys of a table or variants of an enum.
@@ -108,6 +114,12 @@ impl Grammar {
         let target = reference.strip_prefix('#').and_then(|pointer| self.root.pointer(pointer));
         self.resolve(target.unwrap_or_else(|| panic!("schema reference {reference} has no target")))
     }
+}
+
+/// The keys of which a table must have exactly one.
+pub(crate) fn one_of(schema: &Json) -> Vec<&str> {
+    let alternatives = schema.get("oneOf").and_then(Json::as_array).into_iter().flatten();
+    alternatives.flat_map(|alternative| strings(alternative.get("required"))).collect()
 }
 
 /// The keys that a table's schema names.

@@ -164,9 +164,10 @@ impl<'a> SchemaWalk<'a> {
 
     /// A table whose `oneOf` lists keys of which exactly one must be there.
     fn one_of(&mut self, node: &Node, entries: &BTreeMap<String, Node>, schema: &Json, meant: &[&str]) {
-        let Some(alternatives) = schema.get("oneOf").and_then(Json::as_array) else { return };
-        let keys: Vec<&str> =
-            alternatives.iter().flat_map(|a| grammar::strings(a.get("required"))).collect();
+        let keys = grammar::one_of(schema);
+        if keys.is_empty() {
+            return;
+        }
         let given: Vec<&str> = keys.iter().copied().filter(|key| entries.contains_key(*key)).collect();
         let needed = suggest::quoted(&keys);
         match given[..] {

@@ -7,7 +7,8 @@
 //! grid that is refined; for each the weights are non-negative least squares (Lawson & Hanson 1974,
 //! chapter 23). The sum enters as one more equation with a large weight, and what is left of it is taken
 //! up by one factor on all weights. Nothing is random. Six Gaussians are within 2.1 % (L2) of both
-//! dipoles of every material of Jensen et al. 2001 in `optics::materials`.
+//! dipoles of every material of Jensen et al. 2001 in `optics::materials`, and within 2.5 % of the one that
+//! does not absorb, whose dipoles fall as 1/r^3.
 
 use std::f64::consts::PI;
 

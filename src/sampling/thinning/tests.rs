@@ -88,6 +88,37 @@ fn accepted_points_weigh_one_over_their_probability() {
     }
 }
 
+/// Rarely accepted points keep their weight, through the hierarchy and through the scan: N points at one
+/// distance from the query, where p = 4e-7. Accepted are N times the queries times p = 40 and 8 expected,
+/// each sum of weights over N times the queries is 1, within five of its standard deviations.
+#[test]
+fn rare_acceptances_weigh_as_much_as_they_have_to() {
+    let p = 4e-7;
+    let rule = ThinningRule::new(ThinningForm::Exponential { sigma: -crate::math::ln(p) });
+    let tree = PointTree::new(&sphere(200_000, 1.0));
+    let mut stream = stream("rare_acceptances_weigh_as_much_as_they_have_to");
+    for (search, queries) in [(Search::Hierarchy, 500), (Search::Scan, 100)] {
+        let (mut work, mut sum) = (ThinningWork::default(), 0.0);
+        for _ in 0..queries {
+            let add = |accepted: Accepted| {
+                let weight = accepted.weight * rule.probability(accepted.distance);
+                assert!((weight - 1.0).abs() < 1e-12, "{accepted:?}");
+                sum += accepted.weight;
+            };
+            match search {
+                Search::Hierarchy => tree.thin(DVec3::ZERO, &rule, &mut stream, &mut work, add),
+                Search::Scan => {
+                    scan(tree.axes(), 0..tree.len(), DVec3::ZERO, &rule, &mut stream, &mut work, add);
+                }
+            }
+        }
+        let asked = 200_000.0 * f64::from(queries);
+        assert!(work.accepted > 0, "{search:?}");
+        let error = 1.0 / (asked * p).sqrt();
+        assert!((sum / asked - 1.0).abs() < 5.0 * error, "{search:?}: {} +- {error}", sum / asked);
+    }
+}
+
 /// The probability in proportion to a function has the mean that was asked for.
 #[test]
 fn proportional_rule_accepts_as_many_as_asked() {

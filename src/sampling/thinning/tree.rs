@@ -289,3 +289,35 @@ fn split(codes: &[u64]) -> usize {
     let bit = 1u64 << (63 - differing.leading_zeros());
     codes.partition_point(|code| code & bit == 0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every point is inside the boxes of all nodes that hold it, in double precision: else p at the
+    /// nearest point of a box would not bound p at the point.
+    #[test]
+    fn boxes_hold_their_points() {
+        // Far from the origin, where single precision resolves 6e-5.
+        let at = |k: u32, turn: f64| 700.0 + (f64::from(k) * turn).fract();
+        let points: Vec<DVec3> = (0..3000)
+            .map(|k| {
+                DVec3::new(at(k, 0.618_033_988_749_894_9), -at(k, 0.754_877_666), at(k, 0.569_840_29))
+            })
+            .collect();
+        let tree = PointTree::new(&points);
+        assert!(tree.nodes.len() > 300);
+        let query = DVec3::new(699.5, -700.2, 701.3);
+        for node in &tree.nodes {
+            let (nearest, farthest) = node.distances(query);
+            for index in node.first as usize..node.end as usize {
+                let point = tree.point(index).to_array();
+                for (x, (low, high)) in point.iter().zip(node.low.iter().zip(&node.high)) {
+                    assert!(f64::from(*low) <= *x && *x <= f64::from(*high), "{x} {low} {high}");
+                }
+                let distance = (tree.point(index) - query).length();
+                assert!(nearest <= distance && distance <= farthest, "{nearest} {distance} {farthest}");
+            }
+        }
+    }
+}

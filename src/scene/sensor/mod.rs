@@ -8,6 +8,7 @@ mod accepting;
 mod body_flux;
 mod face_flux;
 mod orthographic;
+mod path_length;
 mod perspective;
 mod probe;
 mod rings;
@@ -18,6 +19,7 @@ pub use accepting::Accepting;
 pub use body_flux::BodyFlux;
 pub use face_flux::{FaceFlux, FluxFace};
 pub use orthographic::Orthographic;
+pub use path_length::{Ball, PathLength, PathMeasure};
 pub use perspective::Perspective;
 pub use probe::Probe;
 pub use rings::Rings;
@@ -47,6 +49,8 @@ pub enum Sensor {
     Rings(Rings),
     /// Flux of a finite body by the cosine between exit direction and axis.
     BodyFlux(BodyFlux),
+    /// Path length in a finite body, and what falls onto its surface.
+    PathLength(PathLength),
 }
 
 /// What a sensor asks of an estimator.
@@ -56,6 +60,8 @@ pub enum SensorClass {
     Outside,
     /// The same, and the point at which light entered.
     Entries,
+    /// Rays that start outside the body, and what their paths have done inside ([`PathMeasure`]).
+    Lengths,
     /// Rays that start inside the body.
     Inside,
 }
@@ -72,6 +78,7 @@ macro_rules! call {
             Sensor::FaceFlux(kind) => kind.$method($($argument),*),
             Sensor::Rings(kind) => kind.$method($($argument),*),
             Sensor::BodyFlux(kind) => kind.$method($($argument),*),
+            Sensor::PathLength(kind) => kind.$method($($argument),*),
         }
     };
 }
@@ -135,6 +142,10 @@ trait SensorMethods {
     fn receive(&self, _out: &Ray) -> Option<(usize, f64)> {
         None
     }
+
+    fn measure(&self) -> PathMeasure {
+        PathMeasure::default()
+    }
 }
 
 impl Sensor {
@@ -189,6 +200,11 @@ impl Sensor {
     /// where a slot is a single direction or all of its lines pass through one point.
     pub fn receives(&self, is_finite: bool) -> bool {
         call!(self.receives(is_finite))
+    }
+
+    /// What a new path keeps of itself; nothing except for a sensor of [`SensorClass::Lengths`].
+    pub fn measure(&self) -> PathMeasure {
+        call!(self.measure())
     }
 
     /// The regions, those that are split by class first.

@@ -235,7 +235,7 @@ fn what_cannot_be_judged() {
     let invalid = |stored: &Stored, images: &[(String, ExrImage)], words: &str| {
         let answer = answer(stored, images, true);
         let mean = of(&answer, "mean");
-        assert!(matches!(&mean.outcome, Outcome::Invalid(why) if why.contains(words)), "{mean:?}");
+        assert!(matches!(&mean.outcome, Outcome::Invalid(why) if why.said.contains(words)), "{mean:?}");
     };
     let mut bad = images(!seed, 3, 1.0, |_| 1.0);
     bad[1].1.channels.get_mut("Y").expect("a plane")[SIDE + 2] = f32::INFINITY;

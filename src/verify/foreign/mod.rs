@@ -13,7 +13,7 @@ use super::evidence::Evidence;
 use super::family::{Finding, conclude};
 use super::levels::Looks;
 use super::means::{QuantityMean, SHARE_LIMIT};
-use super::verdict::{Outcome, TestKind, Verdict};
+use super::verdict::{Objection, Outcome, TestKind, Verdict};
 use crate::error::{Error, Result};
 use crate::results::image::Picture;
 use crate::results::record::{EstimatorRun, Observable, ObservedRegion, Quantity};
@@ -231,17 +231,16 @@ impl BandQuestion<'_> {
         };
         let pixels = region.pixels(self.band.width, self.band.height);
         let theirs = self.theirs(&pixels);
-        let mut finding = self.finding(name, Evidence::Nothing(String::new()));
+        let mut finding = self.finding(name, Evidence::Nothing(String::new().into()));
         finding.verdict.set_value(theirs.value, theirs.std_error);
         finding.verdict.set_expected(arm.mean.value, arm.mean.std_error);
-        finding.evidence = match objection
-            .map(String::from)
-            .or_else(|| arm.objection())
-            .or_else(|| has_pixels.then(|| self.misplaced(&pixels, &arm)).flatten())
-        {
-            Some(reason) => Evidence::Nothing(reason),
-            None => self.weigh(&theirs, &arm, &pixels, &mut finding.verdict),
-        };
+        finding.evidence =
+            match objection.map(Objection::from).or_else(|| arm.objection()).or_else(|| {
+                has_pixels.then(|| self.misplaced(&pixels, &arm)).flatten().map(Objection::from)
+            }) {
+                Some(reason) => Evidence::Nothing(reason),
+                None => self.weigh(&theirs, &arm, &pixels, &mut finding.verdict),
+            };
         if region.tile.is_none() {
             finding.detect = Some(self.question.detect);
             if arm.mean.value == 0.0 && !matches!(finding.evidence, Evidence::Nothing(_)) {
@@ -272,10 +271,10 @@ impl BandQuestion<'_> {
         }
         let share = self.band.largest_share(pixels);
         if pixels.len() >= FEW_PIXELS && share > SHARE_LIMIT {
-            return Evidence::Nothing(format!(
-                "heavy tail: one pixel holds {:.0} % of the spread between the images",
-                100.0 * share
-            ));
+            let share = 100.0 * share;
+            let said =
+                format!("heavy tail: one pixel holds {share:.0} % of the spread between the images");
+            return Evidence::Nothing(said.into());
         }
         if self.question.independent_pixels {
             let squares: f64 = pixels.iter().map(|&i| self.band.variance(i)).sum();
@@ -283,10 +282,11 @@ impl BandQuestion<'_> {
             let ratio = spread.estimate.std_error / predicted;
             let dof = self.band.seeds() - 1.0;
             if chi_square_sf(dof * ratio * ratio, dof) < SPREAD_LEVEL {
-                return Evidence::Nothing(format!(
+                let said = format!(
                     "the images' means spread {ratio:.1} times as far as independent pixels would: judge \
                      without --independent-pixels"
-                ));
+                );
+                return Evidence::Nothing(said.into());
             }
         }
         verdict.test = Some(match self.question.independent_pixels {
@@ -336,7 +336,7 @@ impl BandQuestion<'_> {
     fn pixels(&self, objection: Option<&str>) -> Finding {
         let arm = self.quantity(&Observable { name: "mean".into(), class: "all".into() });
         let objection = objection
-            .map(String::from)
+            .map(Objection::from)
             .or_else(|| QuantityMean::of(self.question.stored, &arm).and_then(|arm| arm.objection()));
         let found = pixels::squared_bias(self.band);
         let is_exact = objection.is_none() && found.noise == 0.0;

@@ -10,7 +10,7 @@ use super::single;
 use super::{OracleRow, OracleTable};
 use crate::math::{DVec3, integrate};
 use crate::optics::fresnel::fresnel;
-use crate::optics::materials::{self, MATERIALS};
+use crate::optics::materials::{self, MATERIALS, MeasuredMaterial};
 use crate::optics::medium::Medium;
 
 /// int 2 pi r f(r) dr, in ln r about the length.
@@ -94,10 +94,16 @@ fn profiles(reduced: &Reduced, eta: f64) -> [RadialProfile; 2] {
     ]
 }
 
+/// Those whose profiles fall exponentially; `media_that_do_not_absorb` is about the others.
+fn absorbing() -> impl Iterator<Item = &'static MeasuredMaterial> {
+    MATERIALS.iter().filter(|material| material.sigma_a.iter().all(|a| *a > 0.0))
+}
+
 /// The closed forms are the integrals of the profiles, for boundaries of all kinds.
 #[test]
 fn totals_are_integrals_of_profiles() {
-    for material in &MATERIALS {
+    assert_eq!(absorbing().count(), 11);
+    for material in absorbing() {
         for eta in [0.8, 1.0, material.eta] {
             let reduced = Reduced::new(material.sigma_a[1], material.reduced_sigma_s[1]);
             for profile in profiles(&reduced, eta) {
@@ -148,7 +154,7 @@ fn better_as_printed(reduced: &Reduced, moments: &FresnelMoments, s: f64, r: f64
 /// form; the paper's own formula is not.
 #[test]
 fn the_closed_form_tells_the_right_s_from_the_classical_one() {
-    for material in &MATERIALS {
+    for material in absorbing() {
         let reduced = Reduced::new(material.sigma_a[0], material.reduced_sigma_s[0]);
         let moments = FresnelMoments::exact(material.eta);
         let better = Better::new(&reduced, &moments);

@@ -26,7 +26,8 @@ fn fits_of_dipoles() {
             for ((few, _), (many, total)) in few.iter().zip(&many) {
                 assert!((many.gaussians.total() / total - 1.0).abs() < 1e-13);
                 assert!(many.error.l2 < few.error.l2, "{} {band}", material.name);
-                assert!(many.error.l2 < 0.021, "{} {band}: {:?}", material.name, many.error);
+                let stated = if material.sigma_a[band] > 0.0 { 0.021 } else { 0.025 };
+                assert!(many.error.l2 < stated, "{} {band}: {:?}", material.name, many.error);
             }
         }
     }
