@@ -211,11 +211,14 @@ fn efficiency(data: &ReportData) -> Vec<PageBlock> {
     if data.comparisons.is_empty() {
         return Vec::new();
     }
-    let text = "Variance of a pass times its cost, of the first estimator over the other: above 1 the other is the \
-                better. In brackets the 95 % interval. By counters the cost is a weighted sum of counts, the same on \
-                every machine; by CPU time it is this machine's, and fair only where the estimators of a cell were interleaved. \
-                A ratio is quoted where the two means agree; it is not resolved where more passes could still \
-                change it or where a single pass may dominate it.";
+    let by_cpu: Vec<_> = data.comparisons.iter().filter(|row| row.cost == CostMeasure::Cpu).collect();
+    let text = format!(
+        "Variance of a pass times its cost, of the first estimator over the other: above 1 the other is the better. \
+         In brackets the 95 % interval. By counters the cost is a weighted sum of counts, the same on every machine; \
+         by CPU time it is this machine's, {}. A ratio is quoted where the two means agree; it is not resolved where \
+         more passes could still change it or where a single pass may dominate it.",
+        summary::clock_words(&by_cpu)
+    );
     let table = named("efficiency-by-class", comparison_table(&data.comparisons));
     let mut blocks = vec![heading("Efficiency")];
     let by = |cost| summary::efficiency(&data.stored, &data.comparisons, cost).map(PageBlock::Table);
@@ -228,7 +231,7 @@ fn efficiency(data: &ReportData) -> Vec<PageBlock> {
         (None, counters) => blocks.extend(counters),
     }
     let title = "By transport class, by counted work and by CPU time, with reasons";
-    blocks.push(PageBlock::Folded(title.into(), vec![PageBlock::Text(text.into()), table]));
+    blocks.push(PageBlock::Folded(title.into(), vec![PageBlock::Text(text), table]));
     if let Some(drift) = weights::drift(&weights::timed(&data.stored)).filter(|d| *d > DRIFT_LIMIT) {
         blocks.push(PageBlock::Text(format!(
             "CPU times of these runs deviate by up to {:.0} % from what the counters' weights predict: measure the \

@@ -82,7 +82,7 @@ pub(crate) fn efficiency(
 }
 
 /// How CPU times came about.
-fn clock_words(rows: &[&EfficiencyRow]) -> String {
+pub(crate) fn clock_words(rows: &[&EfficiencyRow]) -> String {
     let controls = || rows.iter().filter_map(|row| row.control_ratio);
     let number = |x: f64| significant(x, 4);
     match rows.iter().filter(|row| row.interleaved).count() {

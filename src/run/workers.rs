@@ -6,15 +6,17 @@
 //! sized by the time they take; the fixed tree over passes makes results independent of that size.
 //!
 //! The estimators of a cell are interleaved, so that their CPU times can be compared: one worker runs a
-//! turn of about a second, the same part of every arm's passes in the order A B .. B A, and whatever
+//! turn of about an eighth of a second, the same part of every arm's passes in the order A B .. B A, and whatever
 //! drifts steadily (clock rate, temperature, other load) adds the same to each arm. Arms may have
 //! different numbers of passes: a turn is a part of the run, [f, f') of each. A worker's first turn in a
 //! cell warms it up, and one of which an earlier process had run a part is not in that order: neither
 //! counts as timed (`Work::settled`).
 //!
-//! In every eighth turn the first arm's passes run twice, A C B .. B C A: C is the same work as A at
-//! another place in the order, so that the ratio of their times is 1 but for the machine. Its scores are
-//! dropped; its time is kept (`Work::twice`).
+//! In every eighth turn (every second where a claim rests on CPU time) the first arm's passes run twice,
+//! A C B .. B C A: C is the same work as A at another place in the order, so that the ratio of their
+//! times is 1 but for the machine. Its scores are dropped; its time is kept (`Work::twice`). The error of
+//! a ratio contains the scatter of this control: in cells of a few seconds, 1 to 3 % with every eighth
+//! turn.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -85,9 +87,11 @@ impl Completed {
 /// Wall time that a block should take, seconds.
 const BLOCK_SECONDS: f64 = 0.25;
 /// Wall time that a turn of all arms should take, seconds.
-const TURN_SECONDS: f64 = 1.0;
+const TURN_SECONDS: f64 = 0.125;
 /// One turn in so many runs passes of the first arm twice.
 const CONTROL_EVERY: u64 = 8;
+/// The same where a claim rests on CPU time.
+const CLAIMED_CONTROL_EVERY: u64 = 2;
 /// Time between checkpoints of a job under way.
 const CHECKPOINT_EVERY: Duration = Duration::from_secs(5);
 
@@ -357,8 +361,11 @@ impl Pool<'_> {
         let longest = active.lanes.iter().map(|lane| lane.passes).max()?;
         while active.given < longest {
             let passes = self.turn_length(active, longest);
-            let is_main = self.jobs[active.lanes[0].job].passes()?.stage == Stage::Main;
-            let has_control = is_main && active.turn % CONTROL_EVERY == CONTROL_EVERY - 1;
+            let arms = || active.lanes.iter().filter_map(|lane| self.jobs[lane.job].passes());
+            let is_main = arms().all(|arm| arm.stage == Stage::Main);
+            let is_claimed = arms().any(|arm| arm.arm.is_control);
+            let every = if is_claimed { CLAIMED_CONTROL_EVERY } else { CONTROL_EVERY };
+            let has_control = is_main && active.turn % every == every - 1;
             let (spans, is_balanced) = turn(&active.lanes, active.given, passes, has_control);
             active.given += passes;
             if !spans.is_empty() {
