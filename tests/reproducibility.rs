@@ -251,3 +251,29 @@ fn a_budget_in_seconds_comes_again_by_the_passes_of_its_record() {
     work.run("run x.toml -q --out third --set object.boundary.rough.alpha=0.4").exits(0);
     work.run("compare first/x third/x").says("the records are not byte-identical");
 }
+
+/// With `only_claimed`, an estimator runs where a claim names it and nowhere else, on the same streams;
+/// cells without a claim stay empty, and the report of such a record is made.
+#[test]
+fn only_what_claims_name_is_run() {
+    let sweep = "[[sweep]]\nkey = \"object.medium.coefficients.albedo\"\nvalues = [0.9, 0.5]\n";
+    let claim = "[[claim]]\nequals = { estimator = \"mis\", value = 0.1, source = \"a guess\", \
+                 where = { albedo = \"0.5\" } }\n";
+    let text = probe() + sweep + claim;
+    let all = fresh(&text);
+    let work = Work::with(&format!("only_claimed = true\n{text}"));
+    work.run("run x.toml -q").exits(0);
+    let claimed = work.record("results");
+    let runs = |files: &Files| -> Vec<usize> {
+        let record = json(files);
+        let cells = record["cells"].as_array().expect("cells");
+        cells.iter().map(|cell| cell["runs"].as_array().expect("runs").len()).collect()
+    };
+    assert_eq!((runs(&all), runs(&claimed)), (vec![2, 2], vec![0, 1]));
+    for (run, bytes) in observables(&claimed) {
+        assert!(observables(&all)[&run] == bytes, "{run:?} differs where all run");
+    }
+    work.run("report results/x").exits(0);
+    let nothing = Work::with(&format!("only_claimed = true\n{}", probe()));
+    nothing.run("check x.toml").exits(2).complains("no claim names an estimator");
+}

@@ -35,7 +35,7 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
         let checked = load(path, &options, registry).and_then(|experiment| {
             build_all(&experiment, registry)?;
             let others: &[String] = if options.setting.is_some() { &[] } else { &experiment.settings };
-            others.iter().try_for_each(|setting| load_setting(setting).map(|_| ()))?;
+            others.iter().try_for_each(|setting| build_all(&load_setting(setting)?, registry))?;
             Ok(experiment)
         });
         match checked {
@@ -69,7 +69,7 @@ fn summary(experiment: &Experiment) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::tests::{GOOD, registry};
+    use crate::experiment::tests::GOOD;
 
     fn check(texts: &[&str]) -> (String, Result<()>) {
         let folder = tempfile::tempdir().expect("a temporary folder");
@@ -81,7 +81,7 @@ mod tests {
         let reading = Reading { set: Vec::new(), setting: None };
         let args = Args { files: files.collect(), reading };
         let mut out = Vec::new();
-        let result = run(&args, &registry(), &mut out);
+        let result = run(&args, &Registry::builtin(), &mut out);
         (String::from_utf8(out).expect("it is text"), result)
     }
 
@@ -104,5 +104,16 @@ mod tests {
             "{message}"
         );
         assert!(out.contains("1.toml: ok") && !out.contains("2.toml"), "{out}");
+    }
+
+    /// What shows only when it is built is found in the file and in each of its settings.
+    #[test]
+    fn estimators_are_built_in_every_setting() {
+        let vertex = "{ vertex = { point_mm = [0, 0, 0.8], toward = [0, 0, 1] } }";
+        let inside = format!("{GOOD}[setting.inside]\nsensor = {vertex}\n");
+        let (out, result) = check(&[GOOD, &inside]);
+        let message = result.expect_err("`path` starts outside").to_string();
+        assert!(message.contains("path starts its paths outside the body"), "{message}");
+        assert!(out.contains("0.toml: ok") && !out.contains("1.toml"), "{out}");
     }
 }

@@ -55,6 +55,10 @@ pub struct ExperimentFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(min = 1))]
     pub estimator: Vec<EstimatorEntry>,
+    /// Whether an estimator runs only in the cells in which a claim names it; by default it runs in all.
+    /// Cells that no claim is about stay empty.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub only_claimed: bool,
     /// Axes of the sweep; they multiply.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sweep: Vec<Sweep>,

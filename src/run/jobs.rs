@@ -1,7 +1,7 @@
 //! From an experiment to jobs: every cell's scene, every estimator on it, every sampler, the streams of
 //! all.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use serde_json::{Value, json};
@@ -19,7 +19,7 @@ use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure, Faster
 use crate::experiment::{CellSpec, Experiment};
 use crate::results::json::{canonical, hash_bytes, hash_json};
 use crate::results::provenance;
-use crate::results::record::{Band, Comparison, Observable};
+use crate::results::record::{Against, Band, Comparison, Observable};
 use crate::samplers::Sampler;
 use crate::sampling::stream::StreamKey;
 use crate::scene::Scene;
@@ -78,12 +78,22 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
     let arms = Duels::new(experiment);
     let mut jobs = Vec::new();
     for (index, cell) in cells.iter().enumerate() {
+        let named = claimed(experiment, index, &comparisons);
         for (entry, words) in experiment.file.estimator.iter().enumerate() {
+            if named.as_ref().is_some_and(|named| !named.contains(words.name.as_str())) {
+                continue;
+            }
             let targets = targets(index, &words.name, &comparisons, &observables[index]);
             for arm in arms.of(cell.spec, &words.name) {
                 jobs.push(planner.passes(index, cell, entry, arm, targets.clone())?);
             }
         }
+    }
+    if jobs.is_empty() && experiment.file.only_claimed {
+        return Err(Error::input_help(
+            "no claim names an estimator, and `only_claimed` leaves nothing to run",
+            "claim something, or leave `only_claimed` out",
+        ));
     }
     for index in 0..experiment.file.sampler.len() {
         jobs.push(planner.draws(index)?);
@@ -242,15 +252,13 @@ fn build_sampler<'a>(
     Ok((kind, (registered.build)(options)?))
 }
 
-/// Builds every scene and every sampler, for `check`: meshes, maps, the sensor's place and the
-/// options of samplers show only then.
+/// Builds every scene, estimator and sampler and expands every claim, for `check`: meshes, maps, the
+/// sensor's place, options and claims on what nobody measures show only then.
 ///
 /// # Errors
 /// What cannot be built.
 pub(crate) fn build_all(experiment: &Experiment, registry: &Registry) -> Result<()> {
-    let mut builder = Builder::new(experiment);
-    experiment.cells.iter().try_for_each(|cell| builder.scene(cell).map(|_| ()))?;
-    experiment.file.sampler.iter().try_for_each(|words| build_sampler(words, registry).map(|_| ()))
+    plan(experiment, registry).map(|_| ())
 }
 
 /// Claims of efficiency by CPU time: their baselines run twice, on streams of their own, because the same
@@ -281,6 +289,24 @@ pub(super) fn named(layout: &Layout) -> Vec<Observable> {
         class: o.class.to_string(),
     };
     layout.observables().iter().map(name).collect()
+}
+
+/// The estimators that claims name in a cell, where no others run.
+fn claimed<'a>(
+    experiment: &Experiment,
+    cell: usize,
+    comparisons: &'a [Comparison],
+) -> Option<BTreeSet<&'a str>> {
+    let quantities = comparisons.iter().flat_map(|comparison| {
+        let other = match &comparison.against {
+            Against::Value { .. } => None,
+            Against::Quantity { other, .. } => Some(other),
+            Against::Efficiency { baseline, .. } => Some(baseline),
+        };
+        [Some(&comparison.quantity), other]
+    });
+    let here = quantities.flatten().filter(|quantity| quantity.cell == cell);
+    experiment.file.only_claimed.then(|| here.map(|quantity| quantity.estimator.as_str()).collect())
 }
 
 /// The observables that claims name of an estimator in a cell; the sensor's first where none does.

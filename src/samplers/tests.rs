@@ -56,7 +56,7 @@ fn samples_agree_with_their_density() {
         let (pieces, deltas) = (sampler.pieces(), sampler.deltas());
         let mut stream = stream(&name);
         let mut draws = None;
-        for _ in 0..2000 {
+        for _ in 0..500 {
             let before = stream.draws();
             let draw = sampler.draw(&mut stream);
             let taken = stream.draws() - before;

@@ -44,7 +44,7 @@ pub(crate) const SCENE_KEYS: [&str; 6] = ["bands", "object", "sensor", "light", 
 pub(crate) const SAMPLER_KEYS: [&str; 2] = ["samples", "sampler"];
 
 /// Keys that describe more of a scene.
-const MORE_OF_SCENES: [&str; 3] = ["sweep", "pair", "picture"];
+const MORE_OF_SCENES: [&str; 4] = ["sweep", "pair", "picture", "only_claimed"];
 
 /// What an experiment is made of.
 #[derive(Clone, Copy, Debug)]
