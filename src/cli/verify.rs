@@ -75,9 +75,9 @@ struct Judged {
 /// What a path names.
 enum Named {
     /// A record, judged as it is.
-    Record(Judged),
+    Record(Box<Judged>),
     /// An experiment, run where it has no record yet.
-    Experiment(Experiment),
+    Experiment(Box<Experiment>),
 }
 
 /// Everything that verification of one call works with.
@@ -179,12 +179,12 @@ impl Court<'_> {
         let (mut named, mut wrong) = (Vec::new(), Vec::new());
         for path in paths {
             if path.join("record").join("record.json").exists() {
-                named.push(Named::Record(Self::judged(RecordFolder::new(path), None)?));
+                named.push(Named::Record(Box::new(Self::judged(RecordFolder::new(path), None)?)));
                 continue;
             }
             for file in experiment_files(path)? {
                 match self.checked(&file) {
-                    Ok(experiment) => named.push(Named::Experiment(experiment)),
+                    Ok(experiment) => named.push(Named::Experiment(Box::new(experiment))),
                     Err(Error::Input(findings)) => wrong.extend(findings),
                     Err(other) => return Err(other),
                 }
@@ -194,8 +194,8 @@ impl Court<'_> {
             return Err(Error::Input(wrong));
         }
         let measured = |named| match named {
-            Named::Record(judged) => Ok(judged),
-            Named::Experiment(experiment) => self.measured(experiment),
+            Named::Record(judged) => Ok(*judged),
+            Named::Experiment(experiment) => self.measured(*experiment),
         };
         named.into_iter().map(measured).collect()
     }

@@ -9,7 +9,7 @@
 //! per time in the volume V (power times length; a part of the body has the part's volume). The power
 //! that falls onto the surface of area S from outside is pi L S. Their ratio is the mean path length in
 //! the body of light that falls onto its surface,
-//!   <l> = 4 eta^2 V / S,
+//!   mean length = 4 eta^2 V / S,
 //! where light that is reflected at once counts with length 0, and light that leaves a body that is not
 //! convex and meets it again counts as falling onto it again. Blanco & Fournier, "An invariance property of
 //! diffusive random walks", Europhys. Lett. 61 (2003), for eta = 1; Martelli et al., Sci. Rep. 11, 19486
