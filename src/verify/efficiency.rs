@@ -19,7 +19,7 @@
 //!   may hold more than 5 % of an arm's sum of squares; by CPU time, the blocks are parts of a run that
 //!   interleaved the arms of the cell, A B .. B A (`run::workers`), the interval contains what the clock's
 //!   control shows of the machine (`stats::efficiency`), and the baseline against its own control arm has
-//!   1 in the 99.9 % intervals of both E and the cost ratio. Parts that warmed a worker up or were run in
+//!   1 in the 99.9 % intervals of both E and the cost ratio, or is within 5 % of it. Parts that warmed a worker up or were run in
 //!   pieces are left out whole: which ones these are does not depend on the scores.
 //!
 //! By counted work E may be off by the factor f of the two kinds of estimators
@@ -52,6 +52,10 @@ use crate::stats::tree::Merge;
 /// The fewest parts of a run that a ratio of CPU times may rest on.
 const LEAST_PARTS: usize = 16;
 
+/// How far a control arm may be from its baseline. Up to here, the interval of a ratio contains what the
+/// control shows.
+const LARGEST_CONTROL: f64 = 1.05;
+
 /// Two arms at equal cost.
 pub(crate) struct Contest {
     /// Baseline over candidate: above 1 where the candidate is the better. Its intervals are those of
@@ -59,8 +63,6 @@ pub(crate) struct Contest {
     pub efficiency: Efficiency,
     /// The efficiency ratio with the error that the clock's control shows.
     pub ratio: LogRatio,
-    /// Of interleaved arms by CPU time: the time of the first arm's control over its own.
-    pub control: Option<f64>,
     /// Whether the arms were interleaved, and timed with a control; always true by counters.
     pub is_interleaved: bool,
     /// What the ratio is at least, with [`SHOWN`] confidence from below and above together, where only
@@ -98,7 +100,6 @@ pub(crate) fn contest(
         ratio: efficiency.work.with_control(&machine),
         is_interleaved: measure == CostMeasure::Counters || control.is_some(),
         at_least,
-        control: control.map(exp),
         efficiency,
     })
 }
@@ -118,12 +119,23 @@ fn machine_of(stored: &Stored, own: Option<f64>) -> Estimate {
 }
 
 /// The time of passes that were run a second time over that of their first run, in the arm of the cell
-/// that has them: the logarithm of the control's ratio to itself.
+/// that has them: the logarithm of the control's ratio to itself. Where control arms show more, theirs.
 fn control_log(stored: &Stored, cell: usize) -> Option<f64> {
-    let label = &stored.record.cells.get(cell)?.label;
-    let arms = stored.timing.as_ref()?.batches.get(label)?.values();
-    let twice = arms.flat_map(|arm| &arm.twice);
-    let [first, second] = twice.fold([0.0; 2], |sum, times| [sum[0] + times[0], sum[1] + times[1]]);
+    let cell = stored.record.cells.get(cell)?;
+    let batches = stored.timing.as_ref()?.batches.get(&cell.label)?;
+    let twice = batches.values().flat_map(|arm| arm.twice.iter().copied());
+    let of_arms = cell.runs.iter().filter_map(|run| {
+        let (first, second) = (batches.get(run.control_of.as_ref()?)?, batches.get(&run.estimator)?);
+        let times = first.cpu_seconds.iter().zip(&second.cpu_seconds).map(|(a, b)| [*a, *b]);
+        let settled = first.settled.iter().zip(&second.settled).map(|(a, b)| *a && *b);
+        ratio_log(times.zip(settled).filter(|(_, settled)| *settled).map(|(times, _)| times))
+    });
+    Some(of_arms.fold(ratio_log(twice)?, |most, log| if log.abs() > most.abs() { log } else { most }))
+}
+
+/// The logarithm of the sum of second times over that of first ones.
+fn ratio_log(times: impl Iterator<Item = [f64; 2]>) -> Option<f64> {
+    let [first, second] = times.fold([0.0; 2], |sum, times| [sum[0] + times[0], sum[1] + times[1]]);
     (first > 0.0 && second > 0.0).then(|| ln(second / first))
 }
 
@@ -340,13 +352,13 @@ fn control_objection(stored: &Stored, baseline: &Quantity) -> Option<String> {
         Ok(_) => return Some("no control: it was not interleaved".into()),
         Err(reason) => return Some(format!("no control: {reason}")),
     };
-    let excludes_one = |ratio: &LogRatio| ratio.log.value.abs() > ratio.half_width(CONFIDENCE);
-    let machine = machine_of(stored, contest.control.map(ln));
-    let (cost, work) = (contest.efficiency.cost.with_control(&machine), contest.ratio);
-    (excludes_one(&cost) || excludes_one(&work)).then(|| {
+    let is_off =
+        |ratio: &LogRatio| ratio.log.value.abs() > ratio.half_width(CONFIDENCE).max(ln(LARGEST_CONTROL));
+    let (cost, work) = (contest.efficiency.cost, contest.efficiency.work);
+    (is_off(&cost) || is_off(&work)).then(|| {
         format!(
-            "machine too noisy: {} against itself has {:.3} times the cost and {:.3} times the efficiency, and \
-             1 lies outside of a 99.9 % interval",
+            "machine too noisy: {} against itself has {:.3} times the cost and {:.3} times the efficiency, \
+             more than {LARGEST_CONTROL} and outside of a 99.9 % interval",
             baseline.estimator,
             cost.ratio(),
             work.ratio()

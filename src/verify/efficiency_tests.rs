@@ -203,6 +203,20 @@ fn a_timer_that_counts_another_arms_time_is_found() {
     assert_invalid(&by_cpu(leaking, 1.5), "machine too noisy");
 }
 
+/// A control arm that took 2 % longer is no reason to drop a ratio of 4: the interval contains it.
+#[test]
+fn what_a_control_arm_shows_is_in_the_interval() {
+    let by = |factor: f64| {
+        let cost = move |name: &str| if name == "mis (control)" { factor } else { 1.0 };
+        by_cpu(timed(scored(0.1, 0.05), |name, batch| cost(name) * noisy(name, batch)), 1.5)
+    };
+    let [even, off] = [by(1.0), by(1.02)];
+    assert!(even.outcome == Outcome::Pass && off.outcome == Outcome::Pass, "{even:?} {off:?}");
+    let error = |v: &Verdict| v.std_error.expect("an error") / v.value.expect("a ratio");
+    assert!(error(&off).powi(2) > error(&even).powi(2) + 0.015_f64.powi(2), "{even:?} {off:?}");
+    assert_invalid(&by(1.2), "machine too noisy");
+}
+
 /// Replaces the times of the passes that ran twice.
 fn set_control(s: &mut Stored, twice: [f64; 2]) {
     let timing = s.timing.as_mut().expect("a timing");
