@@ -11,7 +11,7 @@ use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 use crate::optics::medium::Medium;
 use crate::optics::phase::HenyeyGreenstein;
-use crate::sampling::stream::{Purpose, StreamKey, opened_by};
+use crate::sampling::stream::{PURPOSES, Purpose, StreamKey, opened_by};
 use crate::scene::sensor::{BodyFlux, Probe};
 use crate::scene::{Emission, Light, Scene, Sensor};
 
@@ -75,13 +75,5 @@ fn no_stream_is_opened_twice() {
         }
         assert!(names.len() > 3 * 64, "{name}: {} streams", names.len());
     }
-    let all = [
-        Purpose::Sensor,
-        Purpose::Walk,
-        Purpose::Light,
-        Purpose::Connection,
-        Purpose::Hero,
-        Purpose::Cloud,
-    ];
-    assert!(all.iter().all(|&purpose| used.contains(&(purpose as u64))), "{used:?}");
+    assert!(PURPOSES.iter().all(|&purpose| used.contains(&(purpose as u64))), "{used:?}");
 }

@@ -78,9 +78,9 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
     let arms = Duels::new(experiment);
     let mut jobs = Vec::new();
     for (index, cell) in cells.iter().enumerate() {
-        let named = claimed(experiment, index, &comparisons);
+        let wanted = claimed(experiment, index, &comparisons);
         for (entry, words) in experiment.file.estimator.iter().enumerate() {
-            if named.as_ref().is_some_and(|named| !named.contains(words.name.as_str())) {
+            if wanted.as_ref().is_some_and(|names| !names.contains(words.name.as_str())) {
                 continue;
             }
             let targets = targets(index, &words.name, &comparisons, &observables[index]);

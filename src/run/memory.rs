@@ -25,8 +25,8 @@ impl MemoryEstimate {
     /// holds one image per bit of its passes, and as much again while its state is written. Each thread
     /// holds the images of its block (sized by time: large images have blocks of a few passes) and one
     /// more waits to be collected. Where the estimators of a cell are interleaved, they are under way
-    /// together, and two blocks of each may wait for the turn of those before them. What an estimator needs for a pass it
-    /// needs on each thread.
+    /// together, and two blocks of each may wait for the turn of those before them. What an estimator
+    /// needs for a pass it needs on each thread.
     pub(crate) fn new(
         jobs: &[Job],
         [shapes, building]: [usize; 2],

@@ -6,11 +6,11 @@
 //! sized by the time they take; the fixed tree over passes makes results independent of that size.
 //!
 //! The estimators of a cell are interleaved, so that their CPU times can be compared: one worker runs a
-//! turn of about an eighth of a second, the same part of every arm's passes in the order A B .. B A, and whatever
-//! drifts steadily (clock rate, temperature, other load) adds the same to each arm. Arms may have
-//! different numbers of passes: a turn is a part of the run, [f, f') of each. A worker's first turn in a
-//! cell warms it up, and one of which an earlier process had run a part is not in that order: neither
-//! counts as timed (`Work::settled`).
+//! turn of about an eighth of a second, the same part of every arm's passes in the order A B .. B A, and
+//! whatever drifts steadily (clock rate, temperature, other load) adds the same to each arm. Arms may
+//! have different numbers of passes: a turn is a part of the run, [f, f') of each. A worker's first turn
+//! in a cell warms it up, and one of which an earlier process had run a part is not in that order:
+//! neither counts as timed (`Work::settled`).
 //!
 //! In every eighth turn (every second where a claim rests on CPU time) the first arm's passes run twice,
 //! A C B .. B C A: C is the same work as A at another place in the order, so that the ratio of their

@@ -111,6 +111,11 @@ thread_local! {
     static OPENED: std::cell::RefCell<Option<Vec<OpenedStream>>> = const { std::cell::RefCell::new(None) };
 }
 
+/// Every purpose.
+#[cfg(test)]
+pub(crate) const PURPOSES: [Purpose; 6] =
+    [Purpose::Sensor, Purpose::Walk, Purpose::Light, Purpose::Connection, Purpose::Hero, Purpose::Cloud];
+
 /// The streams that the calling thread opens in `work`.
 #[cfg(test)]
 pub(crate) fn opened_by(work: impl FnOnce()) -> Vec<OpenedStream> {
@@ -193,15 +198,6 @@ mod tests {
 
     const FROZEN: [u64; 4] =
         [4607173566107404283, 4606326434038641471, 4605347230709447812, 4601066195608706346];
-
-    const PURPOSES: [Purpose; 6] = [
-        Purpose::Sensor,
-        Purpose::Walk,
-        Purpose::Light,
-        Purpose::Connection,
-        Purpose::Hero,
-        Purpose::Cloud,
-    ];
 
     /// The audit: neighbouring passes, pixels and purposes, k-th draw against k-th draw.
     #[test]

@@ -19,8 +19,9 @@
 //!   may hold more than 5 % of an arm's sum of squares; by CPU time, the blocks are parts of a run that
 //!   interleaved the arms of the cell, A B .. B A (`run::workers`), the interval contains what the clock's
 //!   control shows of the machine (`stats::efficiency`), and the baseline against its own control arm has
-//!   1 in the 99.9 % intervals of both E and the cost ratio, or is within 5 % of it. Parts that warmed a worker up or were run in
-//!   pieces are left out whole: which ones these are does not depend on the scores.
+//!   1 in the 99.9 % intervals of both E and the cost ratio, or is within 5 % of it. Parts that warmed a
+//!   worker up or were run in pieces are left out whole: which ones these are does not depend on the
+//!   scores.
 //!
 //! By counted work E may be off by the factor f of the two kinds of estimators
 //! (`results::counted_work`), so that the claim must hold whatever the clock says within it: e f stands
@@ -121,21 +122,32 @@ fn machine_of(stored: &Stored, own: Option<f64>) -> Estimate {
 /// The time of passes that were run a second time over that of their first run, in the arm of the cell
 /// that has them: the logarithm of the control's ratio to itself. Where control arms show more, theirs.
 fn control_log(stored: &Stored, cell: usize) -> Option<f64> {
-    let cell = stored.record.cells.get(cell)?;
-    let batches = stored.timing.as_ref()?.batches.get(&cell.label)?;
-    let twice = batches.values().flat_map(|arm| arm.twice.iter().copied());
-    let of_arms = cell.runs.iter().filter_map(|run| {
-        let (first, second) = (batches.get(run.control_of.as_ref()?)?, batches.get(&run.estimator)?);
-        let times = first.cpu_seconds.iter().zip(&second.cpu_seconds).map(|(a, b)| [*a, *b]);
-        let settled = first.settled.iter().zip(&second.settled).map(|(a, b)| *a && *b);
-        ratio_log(times.zip(settled).filter(|(_, settled)| *settled).map(|(times, _)| times))
+    let runs = &stored.record.cells.get(cell)?.runs;
+    let batches = stored.timing.as_ref()?.batches.get(&stored.record.cells[cell].label)?;
+    let twice = batches.values().flat_map(|arm| &arm.twice);
+    let [first, second] = twice.fold([0.0; 2], |sum, times| [sum[0] + times[0], sum[1] + times[1]]);
+    let of_arms = runs.iter().filter_map(|run| {
+        let observable = run.observables.first()?;
+        let arm = |estimator: &str| {
+            let (estimator, observable) = (estimator.into(), observable.clone());
+            let quantity = Quantity { cell, estimator, observable, band: 0 };
+            CostedBatches::of(stored, &quantity, CostMeasure::Cpu).ok()
+        };
+        let (first, second) = parts(&arm(run.control_of.as_ref()?)?, &arm(&run.estimator)?);
+        ratio_log(per_pass(&first), per_pass(&second))
     });
-    Some(of_arms.fold(ratio_log(twice)?, |most, log| if log.abs() > most.abs() { log } else { most }))
+    let own = ratio_log(first, second)?;
+    Some(of_arms.fold(own, |most, log| if log.abs() > most.abs() { log } else { most }))
 }
 
-/// The logarithm of the sum of second times over that of first ones.
-fn ratio_log(times: impl Iterator<Item = [f64; 2]>) -> Option<f64> {
-    let [first, second] = times.fold([0.0; 2], |sum, times| [sum[0] + times[0], sum[1] + times[1]]);
+/// Time of a pass. Arms may have different numbers of them.
+fn per_pass(parts: &[JackknifeBlock]) -> f64 {
+    let cost: f64 = parts.iter().map(|part| part.cost).sum();
+    cost / parts.iter().map(|part| part.moments.n).sum::<u64>() as f64
+}
+
+/// The logarithm of a second time over a first, where both were measured.
+fn ratio_log(first: f64, second: f64) -> Option<f64> {
     (first > 0.0 && second > 0.0).then(|| ln(second / first))
 }
 

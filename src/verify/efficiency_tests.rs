@@ -273,6 +273,11 @@ fn arms_of_different_lengths_have_the_same_parts() {
     let passes: u64 = b.iter().map(|block| block.moments.n).sum();
     assert_eq!(passes, 200 - 8);
     assert!(parts(&arm(1, 1), &arm(1, 1)).0.is_empty());
+    // A second of CPU time for each pass of both: controls are compared by the pass.
+    let even = |count: usize, n: u64| CostedBatches { costs: vec![n as f64; count], ..arm(count, n) };
+    let (a, b) = parts(&even(64, 4), &even(100, 2));
+    assert_eq!(ratio_log(per_pass(&a), per_pass(&b)), Some(0.0));
+    assert_eq!(ratio_log(per_pass(&[]), 1.0), None);
 }
 
 #[test]
