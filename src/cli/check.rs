@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::{Reading, counted};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, LoadOptions, Registry, load};
-use crate::run::build_all;
+use crate::run::plan;
 
 /// Validate experiment files and report all errors.
 ///
@@ -33,9 +33,11 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
             load(path, &LoadOptions { setting: Some(setting.clone()), ..options.clone() }, registry)
         };
         let checked = load(path, &options, registry).and_then(|experiment| {
-            build_all(&experiment, registry)?;
+            plan(&experiment, registry)?;
             let others: &[String] = if options.setting.is_some() { &[] } else { &experiment.settings };
-            others.iter().try_for_each(|setting| build_all(&load_setting(setting)?, registry))?;
+            for setting in others {
+                plan(&load_setting(setting)?, registry)?;
+            }
             Ok(experiment)
         });
         match checked {

@@ -13,7 +13,7 @@ use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::{atomic, provenance};
 use crate::run::interrupt::Interrupt;
-use crate::run::{Options, Remeasured, build_all};
+use crate::run::{Options, Remeasured, plan};
 use crate::verify::judge::{Case, Judgement, Looks, Measured, judge};
 use crate::verify::junit;
 use crate::verify::levels::{FAMILY_LEVEL, FIRST_LOOK, RETEST_FACTOR};
@@ -220,7 +220,7 @@ impl Court<'_> {
     fn checked(&self, file: &Path) -> Result<Experiment> {
         let experiment = load(file, &self.reading, self.registry)?;
         if !crate::run::has_record(&experiment, &self.working.out) {
-            build_all(&experiment, self.registry)?;
+            plan(&experiment, self.registry)?;
         }
         Ok(experiment)
     }

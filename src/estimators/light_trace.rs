@@ -329,7 +329,7 @@ impl<'a> Photon<'a> {
         loop {
             let t = sample_exponential(self.medium.sigma_t, self.stream.draw());
             self.scores.count(Cost::Rays);
-            match self.scene.shape.intersect(&self.ray, Side::Inside, self.from, t) {
+            match self.scene.shape.end_of_flight(&self.ray, self.from, t) {
                 Some(hit) => {
                     self.measure.fly(&self.ray, hit.t);
                     return Some(hit);

@@ -20,6 +20,7 @@ mod kind;
 pub mod light_trace;
 pub mod path;
 pub mod point_cloud;
+mod roulette;
 mod scores;
 mod serves;
 pub mod snee;
@@ -28,9 +29,9 @@ mod walk;
 pub use estimator::{BandUse, Bias, Estimator, HeavyTail};
 pub use history::{History, TransportClass};
 pub use kind::{BuildEstimator, EstimatorKind, read_options};
+pub use roulette::Roulette;
 pub use scores::{Anomaly, Cost, Layout, ObservableName, Scores};
 pub use serves::{Bodies, BoundaryKind, Sensors, Serves};
-pub use walk::Roulette;
 
 /// Every estimator of this crate, in the order in which they are listed.
 pub const KINDS: &[EstimatorKind] = &[

@@ -31,7 +31,7 @@ use crate::optics::boundary::Boundary;
 use crate::sampling::stream::PassKey;
 use crate::scene::Scene;
 
-pub use super::walk::Roulette;
+pub use super::Roulette;
 
 /// Options of `path` and `bidirectional`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]

@@ -1,7 +1,7 @@
 //! Identities, closed forms and published numbers for the path tracer.
 
 use super::super::Layout;
-use super::super::walk::roulette;
+use super::super::roulette::roulette;
 use super::*;
 use crate::geometry::{Ray, Shape, procedural};
 use crate::math::{DVec3, Frame};

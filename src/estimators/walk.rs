@@ -18,12 +18,10 @@
 
 use std::sync::Arc;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use super::bands::{ScorePlace, WalkBands};
 use super::choice::{choose_light, light_shares};
 use super::crossing::{other, radiance_scale};
+use super::roulette::{Roulette, roulette};
 use super::{Anomaly, Cost, History, Scores, TransportClass};
 use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
@@ -33,23 +31,6 @@ use crate::sampling::distance::{sample_exponential, transmittance};
 use crate::sampling::stream::{PassKey, Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::sensor::PathMeasure;
-
-/// Russian roulette: when a path is ended by chance.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Roulette {
-    /// At every scattering event with probability 1 - albedo: the weight never changes.
-    Analog {},
-    /// Only where the path's weight has fallen below this: it survives with probability weight over
-    /// threshold and continues with the threshold as weight.
-    Below(#[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))] f64),
-}
-
-impl Default for Roulette {
-    fn default() -> Self {
-        Roulette::Below(0.25)
-    }
-}
 
 /// Data that all walks of an estimator share.
 #[derive(Debug)]
@@ -351,7 +332,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     fn end_of_flight(&mut self, t: f64) -> Option<Hit> {
         let shape = &self.scene.shape;
         if !self.emits {
-            return shape.intersect(&self.ray, Side::Inside, self.from, t);
+            return shape.end_of_flight(&self.ray, self.from, t);
         }
         let hit = shape.intersect(&self.ray, Side::Inside, self.from, f64::INFINITY);
         if hit.is_none() && self.bounds.is_some() {
@@ -417,9 +398,11 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             Roulette::Below(threshold) => {
                 self.throughput *= factor;
                 self.survival *= factor;
-                let probability = roulette(self.survival, threshold, || self.stream.draw())?;
-                self.throughput /= probability;
-                self.survival /= probability;
+                if self.survival < threshold {
+                    let probability = roulette(self.survival, threshold, || self.stream.draw())?;
+                    self.throughput /= probability;
+                    self.survival /= probability;
+                }
                 Some(())
             }
         }
@@ -680,19 +663,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
 
     #[inline]
     fn matched(&self) -> bool {
-        self.boundary == Boundary::Matched
+        matches!(self.boundary, Boundary::Matched)
     }
-}
-
-/// Russian roulette on a weight: above the threshold it is unchanged, below it survives with
-/// probability weight / threshold. Returns the probability to divide by.
-#[inline]
-pub(super) fn roulette(weight: f64, threshold: f64, u: impl FnOnce() -> f64) -> Option<f64> {
-    if weight >= threshold {
-        return Some(1.0);
-    }
-    let probability = weight / threshold;
-    (u() < probability).then_some(probability)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::document::{self, Node, Value};
 use super::picture::PictureEntry;
 use super::registry::Registry;
 use super::rules::{self, At, CELL_KEYS, CellPoint, ExperimentParts, Findings, Known};
-use super::schema::{BandsEntry, ClaimEntry, ExperimentFile};
+use super::schema::{BandsEntry, BudgetShare, ClaimEntry, ExperimentFile};
 use super::schema_json::json_schema;
 use super::sweep::{self, AxisPoint, SweepAxis};
 use super::validate::SchemaWalk;
@@ -147,6 +147,10 @@ impl Loader<'_> {
             if let Some(claim) = typed::<ClaimEntry>(entry) {
                 rules::claim(claims.item(i), &claim, &known);
             }
+        }
+        let (shares, budget) = (at.to("budget_share"), at.typed("budget"));
+        for (i, share) in at.typed::<Vec<BudgetShare>>("budget_share").iter().flatten().enumerate() {
+            rules::budget_share(shares.item(i), share, budget.as_ref(), &known);
         }
         let pictures = at.to("picture");
         let entries = self.root.get("picture").map(Node::items).unwrap_or_default();

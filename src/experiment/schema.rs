@@ -68,6 +68,9 @@ pub struct ExperimentFile {
     /// Number of passes, or CPU time, of every measurement.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<Budget>,
+    /// Runs that take less than the whole budget; all others take all of it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub budget_share: Vec<BudgetShare>,
     /// Draws per sampler.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1000, max = 10000000000u64))]
@@ -586,6 +589,22 @@ pub enum Budget {
     CpuSeconds(#[schemars(extend("exclusiveMinimum" = 0))] f64),
     /// Relative standard error of the observables that claims name; a pilot turns it into passes.
     RelativeError(RelativeError),
+}
+
+/// Runs that take a share of the budget: where one estimator, or one cell, needs fewer passes than
+/// another for the same error. The shares of several entries that match a run multiply.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BudgetShare {
+    /// Only cells with these labels: axis -> label.
+    #[serde(default, rename = "where", skip_serializing_if = "BTreeMap::is_empty")]
+    pub only: BTreeMap<String, String>,
+    /// Only these estimators, and their controls; all by default.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub estimators: Vec<String>,
+    /// Part of the passes, or of the CPU seconds.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
+    pub share: f64,
 }
 
 /// A relative standard error.

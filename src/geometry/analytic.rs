@@ -287,6 +287,39 @@ mod tests {
         assert_eq!((hit.face, hit.t), (FaceId(3), f64::MIN_POSITIVE));
     }
 
+    /// A flight inside ends at the boundary exactly where the closest crossing says so, to the last digit
+    /// of its length.
+    #[test]
+    fn the_end_of_a_flight_shows_what_it_meets() {
+        let mut u = Uniform::named("the_end_of_a_flight_shows_what_it_meets");
+        for shape in shapes() {
+            let mut ray = Ray { origin: DVec3::new(0.01, 0.02, -0.1), dir: DVec3::Z };
+            let mut from = None;
+            for _ in 0..RAYS / 10 {
+                let free = shape.intersect(&ray, Side::Inside, from, f64::INFINITY);
+                let reach = free.map_or(1.0, |hit| hit.t);
+                for exponent in 0..=52 {
+                    let off = reach * 0.5f64.powi(exponent);
+                    for t in [reach - off, reach, reach + off] {
+                        let met = shape.intersect(&ray, Side::Inside, from, t);
+                        assert_eq!(shape.end_of_flight(&ray, from, t), met, "{shape:?} {ray:?} {t}");
+                    }
+                }
+                // On from a point of the flight, close to its end as often as not, or from the surface.
+                let depth = 0.1f64.powf(15.0 * u.next());
+                (ray, from) = match free {
+                    Some(hit) if u.next() < 0.5 => {
+                        (Ray { origin: hit.point, dir: inward(hit.normal, &mut u) }, Some(hit.face))
+                    }
+                    Some(hit) => {
+                        (Ray { origin: ray.at(hit.t * (1.0 - depth)), dir: direction(&mut u) }, None)
+                    }
+                    None => (Ray { origin: DVec3::new(0.0, 0.0, -depth), dir: direction(&mut u) }, None),
+                };
+            }
+        }
+    }
+
     #[test]
     fn bounded_rays_see_only_what_they_reach() {
         let ray = Ray { origin: DVec3::new(0.0, 0.0, -0.25), dir: DVec3::Z };

@@ -13,12 +13,16 @@ pub fn sin_cos_turns(u: f64) -> (f64, f64) {
     let r2 = r * r;
     let sin = r * horner(r2, &SIN);
     let cos = horner(r2, &COS);
-    match (k as i64) & 3 {
-        0 => (sin, cos),
-        1 => (cos, -sin),
-        2 => (-sin, -cos),
-        _ => (-cos, sin),
-    }
+    // The quadrant is random, so that a branch on it would be mispredicted: an odd one exchanges the
+    // two, and each changes its sign where its bit says so.
+    let quadrant = k as i64 as u64;
+    let exchanged = (sin.to_bits() ^ cos.to_bits()) & (quadrant & 1).wrapping_neg();
+    let sin_sign = (quadrant & 2) << 62;
+    let cos_sign = (quadrant.wrapping_add(1) & 2) << 62;
+    (
+        f64::from_bits(sin.to_bits() ^ exchanged ^ sin_sign),
+        f64::from_bits(cos.to_bits() ^ exchanged ^ cos_sign),
+    )
 }
 
 #[inline]

@@ -43,6 +43,9 @@ impl HenyeyGreenstein {
     #[inline]
     pub fn sample_poles(&self, u: f64) -> (f64, f64) {
         let g = self.g;
+        if g == 0.0 {
+            return (2.0 * (1.0 - u), 2.0 * u); // the same bits, without three divisions by 1
+        }
         let d = if g >= 0.0 { (1.0 - g) + 2.0 * g * u } else { (1.0 + g) - 2.0 * g * (1.0 - u) };
         let q = (1.0 - g) * (1.0 + g) / d;
         ((1.0 - g) * (1.0 - u) * (q + (1.0 - g)) / d, (1.0 + g) * u * (q + (1.0 + g)) / d)

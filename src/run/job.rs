@@ -77,8 +77,17 @@ pub(crate) struct Passes {
     pub layout: Layout,
     /// Bands that one call runs together, with their streams.
     pub groups: Vec<Group>,
+    /// What the budget means for this run.
+    pub terms: BudgetTerms,
+}
+
+/// What a budget means for one run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct BudgetTerms {
     /// Observables whose relative error a budget may bound.
     pub targets: Vec<usize>,
+    /// Part of the budget's passes or seconds.
+    pub share: f64,
 }
 
 /// Bands that one call runs together.

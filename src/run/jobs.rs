@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::chi_square::Draws;
 use super::comparisons;
-use super::job::{Arm, Group, Job, Passes, Task, band_groups};
+use super::job::{Arm, BudgetTerms, Group, Job, Passes, Task, band_groups};
 use super::keys::{KEY_VERSION, Stage, StreamName};
 use super::memory::MemoryEstimate;
 use crate::error::{Error, Result};
@@ -84,8 +84,10 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
                 continue;
             }
             let targets = targets(index, &words.name, &comparisons, &observables[index]);
+            let share = share(experiment, cell.spec, &words.name);
+            let terms = BudgetTerms { targets, share };
             for arm in arms.of(cell.spec, &words.name) {
-                jobs.push(planner.passes(index, cell, entry, arm, targets.clone())?);
+                jobs.push(planner.passes(index, cell, entry, arm, terms.clone())?);
             }
         }
     }
@@ -156,7 +158,7 @@ impl Planner<'_> {
         cell: &BuiltCell,
         entry: usize,
         arm: Arm,
-        targets: Vec<usize>,
+        terms: BudgetTerms,
     ) -> Result<Job> {
         let words = &self.experiment.file.estimator[entry];
         let no_kind = || Error::input(format!("estimator `{}` has no kind", words.name));
@@ -186,7 +188,7 @@ impl Planner<'_> {
         });
         let (stage, layout) = (self.stage, cell.layout.clone());
         let passes =
-            Passes { cell: index, entry, arm, stage, count: None, estimator, layout, groups, targets };
+            Passes { cell: index, entry, arm, stage, count: None, estimator, layout, groups, terms };
         Ok(Job { label, identity: hash_json(&identity), task: Task::Estimate(Box::new(passes)) })
     }
 
@@ -252,15 +254,6 @@ fn build_sampler<'a>(
     Ok((kind, (registered.build)(options)?))
 }
 
-/// Builds every scene, estimator and sampler and expands every claim, for `check`: meshes, maps, the
-/// sensor's place, options and claims on what nobody measures show only then.
-///
-/// # Errors
-/// What cannot be built.
-pub(crate) fn build_all(experiment: &Experiment, registry: &Registry) -> Result<()> {
-    plan(experiment, registry).map(|_| ())
-}
-
 /// Claims of efficiency by CPU time: their baselines run twice, on streams of their own, because the same
 /// estimator against itself shows whether clock and jackknife can be trusted.
 struct Duels(Vec<Faster>);
@@ -307,6 +300,14 @@ fn claimed<'a>(
     });
     let here = quantities.flatten().filter(|quantity| quantity.cell == cell);
     experiment.file.only_claimed.then(|| here.map(|quantity| quantity.estimator.as_str()).collect())
+}
+
+/// The part of the budget that an estimator takes in a cell.
+fn share(experiment: &Experiment, cell: &CellSpec, estimator: &str) -> f64 {
+    let shares = experiment.file.budget_share.iter();
+    let of_estimator = |names: &[String]| names.is_empty() || names.iter().any(|name| name == estimator);
+    let mine = shares.filter(|row| comparisons::is_in(cell, &row.only) && of_estimator(&row.estimators));
+    mine.map(|row| row.share).product()
 }
 
 /// The observables that claims name of an estimator in a cell; the sensor's first where none does.

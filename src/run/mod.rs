@@ -38,7 +38,7 @@ use live::{Live, Show};
 use progress::Progress;
 use workers::Completed;
 
-pub(crate) use jobs::{Plan, build_all, plan};
+pub(crate) use jobs::{Plan, plan};
 pub(crate) use pilot::estimate_seconds;
 pub(crate) use retest::{Remeasured, retest};
 

@@ -19,8 +19,9 @@ pub(crate) fn passes(job: &Passes, budget: &Budget, stop: &dyn Fn() -> bool) -> 
         return job.count;
     }
     match budget {
-        Budget::Passes(passes) => Some(*passes),
-        Budget::CpuSeconds(seconds) => for_seconds(job, *seconds, stop),
+        // A share of 1 leaves any number of passes as it is.
+        Budget::Passes(passes) => Some(((*passes as f64 * job.terms.share).round() as u64).max(2)),
+        Budget::CpuSeconds(seconds) => for_seconds(job, seconds * job.terms.share, stop),
         Budget::RelativeError(target) => for_error(job, target, stop),
     }
 }
@@ -73,7 +74,7 @@ fn for_error(job: &Passes, target: &RelativeError, stop: &dyn Fn() -> bool) -> O
         }
         let moments = pilot.clone().finish().unwrap_or_default();
         let bands = job.layout.bands();
-        let wanted = job.targets.iter().flat_map(|t| &moments[t * bands..(t + 1) * bands]);
+        let wanted = job.terms.targets.iter().flat_map(|t| &moments[t * bands..(t + 1) * bands]);
         let needed = wanted.map(|m| needed_passes(m, target)).max().unwrap_or(0);
         if needed <= PILOT_SHARE * length || length >= LONGEST_PILOT {
             return Some(needed.clamp(LEAST_PASSES, PILOT_SHARE * LONGEST_PILOT));

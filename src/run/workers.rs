@@ -404,7 +404,7 @@ impl Pool<'_> {
         let identity = &self.jobs[index].identity;
         let path = checkpoint::path(self.settings.root, identity);
         let earlier = checkpoint::start(&path, identity);
-        let budget = hash_json(&(self.settings.budget, &passes.targets));
+        let budget = hash_json(&(self.settings.budget, &passes.terms));
         // A pilot that times itself would find another number each time.
         let count = match (passes.count, &earlier) {
             (Some(count), _) => count,

@@ -216,7 +216,7 @@ fn pairs(
 }
 
 /// The estimators are there, each named once.
-fn names(at: At, estimators: &[String], known: &Known) {
+pub(super) fn names(at: At, estimators: &[String], known: &Known) {
     for (i, name) in estimators.iter().enumerate() {
         estimator(at.item(i), name, known);
         if estimators[..i].contains(name) {
@@ -252,7 +252,8 @@ pub(super) fn axis<'a>(at: At, name: &str, axes: &'a [SweepAxis]) -> Option<&'a 
     axis
 }
 
-fn filter(at: At, only: &BTreeMap<String, String>, axes: &[SweepAxis]) {
+/// The axes and labels of a `where` are there.
+pub(super) fn filter(at: At, only: &BTreeMap<String, String>, axes: &[SweepAxis]) {
     for (name, label) in only {
         let at = at.to("where").to(name);
         let Some(axis) = axis(at.key(), name, axes) else { continue };

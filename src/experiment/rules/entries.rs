@@ -1,7 +1,9 @@
 //! Rules of lists of named entries and of `pair`.
 
 use super::At;
+use super::claims::{Known, filter, names as estimators};
 use crate::experiment::document::Node;
+use crate::experiment::schema::{Budget, BudgetShare};
 use crate::experiment::suggest;
 use crate::experiment::validate::grammar::Grammar;
 
@@ -44,7 +46,7 @@ pub(crate) const SCENE_KEYS: [&str; 6] = ["bands", "object", "sensor", "light", 
 pub(crate) const SAMPLER_KEYS: [&str; 2] = ["samples", "sampler"];
 
 /// Keys that describe more of a scene.
-const MORE_OF_SCENES: [&str; 4] = ["sweep", "pair", "picture", "only_claimed"];
+const MORE_OF_SCENES: [&str; 5] = ["sweep", "pair", "picture", "only_claimed", "budget_share"];
 
 /// What an experiment is made of.
 #[derive(Clone, Copy, Debug)]
@@ -82,6 +84,20 @@ pub(crate) fn parts(at: At, root: &Node) -> ExperimentParts {
         }
     }
     parts
+}
+
+/// A share of the budget names estimators and labels that are there, and the budget can be shared out.
+pub(crate) fn budget_share(at: At, entry: &BudgetShare, budget: Option<&Budget>, known: &Known) {
+    estimators(at.to("estimators"), &entry.estimators, known);
+    if let Some(axes) = known.axes {
+        filter(at, &entry.only, axes);
+    }
+    if matches!(budget, Some(Budget::RelativeError(_))) {
+        at.report_help(
+            "an error cannot be shared out: `relative_error` already gives every run its own number of passes",
+            "leave it out, or take a budget in passes or seconds",
+        );
+    }
 }
 
 /// The first words of keys that cells may differ in.

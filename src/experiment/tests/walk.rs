@@ -103,6 +103,21 @@ fn unknown_kinds_are_named_with_what_was_meant() {
 }
 
 #[test]
+fn shares_of_the_budget_name_what_is_there() {
+    let share = |text: &str| refused_with(&format!("[[budget_share]]\n{text}\n"));
+    let message = share("share = 0.5\nestimators = [\"pth\"]");
+    assert!(message.contains("unknown estimator `pth`"), "{message}");
+    let message = share("share = 0.5\nwhere = { light = \"sky\" }");
+    assert!(message.contains("unknown axis `light`"), "{message}");
+    assert!(share("share = 0").contains("must be greater than 0, is 0"));
+    assert!(share("share = 2").contains("must be at most 1, is 2"));
+    let error = "budget.relative_error = { at_most = 0.1 }";
+    let message =
+        errors(&format!("{}[[budget_share]]\nshare = 0.5\n", GOOD.replace("budget.passes = 16", error)));
+    assert!(message.contains("an error cannot be shared out"), "{message}");
+}
+
+#[test]
 fn numbers_are_finite_and_in_range() {
     for text in ["nan", "inf", "-inf"] {
         let message = refused("radius_mm = 1.0", &format!("radius_mm = {text}"));
