@@ -271,6 +271,8 @@ mod tests {
                 let found = rays.iter().find(|ray| (ray.entry - side * a).abs() < 1e-9);
                 let found = found.unwrap_or_else(|| panic!("{eta} {reflections} {a}: {rays:?}"));
                 assert!((found.distance - length).abs() < 1e-9);
+                let whole = length + f64::from(reflections) * 2.0 * cos(asin(sin(a) / eta));
+                assert!((found.length - whole).abs() < 1e-9);
                 let turn = atan2(-dir[0] * side, -dir[1]);
                 assert!((sin(found.turn - turn)).abs() < 1e-9 && cos(found.turn - turn) > 0.0);
                 // Across the ray at x, a neighbour passes at d(offset): flux sin a cos a da dphi = M rho |d|.

@@ -33,7 +33,10 @@ fn cos_sum(a: f64, b: f64) -> f64 {
 }
 
 impl Bounds {
-    pub(super) fn new(points: impl Iterator<Item = DVec3> + Clone, normals: impl Iterator<Item = DVec3> + Clone) -> Bounds {
+    pub(super) fn new(
+        points: impl Iterator<Item = DVec3> + Clone,
+        normals: impl Iterator<Item = DVec3> + Clone,
+    ) -> Bounds {
         let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (min, max) = points.clone().fold(empty, |(min, max), p| (min.min(p), max.max(p)));
         let center = 0.5 * (min + max);

@@ -41,7 +41,8 @@ impl ConeTree {
     }
 
     fn bounds<'a>(facets: impl Iterator<Item = &'a Facet> + Clone) -> Bounds {
-        let corners = facets.clone().flat_map(|f| [f.corner, f.corner + f.edges[0], f.corner + f.edges[1]]);
+        let corners =
+            facets.clone().flat_map(|f| [f.corner, f.corner + f.edges[0], f.corner + f.edges[1]]);
         let normals = facets.flat_map(|f| match f.shading {
             Some((n, m)) => [n, n + m[0], n + m[1]],
             None => [f.normal; 3],
@@ -57,10 +58,12 @@ impl ConeTree {
         if facets.len() <= LEAF {
             return;
         }
-        let key = |b: &Bounds, axis: usize| if axis < 3 { b.center[axis] / size } else { b.axis[axis - 3] };
+        let key =
+            |b: &Bounds, axis: usize| if axis < 3 { b.center[axis] / size } else { b.axis[axis - 3] };
         let spread = |axis: usize| {
             let keys = facets.iter().map(|(b, _)| key(b, axis));
-            let (low, high) = keys.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), k| (l.min(k), h.max(k)));
+            let (low, high) =
+                keys.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), k| (l.min(k), h.max(k)));
             high - low
         };
         let spreads: [f64; 6] = std::array::from_fn(spread);
@@ -98,6 +101,11 @@ impl ConeTree {
             }
         }
         looked
+    }
+
+    /// Memory behind it, bytes.
+    pub(super) fn heap_bytes(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.facets)
     }
 
     /// All facets, in its order.

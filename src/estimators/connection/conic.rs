@@ -39,7 +39,13 @@ impl Conic {
     }
 
     /// Offers every root to `found`, hidden ones included.
-    pub(super) fn roots(&self, shape: &Shape, query: &Query, work: &mut Work, found: &mut impl FnMut(Root)) {
+    pub(super) fn roots(
+        &self,
+        shape: &Shape,
+        query: &Query,
+        work: &mut Work,
+        found: &mut impl FnMut(Root),
+    ) {
         if query.eta == 1.0 {
             straight_line::crossings(shape, query, work, found);
             return;

@@ -38,7 +38,8 @@ fn no_root_differs_from_exhaustive_subdivision() {
                 };
                 let differs = |found: &[Root]| {
                     let is_in = |root: &Root, others: &[Root]| {
-                        let same = |o: &&Root| o.face == root.face && o.point.distance(root.point) < 1e-8;
+                        let same =
+                            |o: &&Root| o.face == root.face && o.point.distance(root.point) < 1e-8;
                         others.iter().filter(same).count() == 1
                     };
                     found.len() != roots.len()
@@ -54,7 +55,9 @@ fn no_root_differs_from_exhaustive_subdivision() {
             let per = |n: u64| n as f64 / f64::from(done);
             println!(
                 "{name}, eta {eta}: {:.3} roots (at most {most}), {:.1} nodes, {:.2} facets solved per connection",
-                per(count as u64), per(work.nodes), per(work.solves)
+                per(count as u64),
+                per(work.nodes),
+                per(work.solves)
             );
         }
     }
@@ -73,13 +76,20 @@ fn light_that_enters_is_found() {
         for eta in [1.05, 1.5, 2.2, 0.8] {
             for _ in 0..4000 {
                 let w_l = direction(&mut stream);
-                let Some((hit, dir, length)) = entering(shape, w_l, eta, stream.draw2()) else { continue };
+                let Some((hit, dir, length)) = entering(shape, w_l, eta, stream.draw2()) else {
+                    continue;
+                };
                 let distance = length * stream.draw();
                 let query = Query { x: hit.point - dir * distance, w_l, eta };
                 let roots = all(&conic, shape, &query, &mut Work::default());
                 tried += 1;
-                let miss = roots.iter().map(|r| r.point.distance(hit.point)).fold(f64::INFINITY, f64::min);
-                assert!(miss < 1e-7, "{name} {eta} {query:?} {hit:?}: nearest of {} at {miss:e}", roots.len());
+                let miss =
+                    roots.iter().map(|r| r.point.distance(hit.point)).fold(f64::INFINITY, f64::min);
+                assert!(
+                    miss < 1e-7,
+                    "{name} {eta} {query:?} {hit:?}: nearest of {} at {miss:e}",
+                    roots.len()
+                );
                 worst = worst.max(miss);
                 for root in roots {
                     assert!(root.ratio > 0.0 && !root.ratio.is_nan() && root.distance > 0.0);
@@ -118,7 +128,10 @@ fn the_sphere_has_the_roots_of_its_scalar_equation() {
             for ((d, m), (d0, m0)) in got.iter().zip(&expected) {
                 // A root moves by a rounding times the focusing, and the focusing by its square.
                 let bound = 1e-12 * (1.0 + m0 * m0);
-                assert!((d - d0).abs() < bound && (m / m0 - 1.0).abs() < 10.0 * bound, "{eta} {query:?} {got:?} {expected:?}");
+                assert!(
+                    (d - d0).abs() < bound && (m / m0 - 1.0).abs() < 10.0 * bound,
+                    "{eta} {query:?} {got:?} {expected:?}"
+                );
             }
         }
     }
@@ -141,7 +154,9 @@ fn planes_have_their_closed_form() {
     }
     // From below the half-space is dark, the slab is not.
     let query = Query { x, w_l: -w_l, eta: 1.4 };
-    assert!(all(&Conic::new(&Shape::HalfSpace), &Shape::HalfSpace, &query, &mut Work::default()).is_empty());
+    assert!(
+        all(&Conic::new(&Shape::HalfSpace), &Shape::HalfSpace, &query, &mut Work::default()).is_empty()
+    );
     let slab = Shape::Slab { thickness: 1.0 };
     assert_eq!(all(&Conic::new(&slab), &slab, &query, &mut Work::default()).len(), 1);
     // At grazing light, below the critical angle, every face that is lit and whose refracted direction leads

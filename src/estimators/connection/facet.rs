@@ -141,10 +141,10 @@ impl<F: FnMut(Root)> Places<'_, F> {
         }
         let is_wide = least < 0.25 * normals[0].length_squared();
         if is_wide && cuts > 0 {
-            let map = |[u, v]: [f64; 2]| {
-                [0, 1].map(|i| at[i] + sides[0][i] * u + sides[1][i] * v)
-            };
-            for (corner, size) in [([0.0, 0.0], 0.5), ([0.5, 0.0], 0.5), ([0.0, 0.5], 0.5), ([0.5, 0.5], -0.5)] {
+            let map = |[u, v]: [f64; 2]| [0, 1].map(|i| at[i] + sides[0][i] * u + sides[1][i] * v);
+            for (corner, size) in
+                [([0.0, 0.0], 0.5), ([0.5, 0.0], 0.5), ([0.0, 0.5], 0.5), ([0.5, 0.5], -0.5)]
+            {
                 let steps = [[size, 0.0], [0.0, size]];
                 let finer = sides.map(|side| side.map(|s| s * size));
                 self.search(&part.part(corner, steps), map(corner), finer, cuts - 1);
@@ -177,8 +177,8 @@ impl<F: FnMut(Root)> Places<'_, F> {
     fn solve(&mut self, part: &Linear, at: [f64; 2], sides: [[f64; 2]; 2], k: [f64; 2]) {
         let Query { w_l, eta, .. } = *self.query;
         // Linear in k: values at the ends, which are the Bernstein coefficients.
-        let [a, b, c] =
-            [(part.e[0], part.m[0]), (part.e[1], part.m[1]), (part.p, part.n)].map(|(e, m)| k.map(|k| e - m * k));
+        let [a, b, c] = [(part.e[0], part.m[0]), (part.e[1], part.m[1]), (part.p, part.n)]
+            .map(|(e, m)| k.map(|k| e - m * k));
         let cross = |p: [DVec3; 2], q: [DVec3; 2]| {
             [p[0].cross(q[0]), (p[0].cross(q[1]) + p[1].cross(q[0])) * 0.5, p[1].cross(q[1])]
         };

@@ -88,7 +88,12 @@ pub(super) fn mnee(shape: &Shape, query: &Query, work: &mut Work) -> Option<Root
 }
 
 /// A root that specular manifold sampling finds, and its weight.
-pub(super) fn sms(shape: &Shape, query: &Query, stream: &mut Stream, work: &mut Work) -> Option<(Root, f64)> {
+pub(super) fn sms(
+    shape: &Shape,
+    query: &Query,
+    stream: &mut Stream,
+    work: &mut Work,
+) -> Option<(Root, f64)> {
     let frame = Frame::about(query.w_l);
     // Without refraction the cone is one direction.
     let height = 1.0 - query.eta.min(1.0 / query.eta);

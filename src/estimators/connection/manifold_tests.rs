@@ -41,11 +41,17 @@ fn newton_and_mnee_find_roots_only() {
             conic.roots(&shape, &query, &mut Work::default(), &mut |root| roots.push(root));
             let seen = visible(&conic, &shape, &query);
             newton::roots(&conic, &shape, &query, &mut work, &mut |root| {
-                assert!(roots.iter().any(|other| is_same(other, root.point)), "{name}: {root:?} {roots:?}");
+                assert!(
+                    roots.iter().any(|other| is_same(other, root.point)),
+                    "{name}: {root:?} {roots:?}"
+                );
                 by_newton += 1;
             });
             if let Some(root) = mnee(&shape, &query, &mut walks) {
-                assert!(seen.iter().any(|other| is_same(other, root.point)), "{name}: {root:?} {seen:?}");
+                assert!(
+                    seen.iter().any(|other| is_same(other, root.point)),
+                    "{name}: {root:?} {seen:?}"
+                );
                 by_mnee += 1;
             }
             several += u32::from(seen.len() > 1);
@@ -93,7 +99,10 @@ fn weighted_trials_sum_over_all_roots() {
             let mean = sum / f64::from(count);
             let error = ((squares / f64::from(count) - mean * mean) / f64::from(count)).sqrt();
             worst = worst.max((mean - expected).abs() / error);
-            assert!((mean - expected).abs() < 5.0 * error, "{name} {query:?}: {mean} +- {error}, {expected}");
+            assert!(
+                (mean - expected).abs() < 5.0 * error,
+                "{name} {query:?}: {mean} +- {error}, {expected}"
+            );
         }
         println!(
             "{name}: worst {worst:.1} standard errors, {:.1} walks and {:.1} steps a connection",
@@ -126,7 +135,10 @@ fn without_refraction_all_methods_are_the_straight_line() {
             for root in [by_mnee, by_sms].into_iter().flatten().chain(by_newton) {
                 compared += 1;
                 assert!(root.point.distance(straight.point) < 1e-9, "{name}");
-                assert!((root.transmittance - 1.0).abs() < 1e-12 && (root.distance - straight.distance).abs() < 1e-9);
+                assert!(
+                    (root.transmittance - 1.0).abs() < 1e-12
+                        && (root.distance - straight.distance).abs() < 1e-9
+                );
             }
         }
         assert!(compared > 300, "{name} {compared}");

@@ -248,7 +248,9 @@ mod tests {
     fn special_cases() {
         let ends = solve(&with_roots(&[0.0, 1.0, 2.0, 3.0, -1.0, -2.0]));
         assert!(ends.len() <= 2);
-        assert!(ends.first().is_some_and(|t| *t < 1e-12) && ends.last().is_some_and(|t| *t > 1.0 - 1e-12));
+        assert!(
+            ends.first().is_some_and(|t| *t < 1e-12) && ends.last().is_some_and(|t| *t > 1.0 - 1e-12)
+        );
         let double = solve(&with_roots(&[0.5, 0.5, 2.0, 3.0, -1.0, -2.0]));
         assert!(double.iter().all(|t| (t - 0.5).abs() < 1e-6), "{double:?}");
         assert_eq!(roots::<0>(&[0.0; 7], 0.0, &[], &mut |_| {}), Err(Degenerate));
@@ -277,7 +279,8 @@ mod tests {
         for i in 0..=10 {
             let t = f64::from(i) / 10.0;
             let s = 1.0 - t;
-            let expected = 2.0 * (s * s * p[0] + 2.0 * s * t * p[1] + t * t * p[2]) * (s * q[0] + t * q[1]);
+            let expected =
+                2.0 * (s * s * p[0] + 2.0 * s * t * p[1] + t * t * p[2]) * (s * q[0] + t * q[1]);
             assert!((value(&product, t) - expected).abs() < 1e-15);
             let [left, right] = halves(&product);
             assert!((value(&left, t) - value(&product, 0.5 * t)).abs() < 1e-15);

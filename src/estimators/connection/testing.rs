@@ -69,7 +69,8 @@ pub(super) fn exhaustive(query: &Query, facet: &Facet, depth: u32, found: &mut V
         if !may_hold(query, facet, corners, middle) {
             continue;
         }
-        let reach = corners.map(|c| facet.at(c).distance(facet.at(middle))).into_iter().fold(0.0, f64::max);
+        let reach =
+            corners.map(|c| facet.at(c).distance(facet.at(middle))).into_iter().fold(0.0, f64::max);
         let is_near = reach > 0.25 * facet.at(middle).distance(query.x);
         if level < depth || is_near && level < 40 {
             let half = 0.5 * size;
@@ -99,7 +100,8 @@ fn may_hold(query: &Query, facet: &Facet, corners: [[f64; 2]; 3], middle: [f64; 
     let to = patch.point - query.x;
     let distance = to.length();
     let reach = corners.map(|c| facet.at(c).distance(patch.point)).into_iter().fold(0.0, f64::max);
-    let turn = corners.map(|c| facet.patch(c).shading.dot(patch.shading)).into_iter().fold(1.0, f64::min);
+    let turn =
+        corners.map(|c| facet.patch(c).shading.dot(patch.shading)).into_iter().fold(1.0, f64::min);
     if reach >= distance || turn <= 0.0 {
         return true;
     }

@@ -56,7 +56,9 @@ fn all_forms_agree() {
         for eta in [1.0, 1.1, 1.5, 2.2, 0.8] {
             for _ in 0..400 {
                 let w_l = direction(&mut stream);
-                let Some((hit, dir, length)) = entering(shape, w_l, eta, stream.draw2()) else { continue };
+                let Some((hit, dir, length)) = entering(shape, w_l, eta, stream.draw2()) else {
+                    continue;
+                };
                 let distance = length * (0.05 + 0.9 * stream.draw());
                 let x = hit.point - dir * distance;
                 let patch = patch_at(shape, hit.face, hit.point, hit.normal);
@@ -84,7 +86,9 @@ fn all_forms_agree() {
                             let t = (facet.corner - x).dot(facet.normal) / w.dot(facet.normal);
                             facet.patch(facet.place(x + w * t)).shading
                         }
-                        _ => shape.intersect(&Ray { origin: x, dir: w }, Side::Inside, None, 1e9)?.normal,
+                        _ => {
+                            shape.intersect(&Ray { origin: x, dir: w }, Side::Inside, None, 1e9)?.normal
+                        }
                     };
                     let ct = w.dot(n);
                     let cl2 = 1.0 - eta * eta * (1.0 - ct * ct);
@@ -97,7 +101,9 @@ fn all_forms_agree() {
             }
         }
         assert!(compared > 500, "{name}: {compared}");
-        println!("{name}: {compared} compared, differences {most:.1e}, Veach's factor off 1 by {most_veach:.1e}");
+        println!(
+            "{name}: {compared} compared, differences {most:.1e}, Veach's factor off 1 by {most_veach:.1e}"
+        );
         assert!(most < 1e-7, "{name}: {most}");
         assert_eq!(most_veach > 1e-6, name.contains("interpolated"), "{name}: {most_veach}");
     }
