@@ -86,8 +86,9 @@ impl Prism {
 }
 
 /// Radiance that a camera ray gathers inside by one scattering event, W/(mm^2 sr), of parallel light of irradiance
-/// 1. `phase` is the phase function of the cosine between propagation directions, `sigma_s` and `sigma_t` are in
-/// 1/mm. The sum over facets is exact: the error is rounding, 1e-13 of the sum for bodies of ordinary shape.
+/// one. `phase` is the phase function of the cosine between propagation directions; coefficients are in 1/mm.
+///
+/// The sum over facets is exact: the error is rounding, 1e-13 of the sum for bodies of ordinary shape.
 pub(crate) fn single_scattering(
     facets: &[[DVec3; 3]],
     light: DVec3,

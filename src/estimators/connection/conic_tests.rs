@@ -2,6 +2,7 @@
 
 use super::super::testing::{direction, entering, exhaustive, meshes, point_inside, stream};
 use super::*;
+use crate::geometry::procedural;
 use crate::reference::refracting_plane::PlaneBeam;
 use crate::reference::refracting_sphere::LitSphere;
 
@@ -176,7 +177,7 @@ fn without_refraction_the_light_comes_straight() {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
             let query = Query { x, w_l: direction(&mut stream), eta: 1.0 };
             let roots = all(&conic, &shape, &query, &mut Work::default());
-            let Some(straight) = straight_line::root(&shape, &query) else {
+            let Some(straight) = straight_line::root(&shape, &query, &mut Work::default()) else {
                 assert!(roots.is_empty()); // the shading normal faces away
                 continue;
             };
@@ -200,7 +201,8 @@ fn the_limit_without_refraction_is_continuous() {
             done += 1;
             let query = Query { x, w_l: direction(&mut stream), eta };
             let roots = all(&conic, &shape, &query, &mut Work::default());
-            let straight = straight_line::root(&shape, &query).expect("a ray leaves");
+            let straight =
+                straight_line::root(&shape, &query, &mut Work::default()).expect("a ray leaves");
             let near = roots.iter().any(|r| r.point.distance(straight.point) < 1e-6);
             single += u32::from(near && roots.len() == 1);
         }
@@ -260,4 +262,55 @@ fn special_points_of_the_sphere() {
     }
     let on = find(DVec3::new(0.0, 1.2, 1.6), 1.5);
     assert!(on.iter().all(|r| !r.ratio.is_nan() && !r.distance.is_nan()), "{on:?}");
+}
+
+/// Razor-thin triangles, normals that turn by more than a right angle within a triangle, and a body far from the
+/// origin: light that enters is found, and nothing is NaN.
+#[test]
+fn hard_meshes() {
+    let mut stream = stream("hard_meshes");
+    let far = procedural::icosphere(1.0, 2, true).expect("closed");
+    let moved = far.vertices().iter().map(|v| *v * 0.01 + DVec3::new(100.0, -30.0, 7.0));
+    let far = crate::geometry::Mesh::new(moved.collect(), far.triangles().to_vec(), None, true);
+    let meshes = [
+        ("thin ring", procedural::torus(1.0, 0.05, [3, 100], true), 1e-6),
+        ("thin flat ring", procedural::torus(1.0, 0.05, [3, 100], false), 1e-9),
+        ("spikes", procedural::bumpy_sphere(1.0, 3, 0.3, 300.0, true), 1e-6),
+        ("icosahedron", procedural::icosphere(1.0, 0, true), 1e-9),
+        ("plate", procedural::drilled_box(DVec3::new(1.0, 3.0, 0.01), [4, 1], 0.01), 1e-9),
+        // Coordinates 1e4 times the size cost as many digits.
+        ("far", far, 1e-7),
+    ];
+    for (name, mesh, bound) in meshes {
+        let shape = Shape::Mesh(mesh.expect(name));
+        let conic = Conic::new(&shape);
+        let size = shape.bounds().map_or(1.0, |bounds| bounds.radius);
+        let (mut tried, mut lost, mut worst) = (0, 0, 0.0f64);
+        for eta in [1.3, 2.0, 0.8] {
+            for _ in 0..1500 {
+                let w_l = direction(&mut stream);
+                let Some((hit, dir, length)) = entering(&shape, w_l, eta, stream.draw2()) else {
+                    continue;
+                };
+                let query = Query { x: hit.point - dir * (length * stream.draw()), w_l, eta };
+                let roots = all(&conic, &shape, &query, &mut Work::default());
+                tried += 1;
+                let nearest = roots
+                    .iter()
+                    .min_by(|p, q| p.point.distance(hit.point).total_cmp(&q.point.distance(hit.point)));
+                let miss = nearest.map_or(f64::INFINITY, |root| root.point.distance(hit.point) / size);
+                for root in &roots {
+                    assert!(root.ratio >= 0.0 && !root.distance.is_nan(), "{name} {root:?}");
+                }
+                if miss > bound {
+                    lost += 1;
+                    println!("{name} {eta} {query:?} {hit:?} {miss:e} {}", roots.len());
+                } else {
+                    worst = worst.max(miss);
+                }
+            }
+        }
+        println!("{name}: {tried} entries, {lost} lost, others found to {worst:.1e}");
+        assert!(tried > 150 && lost == 0, "{name}: {lost} of {tried}");
+    }
 }

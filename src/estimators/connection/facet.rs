@@ -36,6 +36,9 @@ const ROUNDING: f64 = 1e-14;
 const LEAST_CUTS: u32 = 5;
 const PARTS: u32 = 30;
 
+/// Barycentric coordinates at which a Newton iteration has gone astray.
+const FAR: f64 = 10.0;
+
 /// Newton steps from the middle of a part.
 const ITERATIONS: u32 = 50;
 
@@ -46,8 +49,10 @@ pub(super) struct Work {
     pub nodes: u64,
     /// Triangles, or starts of a walk, that were solved for roots.
     pub solves: u64,
-    /// Newton steps, rays of walks included.
+    /// Newton steps.
     pub steps: u64,
+    /// Closest-hit queries.
+    pub rays: u64,
     /// Roots of the shading normal that the geometric one excludes.
     pub wrong_side: u64,
 }
@@ -193,19 +198,23 @@ impl<F: FnMut(Root)> Places<'_, F> {
             (2.0 * area[1].dot(c[1]) + area[2].dot(c[0])) / 3.0,
             area[2].dot(c[1]),
         ];
-        let q: [DVec3; 3] = std::array::from_fn(|i| part.p * d[i] + part.e[0] * u[i] + part.e[1] * v[i]);
-        let mut f: Coefficients = [0.0; polynomial::DEGREE + 1];
-        for axis in 0..3 {
-            let component = q.map(|q| q[axis]);
-            polynomial::add_product(&mut f, 1.0, &component, &component);
+        // Raised to degree 3.
+        let raised = |c: [f64; 3]| [c[0], (c[0] + 2.0 * c[1]) / 3.0, (2.0 * c[1] + c[2]) / 3.0, c[2]];
+        let conditions = [raised(u), raised(v), raised(w), s];
+        if polynomial::excludes(&conditions) {
+            return;
         }
+        let q: [DVec3; 3] = std::array::from_fn(|i| part.p * d[i] + part.e[0] * u[i] + part.e[1] * v[i]);
+        // |Q|^2, of degree 4.
+        let middle = (q[0].dot(q[2]) + 2.0 * q[1].length_squared()) / 3.0;
+        let square =
+            [q[0].length_squared(), q[0].dot(q[1]), middle, q[1].dot(q[2]), q[2].length_squared()];
+        let mut f: Coefficients = [0.0; polynomial::DEGREE + 1];
+        polynomial::add_product(&mut f, 1.0, &square, &[1.0]);
         polynomial::add_product(&mut f, -eta * eta, &s, &s);
         let size2 = |q: &[DVec3]| q.iter().map(|q| q.length_squared()).fold(0.0, f64::max);
         let most = s.iter().fold(0.0f64, |most, s| most.max(s.abs()));
         let noise = ROUNDING * (size2(&q) + eta * eta * most * most);
-        // Raised to degree 3.
-        let raised = |c: [f64; 3]| [c[0], (c[0] + 2.0 * c[1]) / 3.0, (2.0 * c[1] + c[2]) / 3.0, c[2]];
-        let conditions = [raised(u), raised(v), raised(w), s];
         let mut candidates = Vec::new();
         if polynomial::roots(&f, noise, &conditions, &mut |t| candidates.push(t)).is_err() {
             self.subdivide(at, sides, PARTS);
@@ -258,7 +267,7 @@ impl<F: FnMut(Root)> Places<'_, F> {
             if moved < 1e-10 {
                 break;
             }
-            if place.iter().any(|c| !(c.abs() < 10.0)) {
+            if !place.iter().all(|c| c.abs() < FAR) {
                 return;
             }
         }

@@ -16,7 +16,7 @@
 
 use super::facet::{TOLERANCE, Work};
 use super::patch::Patch;
-use super::throughput::{Judgement, Query, Root};
+use super::throughput::{Constraint, Judgement, Query, Root};
 use crate::geometry::{Hit, Ray, Shape, Side};
 use crate::math::{DVec3, Frame};
 use crate::sampling::stream::Stream;
@@ -25,7 +25,10 @@ use crate::sampling::warp::square_to_cap;
 /// Steps of a walk.
 const STEPS: u32 = 64;
 
-/// Part of its Newton step below which a walk gives up.
+/// Residual at which a walk stops. Where two roots merge, a root's place is known to its square root: 1e-7.
+const CONVERGED: f64 = 1e-14;
+
+/// Part of its Newton step below which a walk gives up, and has a root if its residual is 0 to the tolerance.
 const LEAST_SHARE: f64 = 1.0 / 4096.0;
 
 /// Part of the distance from x within which two walks have found the same root.
@@ -42,39 +45,53 @@ fn patch_of(shape: &Shape, hit: &Hit) -> Patch {
 /// The root that a walk from the boundary point in direction `start` finds.
 fn walk(shape: &Shape, query: &Query, start: DVec3, work: &mut Work) -> Option<Root> {
     work.solves += 1;
+    work.rays += 1;
     let mut patch = patch_of(shape, &first_hit(shape, query.x, start)?);
     let mut at = query.constraint(&patch);
     let mut share: f64 = 1.0;
     for _ in 0..STEPS {
-        if at.residual.length() < 0.01 * TOLERANCE {
-            return match query.judge(&patch, TOLERANCE) {
-                Judgement::Root(root) => Some(root),
-                Judgement::WrongSide => {
-                    work.wrong_side += 1;
-                    None
-                }
-                Judgement::None => None,
-            };
+        if at.residual.length() < CONVERGED {
+            break;
         }
-        let step = query.step(&patch, &at)?;
-        loop {
-            work.steps += 1;
-            let dir = (patch.point + step * share - query.x).normalize();
-            let next = first_hit(shape, query.x, dir).map(|hit| patch_of(shape, &hit));
-            if let Some(next) = next {
-                let next_at = query.constraint(&next);
-                if next_at.residual.length() < at.residual.length() {
-                    (patch, at, share) = (next, next_at, (2.0 * share).min(1.0));
-                    break;
-                }
+        let Some((next, next_at)) = step(shape, query, (&patch, &at), &mut share, work) else { break };
+        (patch, at) = (next, next_at);
+    }
+    match query.judge(&patch, 0.01 * TOLERANCE) {
+        Judgement::Root(root) => Some(root),
+        Judgement::WrongSide => {
+            work.wrong_side += 1;
+            None
+        }
+        Judgement::None => None,
+    }
+}
+
+/// One step that makes the residual smaller: the share of Newton's that does; `None` where none does.
+fn step(
+    shape: &Shape,
+    query: &Query,
+    (patch, at): (&Patch, &Constraint),
+    share: &mut f64,
+    work: &mut Work,
+) -> Option<(Patch, Constraint)> {
+    let newton = query.step(patch, at)?;
+    loop {
+        work.steps += 1;
+        work.rays += 1;
+        let dir = (patch.point + newton * *share - query.x).normalize();
+        if let Some(hit) = first_hit(shape, query.x, dir) {
+            let next = patch_of(shape, &hit);
+            let next_at = query.constraint(&next);
+            if next_at.residual.length() < at.residual.length() {
+                *share = (2.0 * *share).min(1.0);
+                return Some((next, next_at));
             }
-            share *= 0.5;
-            if share < LEAST_SHARE {
-                return None;
-            }
+        }
+        *share *= 0.5;
+        if *share < LEAST_SHARE {
+            return None;
         }
     }
-    None
 }
 
 /// Whether two roots of one query are the same.

@@ -122,7 +122,9 @@ fn without_refraction_all_methods_are_the_straight_line() {
         for _ in 0..300 {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
             let query = Query { x, w_l: direction(&mut stream), eta: 1.0 };
-            let Some(straight) = straight_line::root(&shape, &query) else { continue };
+            let Some(straight) = straight_line::root(&shape, &query, &mut Work::default()) else {
+                continue;
+            };
             let mut work = Work::default();
             let by_mnee = mnee(&shape, &query, &mut work);
             let by_sms = sms(&shape, &query, &mut stream, &mut work).map(|(root, weight)| {

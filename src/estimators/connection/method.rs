@@ -65,17 +65,22 @@ impl Solver {
                 found.extend(sampled.map(|(root, weight)| WeightedRoot { root, weight }));
             }
             ConnectionMethod::StraightLine {} => {
-                straight_line::root(shape, query).into_iter().for_each(all);
+                straight_line::root(shape, query, work).into_iter().for_each(all);
             }
         }
     }
 
     /// Whether the method finds the root of a query that is at this point, so that its density there is known; `None`
     /// where the density is not: what such a method connects to is left to it alone.
-    pub(super) fn finds(&self, shape: &Shape, query: &Query, point: DVec3) -> Option<bool> {
+    pub(super) fn finds(
+        &self,
+        shape: &Shape,
+        query: &Query,
+        point: DVec3,
+        work: &mut Work,
+    ) -> Option<bool> {
         let mut is_found = false;
         let mut compare = |root: Root| is_found |= manifold::is_same(&root, point);
-        let work = &mut Work::default();
         match self.method {
             ConnectionMethod::Conic {} => return Some(true),
             ConnectionMethod::Sms {} | ConnectionMethod::StraightLine {} => return None,

@@ -103,7 +103,7 @@ pub(super) fn roots<const N: usize>(
 }
 
 /// Whether conditions have opposite signs all over the interval.
-fn excludes<const N: usize>(conditions: &Conditions<N>) -> bool {
+pub(super) fn excludes<const N: usize>(conditions: &Conditions<N>) -> bool {
     let is = |sign: f64| move |c: &[f64; 4]| c.iter().all(|c| c * sign > 0.0);
     conditions.iter().any(is(1.0)) && conditions.iter().any(is(-1.0))
 }
@@ -185,9 +185,9 @@ pub(super) fn add_product(sum: &mut Coefficients, factor: f64, p: &[f64], q: &[f
     for (i, p) in p.iter().enumerate() {
         for (j, q) in q.iter().enumerate() {
             let part = factor * BINOMIALS[m][i] * BINOMIALS[n][j] * p * q;
-            for k in 0..=missing {
+            for (k, raise) in BINOMIALS[missing][..=missing].iter().enumerate() {
                 let at = i + j + k;
-                sum[at] += part * BINOMIALS[missing][k] / BINOMIALS[DEGREE][at];
+                sum[at] += part * raise / BINOMIALS[DEGREE][at];
             }
         }
     }

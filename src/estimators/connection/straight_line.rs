@@ -11,7 +11,8 @@ use crate::geometry::{Hit, Ray, Shape, Side};
 use crate::optics::fresnel::fresnel;
 
 /// The first crossing of the straight ray; its focusing as if it were the whole truth, eta^2 / J = 1.
-pub(super) fn root(shape: &Shape, query: &Query) -> Option<Root> {
+pub(super) fn root(shape: &Shape, query: &Query, work: &mut Work) -> Option<Root> {
+    work.rays += 1;
     let hit = first(shape, query)?;
     let cl = query.w_l.dot(hit.shading_normal);
     let Query { w_l: dir, eta, .. } = *query;
@@ -33,7 +34,7 @@ fn first(shape: &Shape, query: &Query) -> Option<Hit> {
 /// The root without refraction, eta = 1, where w is w_L: all later crossings are hidden behind the first.
 pub(super) fn crossings(shape: &Shape, query: &Query, work: &mut Work, found: &mut impl FnMut(Root)) {
     work.solves += 1;
-    let Some(root) = root(shape, query) else { return };
+    let Some(root) = root(shape, query, work) else { return };
     let Some(hit) = first(shape, query) else { return };
     let patch = Patch::at(shape, hit.face, hit.point, hit.normal);
     let ratio = solid_angle_ratio(&patch, query.w_l, hit.t, query.w_l, query.eta);

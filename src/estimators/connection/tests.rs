@@ -124,7 +124,12 @@ fn weights_sum_to_one() {
                 let Judgement::Root(root) = query.judge(&patch, 1e-9) else { panic!("no root") };
                 let is_found = match method {
                     ConnectionMethod::StraightLine {} => continue, // has no density
-                    _ => estimator.setup.solver.finds(&scene.shape, &query, hit.point),
+                    _ => estimator.setup.solver.finds(
+                        &scene.shape,
+                        &query,
+                        hit.point,
+                        &mut facet::Work::default(),
+                    ),
                 };
                 let share = estimator.setup.shares[0][light];
                 let pdf = sample.pdf;

@@ -81,6 +81,7 @@ impl Rivals for Connected<'_> {
         roots.clear();
         setup.solver.roots(shape, &query, stream, &mut work, &mut roots);
         (0..work.wrong_side).for_each(|_| walk.scores.note(Anomaly::WrongSide));
+        walk.scores.count_many(Cost::Rays, work.rays);
         let is_shared = sample.pdf.is_some() && setup.is_density_known;
         let density = choice * sample.pdf.unwrap_or(1.0);
         let drawn = Drawn { light, radiance: sample.radiance, density, is_shared };
@@ -119,7 +120,10 @@ impl Rivals for Connected<'_> {
         }
         let shape = &*walk.scene.shape;
         let query = Query { x: departure.point, w_l: wi, eta: walk.boundary.eta() };
-        match setup.solver.finds(shape, &query, exit.hit.point) {
+        let mut work = Work::default();
+        let is_found = setup.solver.finds(shape, &query, exit.hit.point, &mut work);
+        walk.scores.count_many(Cost::Rays, work.rays);
+        match is_found {
             None => return f64::INFINITY,
             Some(false) => return 0.0,
             Some(true) => {}
