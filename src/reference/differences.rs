@@ -5,9 +5,9 @@ use crate::math::{DVec3, Frame};
 /// |d to / d from|: the solid angle of the image of a unit of solid angle about `from` (unit), under a map of unit
 /// directions. `None` where the map is not defined close by.
 ///
-/// Central differences with steps h and h/2 and one step of Richardson's extrapolation: the error is of order
-/// h^4 in the map's fifth derivatives, and 1e-16 / h from rounding; with h = 1e-3, and derivatives of order 1,
-/// both are below 1e-11.
+/// Central differences with steps h and h/2 and one step of Richardson's extrapolation: the error is of
+/// order h^4 in the map's fifth derivatives, and 1e-16 / h from rounding; with h = 1e-3, and derivatives
+/// of order 1, both are below 1e-11.
 pub(crate) fn solid_angle_ratio(
     map: impl Fn(DVec3) -> Option<DVec3>,
     from: DVec3,

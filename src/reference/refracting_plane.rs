@@ -1,8 +1,8 @@
 //! Light that the plane z = 0 refracts into the body below: one ray a point, in closed form.
 //!
-//! Parallel light from the direction w_L (unit, z = cl > 0) travels inside along -w with w = (w_L + (eta ct -
-//! cl) z) / eta, eta ct = sqrt(eta^2 - 1 + cl^2). An irradiance E across the light becomes T E cl / ct across
-//! the refracted beam: the flux through a unit of the plane, T E cl, crosses ct of it.
+//! Parallel light from the direction w_L (unit, z = cl > 0) travels inside along -w with w = (w_L + (eta
+//! ct - cl) z) / eta, eta ct = sqrt(eta^2 - 1 + cl^2). An irradiance E across the light becomes T E cl /
+//! ct across the refracted beam: the flux through a unit of the plane, T E cl, crosses ct of it.
 //!
 //! The light of a camera ray that enters with the cosine mu to the depth axis and is scattered once:
 //!   L = int_0^l sigma_s e^(-sigma t) p T E (cl / ct) e^(-sigma mu t / ct) dt
@@ -46,9 +46,9 @@ impl PlaneBeam {
         (point + self.toward * distance, distance)
     }
 
-    /// Radiance that a camera ray gathers by one scattering event, W/(mm^2 sr), of light of irradiance 1: the ray
-    /// enters at the plane along `dir` and ends after `length` mm (infinite in a half-space). `phase` is per
-    /// solid angle, `sigma_s` and `sigma_t` are in 1/mm.
+    /// Radiance that a camera ray gathers by one scattering event, W/(mm^2 sr), of light of irradiance
+    /// 1: the ray enters at the plane along `dir` and ends after `length` mm (infinite in a half-space).
+    /// `phase` is per solid angle, `sigma_s` and `sigma_t` are in 1/mm.
     pub(crate) fn single_scattering(
         &self,
         dir: DVec3,
@@ -74,8 +74,9 @@ pub(crate) struct PointBeam {
 impl PointBeam {
     /// By bisection of h tan a + z tan b = r, sin a = eta sin b, which grows with the angle.
     ///
-    /// D is that of Walter et al. 2009, "Single scattering in refractive media with triangle mesh boundaries", for a
-    /// plane: (d + eta d_L) (d cl / ct + eta d_L ct / cl), d and d_L being the lengths inside and outside.
+    /// D is that of Walter et al. 2009, "Single scattering in refractive media with triangle mesh
+    /// boundaries", for a plane: (d + eta d_L) (d cl / ct + eta d_L ct / cl), d and d_L being the
+    /// lengths inside and outside.
     pub(crate) fn new(h: f64, z: f64, r: f64, eta: f64) -> PointBeam {
         let cosines = |sin: f64| [(1.0 - sin * sin).sqrt(), (1.0 - sin * sin / (eta * eta)).sqrt()];
         let reach = |sin: f64| {

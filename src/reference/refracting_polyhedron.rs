@@ -1,13 +1,15 @@
 //! Exact single scattering of a convex body of flat facets under parallel light.
 //!
-//! Behind a facet the refracted light is a prism: every ray of it has the same direction, and a point x lies in it
-//! if x + s w, w being the direction towards the entry, meets the facet. With corners a, a + e1, a + e2,
+//! Behind a facet the refracted light is a prism: every ray of it has the same direction, and a point x
+//! lies in it if x + s w, w being the direction towards the entry, meets the facet. With corners a, a +
+//! e1, a + e2,
 //!   x + s w = a + u e1 + v e2
-//! gives u, v and s as linear functions of x, so along a camera ray x(t) they are A + B t. The part of the ray in
-//! the prism is the interval [t0, t1] in which u >= 0, v >= 0, u + v <= 1 and s >= 0, and
+//! gives u, v and s as linear functions of x, so along a camera ray x(t) they are A + B t. The part of
+//! the ray in the prism is the interval [t0, t1] in which u >= 0, v >= 0, u + v <= 1 and s >= 0, and
 //!   int_t0^t1 e^(-sigma (t + s(t))) dt = e^(-sigma (t0 + s(t0))) (1 - e^(-k l)) / k,
-//! k = sigma (1 + ds/dt), l = t1 - t0. It is scattered by one angle, so the radiance of the facet is that times
-//! sigma_s, the phase function, T E and the magnification cl / ct. In a convex body nothing is hidden.
+//! k = sigma (1 + ds/dt), l = t1 - t0. It is scattered by one angle, so the radiance of the facet is
+//! that times sigma_s, the phase function, T E and the magnification cl / ct. In a convex body nothing
+//! is hidden.
 
 use crate::math::{DVec3, exp, exp_m1};
 use crate::optics::fresnel::fresnel;
@@ -35,7 +37,8 @@ pub(crate) struct Prism {
 }
 
 impl Prism {
-    /// Of a triangle whose corners turn counter-clockwise seen from outside; `None` where no light comes in.
+    /// Of a triangle whose corners turn counter-clockwise seen from outside; `None` where no light comes
+    /// in.
     pub(crate) fn new([a, b, c]: [DVec3; 3], light: DVec3, eta: f64) -> Option<Prism> {
         let edges = [b - a, c - a];
         let normal = edges[0].cross(edges[1]).normalize();
@@ -85,8 +88,9 @@ impl Prism {
     }
 }
 
-/// Radiance that a camera ray gathers inside by one scattering event, W/(mm^2 sr), of parallel light of irradiance
-/// one. `phase` is the phase function of the cosine between propagation directions; coefficients are in 1/mm.
+/// Radiance that a camera ray gathers inside by one scattering event, W/(mm^2 sr), of parallel light of
+/// irradiance one. `phase` is the phase function of the cosine between propagation directions;
+/// coefficients are in 1/mm.
 ///
 /// The sum over facets is exact: the error is rounding, 1e-13 of the sum for bodies of ordinary shape.
 pub(crate) fn single_scattering(
@@ -112,8 +116,8 @@ mod tests {
 
     const ETA: f64 = 1.4;
 
-    /// An octahedron with half axes of unlike length: eight facets of one shape, none of them parallel to another's
-    /// edge.
+    /// An octahedron with half axes of unlike length: eight facets of one shape, none of them parallel
+    /// to another's edge.
     fn octahedron(axes: DVec3) -> Vec<[DVec3; 3]> {
         let mut facets = Vec::new();
         for (x, y, z) in (0..8).map(|i| (i & 1, i >> 1 & 1, i >> 2 & 1)) {
@@ -135,8 +139,8 @@ mod tests {
         facets.iter().map(plane).fold(f64::INFINITY, f64::min)
     }
 
-    /// Against quadrature along the ray, which asks for each point of it, facet by facet, whether it is in the
-    /// prism. Interval ends are jumps, which bisection of 2000 intervals resolves to 1e-9.
+    /// Against quadrature along the ray, which asks for each point of it, facet by facet, whether it is
+    /// in the prism. Interval ends are jumps, which bisection of 2000 intervals resolves to 1e-9.
     #[test]
     fn the_closed_form_is_the_integral() {
         let facets = octahedron(DVec3::new(1.0, 0.8, 1.3));

@@ -1,22 +1,23 @@
-//! Parallel light that a sphere refracts: every ray that reaches a point, its focusing, and the energy of all.
+//! Parallel light that a sphere refracts: every ray that reaches a point, its focusing, and the energy
+//! of all.
 //!
 //! The light comes from +z. Everything happens in the meridian plane of the point, where a point has the
-//! coordinates (rho, z). The light that comes in at p = R (sin a, cos a), a in (-pi/2, pi/2) (the sign tells the
-//! side), is refracted to sin t = sin a / eta, and runs inside along -(sin b, cos b), b = a - t. Its line passes the
-//! point at the distance
+//! coordinates (rho, z). The light that comes in at p = R (sin a, cos a), a in (-pi/2, pi/2) (the sign
+//! tells the side), is refracted to sin t = sin a / eta, and runs inside along -(sin b, cos b), b = a -
+//! t. Its line passes the point at the distance
 //!   g(a) = rho cos b - z sin b - (R / eta) sin a;
 //! a root counts if the point lies on the ray's inner side, s = (p - x).(sin b, cos b) > 0.
 //!
-//! Magnification: irradiance across the ray at the point, over that outside, without T and absorption. The light
-//! between two radii of the beam, R^2 |sin a| cos a da dphi, crosses rho dphi times |g'| da. Equivalent forms, all of
-//! which tests compare:
+//! Magnification: irradiance across the ray at the point, over that outside, without T and absorption.
+//! The light between two radii of the beam, R^2 |sin a| cos a da dphi, crosses rho dphi times |g'| da.
+//! Equivalent forms, all of which tests compare:
 //!   by the ring of rays      M = R^2 |sin a| cos a / (rho |g'|)
-//!   by the wavefront         M = (cos a / cos t) / |(1 - s G) (1 - s G / cos^2 t)|, G = (eta cos t - cos a) / (eta R)
-//!   by the implicit function M = eta^2 (cos t / s^2) |dp / dw_L|
+//!   by the wavefront         M = (cos a / cos t) / |(1 - s G) (1 - s G / cos^2 t)|, G = (eta cos t -
+//!   cos a) / (eta R) by the implicit function M = eta^2 (cos t / s^2) |dp / dw_L|
 //! The second holds on the axis, too.
 //!
-//! After an internal reflection everything is turned by pi - 2 t: p and b advance by that angle, and g keeps its
-//! form with the new b.
+//! After an internal reflection everything is turned by pi - 2 t: p and b advance by that angle, and g
+//! keeps its form with the new b.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -51,8 +52,9 @@ pub(crate) struct LitSphere {
     pub reflections: u32,
 }
 
-/// Intervals that are searched for roots and extremes. A pair of roots that lies within one of them has an extreme of
-/// g between; two extremes of g within one interval would need g' to turn within pi / 2000.
+/// Intervals that are searched for roots and extremes. A pair of roots that lies within one of them has
+/// an extreme of g between; two extremes of g within one interval would need g' to turn within pi /
+/// 2000.
 const INTERVALS: u32 = 2000;
 
 impl LitSphere {
@@ -75,8 +77,9 @@ impl LitSphere {
         -(rho * sin(b) + z * cos(b)) * db - self.radius / self.eta * cos(a)
     }
 
-    /// All light that reaches the point (rho > 0, z). Roots are found by bisection to rounding; those of a pair
-    /// that lies closer than 1e-12 rad may be missed, which is where the magnification exceeds 1e5.
+    /// All light that reaches the point (rho > 0, z). Roots are found by bisection to rounding; those of
+    /// a pair that lies closer than 1e-12 rad may be missed, which is where the magnification exceeds
+    /// 1e5.
     pub(crate) fn rays(&self, x: [f64; 2]) -> Vec<SphereRay> {
         let at = |i: u32| FRAC_PI_2 * (2.0 * f64::from(i) / f64::from(INTERVALS) - 1.0);
         let mut cuts: Vec<f64> = (0..=INTERVALS).map(at).collect();
@@ -110,8 +113,8 @@ impl LitSphere {
         })
     }
 
-    /// Integral over the ball of the sum of Fresnel factors times M, mm^3, without absorption: the flux that comes in
-    /// at each radius of the beam times the length that it runs, 2 pi int T b chord(b) db.
+    /// Integral over the ball of the sum of Fresnel factors times M, mm^3, without absorption: the flux
+    /// that comes in at each radius of the beam times the length that it runs, 2 pi int T b chord(b) db.
     pub(crate) fn budget(&self) -> Integral {
         let ring = |a: f64| {
             let (t, _) = self.inside(a);
@@ -149,8 +152,8 @@ mod tests {
         LitSphere { radius: 1.0, eta, reflections }
     }
 
-    /// Points of the meridian plane, uniform in the ball: the additive recurrence of the plastic number, whose
-    /// discrepancy falls nearly as 1 / n.
+    /// Points of the meridian plane, uniform in the ball: the additive recurrence of the plastic number,
+    /// whose discrepancy falls nearly as 1 / n.
     fn points(count: u32) -> impl Iterator<Item = [f64; 2]> {
         (1..=count).map(|i| {
             let [u, v] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3]
@@ -167,8 +170,8 @@ mod tests {
         let s = ray.distance;
         let g = (eta * cos(t) - cos(a)) / (eta * radius);
         let wavefront = cos(a) / cos(t) / ((1.0 - s * g) * (1.0 - s * g / (cos(t) * cos(t)))).abs();
-        // In the plane: p turns with the light by 1 - g_beta / g'. Across it: both turn about the axis from
-        // the middle to the point.
+        // In the plane: p turns with the light by 1 - g_beta / g'. Across it: both turn about the axis
+        // from the middle to the point.
         let g_beta = -x[1] * cos(b) - x[0] * sin(b);
         let in_plane = radius * (1.0 - g_beta / sphere.slope(a, x)).abs();
         let across = radius * (x[0] * cos(a) - x[1] * sin(a)).abs() / x[0];
@@ -209,8 +212,8 @@ mod tests {
         }
     }
 
-    /// Shares of the ball's volume that 0, 1, and 2 or 3 rays reach. Three reach a small part beside the pole that
-    /// points away from the light, where rays that graze on entry arrive from both sides.
+    /// Shares of the ball's volume that 0, 1, and 2 or 3 rays reach. Three reach a small part beside the
+    /// pole that points away from the light, where rays that graze on entry arrive from both sides.
     #[test]
     fn counts_of_rays() {
         for (eta, expected) in [(1.5, [0.2616, 0.7226, 0.0158]), (1.3, [0.1810, 0.7988, 0.0202])] {
@@ -221,7 +224,8 @@ mod tests {
             let [none, one, two, three] = counts.map(|count| f64::from(count) / 1e4);
             assert!(three < 2e-3, "{counts:?}");
             for (got, share) in [none, one, two + three].into_iter().zip(expected) {
-                // Expected: sign changes of g on 1200 intervals at 1.5 million random points (standard error 4e-4).
+                // Expected: sign changes of g on 1200 intervals at 1.5 million random points (standard
+                // error 4e-4).
                 assert!((got - share).abs() < 2e-3, "{eta}: {counts:?} {expected:?}");
             }
         }
@@ -237,13 +241,14 @@ mod tests {
         assert!((sphere(1.0, 0).budget().value - 4.0 / 3.0 * PI).abs() < 1e-10);
     }
 
-    /// Rays that are followed from the light, with and without a reflection, are among those found, and the flux
-    /// between two neighbours has the stated magnification.
+    /// Rays that are followed from the light, with and without a reflection, are among those found, and
+    /// the flux between two neighbours has the stated magnification.
     #[test]
     fn rays_from_the_light_are_found() {
         for (eta, reflections) in [(1.5, 0), (1.3, 0), (1.5, 1), (1.3, 1)] {
             let sphere = sphere(eta, reflections);
-            // The ray that comes in at angle a, followed by vectors: point and direction after the last event.
+            // The ray that comes in at angle a, followed by vectors: point and direction after the last
+            // event.
             let follow = |a: f64| {
                 let (sin_t, normal) = (sin(a) / eta, [sin(a), cos(a)]);
                 let cos_t = (1.0 - sin_t * sin_t).sqrt();
@@ -275,7 +280,8 @@ mod tests {
                 assert!((found.length - whole).abs() < 1e-9);
                 let turn = atan2(-dir[0] * side, -dir[1]);
                 assert!((sin(found.turn - turn)).abs() < 1e-9 && cos(found.turn - turn) > 0.0);
-                // Across the ray at x, a neighbour passes at d(offset): flux sin a cos a da dphi = M rho |d|.
+                // Across the ray at x, a neighbour passes at d(offset): flux sin a cos a da dphi = M rho
+                // |d|.
                 let passes = |a: f64| {
                     let (q, to) = follow(a);
                     // Signed distance from x (back in the ray's own half) to the neighbour's line.

@@ -1,12 +1,13 @@
 //! Which parts of the boundary may refract the light of a query: bounds of their points and normals.
 //!
-//! A part has a sphere that holds its points, of radius r at the distance D from x, and a cone that holds their
-//! normals, of half angle alpha about an axis. Directions w from x to its points deviate by theta = asin(r / D) at most.
-//! It holds no root
+//! A part has a sphere that holds its points, of radius r at the distance D from x, and a cone that
+//! holds their normals, of half angle alpha about an axis. Directions w from x to its points deviate by
+//! theta = asin(r / D) at most. It holds no root
 //!   where all its normals face away from the light, or from w;
-//!   where w and w_L differ by more than refraction ever turns light, acos(min(eta, 1 / eta)) (the spindle of Walter
-//!   et al. 2009);
-//!   where eta w - w_L, which has to be along +-N, is outside the cone: it changes by 2 eta sin(theta / 2) at most.
+//!   where w and w_L differ by more than refraction ever turns light, acos(min(eta, 1 / eta)) (the
+//!   spindle of Walter et al. 2009);
+//!   where eta w - w_L, which has to be along +-N, is outside the cone: it changes by 2 eta sin(theta /
+//!   2) at most.
 
 use super::throughput::Query;
 use crate::math::DVec3;

@@ -1,5 +1,5 @@
-//! A hierarchy over the triangles of a mesh, with the bounds of their points and normals: which of them may refract the
-//! light of a query.
+//! A hierarchy over the triangles of a mesh, with the bounds of their points and normals: which of them
+//! may refract the light of a query.
 
 use super::bounds::Bounds;
 use super::patch::Facet;
@@ -50,7 +50,8 @@ impl ConeTree {
         Bounds::new(corners, normals)
     }
 
-    /// Splits at the median along the direction, of place and normal together, in which facets differ most.
+    /// Splits at the median along the direction, of place and normal together, in which facets differ
+    /// most.
     fn build(nodes: &mut Vec<Node>, facets: &mut [(Bounds, Facet)], first: u32, size: f64) {
         let bounds = ConeTree::bounds(facets.iter().map(|(_, facet)| facet));
         let at = nodes.len();

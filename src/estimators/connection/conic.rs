@@ -1,13 +1,14 @@
 //! Every point of the boundary that refracts the light of a query: the complete solver.
 //!
-//! Half-space, slab and box are planes, each with at most one root in closed form. On a mesh the hierarchy of `cones`
-//! leaves a few triangles, which `facet` solves. On the sphere of radius R about the origin everything lies in the
-//! plane of C = -x and w_L. With p - x = P = k' N + s w_L and N = P - C (of length R), and 1 - k' = +-q,
+//! Half-space, slab and box are planes, each with at most one root in closed form. On a mesh the
+//! hierarchy of `cones` leaves a few triangles, which `facet` solves. On the sphere of radius R about
+//! the origin everything lies in the plane of C = -x and w_L. With p - x = P = k' N + s w_L and N = P -
+//! C (of length R), and 1 - k' = +-q,
 //!   P = C + (s w_L - C) / (+-q),   q = |s w_L - C| / R,
 //! the sign being that of s - c, c = w_L . C, since w_L . N > 0. |P| = eta s turns into
 //!   +-q (R^2 + C^2 - eta^2 s^2) = 2 (C^2 - s c),
-//! squared a polynomial of degree 6 in s, on the interval R - |C| <= eta s <= R + |C| of distances to the sphere.
-//! For eta = 1 there is nothing to solve: the light comes straight.
+//! squared a polynomial of degree 6 in s, on the interval R - |C| <= eta s <= R + |C| of distances to
+//! the sphere. For eta = 1 there is nothing to solve: the light comes straight.
 
 use super::cones::ConeTree;
 use super::facet::{self, TOLERANCE, Work, plane_root};
@@ -129,7 +130,8 @@ fn sphere(radius: f64, query: &Query, work: &mut Work, found: &mut impl FnMut(Ro
     polynomial::add_product(&mut f, -4.0, &line, &line);
     let mut seen: Vec<DVec3> = Vec::new();
     let mut candidates = Vec::new();
-    // Where it vanishes, on the axis, are the rings of light that come from all around it: no point is on it.
+    // Where it vanishes, on the axis, are the rings of light that come from all around it: no point is
+    // on it.
     let noise = 1e-14 * f.iter().fold(0.0f64, |most, c| most.max(c.abs()));
     if polynomial::roots::<0>(&f, noise, &[], &mut |t| candidates.push(t)).is_err() {
         candidates.extend([0.0, 0.5, 1.0]);

@@ -1,18 +1,20 @@
-//! Walks on the boundary towards a root, from a starting point: manifold next-event estimation, and specular manifold
-//! sampling.
+//! Walks on the boundary towards a root, from a starting point: manifold next-event estimation, and
+//! specular manifold sampling.
 //!
-//! A walk takes Newton steps in the tangent plane and comes back to the boundary by a ray from x, so that what it finds
-//! is visible from x (Hanika, Droske & Fascione 2015, "Manifold next event estimation"). A step that makes the residual
-//! grow is halved, else the next one is doubled, to 1 at most.
+//! A walk takes Newton steps in the tangent plane and comes back to the boundary by a ray from x, so
+//! that what it finds is visible from x (Hanika, Droske & Fascione 2015, "Manifold next event
+//! estimation"). A step that makes the residual grow is halved, else the next one is doubled, to 1 at
+//! most.
 //!
-//! From one start, where the straight ray to the light leaves the body, a walk finds one root or none: MNEE. All
-//! others are lost. From random starts it finds each visible root k with a probability p_k > 0 that nobody knows;
-//! the number of further trials until the same root is found again has the mean 1 / p_k, which weights it without bias
-//! (Zeltner, Georgiev & Jakob 2020, "Specular manifold sampling for rendering high-frequency caustics and glints"). No trial
-//! is cut off: the mean number of trials is one for each root that is there.
+//! From one start, where the straight ray to the light leaves the body, a walk finds one root or none:
+//! MNEE. All others are lost. From random starts it finds each visible root k with a probability p_k > 0
+//! that nobody knows; the number of further trials until the same root is found again has the mean 1 /
+//! p_k, which weights it without bias (Zeltner, Georgiev & Jakob 2020, "Specular manifold sampling for
+//! rendering high-frequency caustics and glints"). No trial is cut off: the mean number of trials is one
+//! for each root that is there.
 //!
-//! Starts are uniform in the cone about w_L of half angle acos(min(eta, 1 / eta)), seen from x, beyond which no refraction
-//! turns light.
+//! Starts are uniform in the cone about w_L of half angle acos(min(eta, 1 / eta)), seen from x, beyond
+//! which no refraction turns light.
 
 use super::facet::{TOLERANCE, Work};
 use super::patch::Patch;
@@ -25,10 +27,12 @@ use crate::sampling::warp::square_to_cap;
 /// Steps of a walk.
 const STEPS: u32 = 64;
 
-/// Residual at which a walk stops. Where two roots merge, a root's place is known to its square root: 1e-7.
+/// Residual at which a walk stops. Where two roots merge, a root's place is known to its square root:
+/// 1e-7.
 const CONVERGED: f64 = 1e-14;
 
-/// Part of its Newton step below which a walk gives up, and has a root if its residual is 0 to the tolerance.
+/// Part of its Newton step below which a walk gives up, and has a root if its residual is 0 to the
+/// tolerance.
 const LEAST_SHARE: f64 = 1.0 / 4096.0;
 
 /// Part of the distance from x within which two walks have found the same root.

@@ -70,8 +70,8 @@ impl Solver {
         }
     }
 
-    /// Whether the method finds the root of a query that is at this point, so that its density there is known; `None`
-    /// where the density is not: what such a method connects to is left to it alone.
+    /// Whether the method finds the root of a query that is at this point, so that its density there is
+    /// known; `None` where the density is not: what such a method connects to is left to it alone.
     pub(super) fn finds(
         &self,
         shape: &Shape,

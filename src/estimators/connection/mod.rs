@@ -1,9 +1,10 @@
-//! Connections through a smooth boundary: at every medium vertex x of a camera walk, the boundary points p at which light
-//! from a chosen light is refracted to x.
+//! Connections through a smooth boundary: at every medium vertex x of a camera walk, the boundary points
+//! p at which light from a chosen light is refracted to x.
 //!
-//! A root p obeys Snell's law for w = unit(p - x) and the direction w_L to the light; what it contributes is in
-//! `throughput`, its weight against the walk's own sampling in `vertex`. A root counts where p is the first boundary
-//! point that x sees along w, and nothing is between p and the light. Methods differ in which roots they find:
+//! A root p obeys Snell's law for w = unit(p - x) and the direction w_L to the light; what it
+//! contributes is in `throughput`, its weight against the walk's own sampling in `vertex`. A root counts
+//! where p is the first boundary point that x sees along w, and nothing is between p and the light.
+//! Methods differ in which roots they find:
 //!
 //! | method | roots | parallel light | disc of directions |
 //! |---|---|---|---|
@@ -15,8 +16,9 @@
 //!
 //! Lights that are not concentrated (environments) are left to the walk.
 //!
-//! What the connection finds are paths whose light is refracted once, at the last boundary point before it meets the
-//! last medium vertex: whatever the camera's part of the path does. In the record's classes:
+//! What the connection finds are paths whose light is refracted once, at the last boundary point before
+//! it meets the last medium vertex: whatever the camera's part of the path does. In the record's
+//! classes:
 //!
 //! | light reaches the last medium vertex | class by the camera's part | found |
 //! |---|---|---|
@@ -26,8 +28,8 @@
 //! | through another part of a body that is not convex | any of the four | from a disc, by the walk; parallel light: no |
 //!
 //! So under parallel light `single` and `multiple` are complete on convex bodies. `single_internal` and
-//! `multiple_internal` lack what is reflected inside on the light's side; a record does not tell it from what is
-//! reflected on the camera's side, so there `light_trace` has more. On the path to the sensor
+//! `multiple_internal` lack what is reflected inside on the light's side; a record does not tell it from
+//! what is reflected on the camera's side, so there `light_trace` has more. On the path to the sensor
 //! a body is entered and left any number of times.
 
 mod bounds;
@@ -77,7 +79,8 @@ fn complete() -> ConnectionMethod {
     ConnectionMethod::Conic {}
 }
 
-/// Least concentration 4 pi int L^2 / (int L)^2 of a light that is connected to, 2 / height of a cap: 0.4 pi sr.
+/// Least concentration 4 pi int L^2 / (int L)^2 of a light that is connected to, 2 / height of a cap:
+/// 0.4 pi sr.
 const LEAST_CONCENTRATION: f64 = 10.0;
 
 /// What connections share.

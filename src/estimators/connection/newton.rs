@@ -1,9 +1,10 @@
-//! One Newton iteration on every triangle that the hierarchy leaves (Walter, Zhao, Holzschuch & Bala 2009, "Single scattering in
-//! refractive media with triangle mesh boundaries").
+//! One Newton iteration on every triangle that the hierarchy leaves (Walter, Zhao, Holzschuch & Bala
+//! 2009, "Single scattering in refractive media with triangle mesh boundaries").
 //!
-//! The iteration starts at the triangle's middle; a step that makes the residual grow is halved. Where a triangle has two
-//! roots, or where the iteration goes astray, roots are lost: on flat facets and analytic shapes, where one start is
-//! enough or the roots are closed, it is complete, with interpolated normals it is not.
+//! The iteration starts at the triangle's middle; a step that makes the residual grow is halved. Where a
+//! triangle has two roots, or where the iteration goes astray, roots are lost: on flat facets and
+//! analytic shapes, where one start is enough or the roots are closed, it is complete, with interpolated
+//! normals it is not.
 
 use super::conic::Conic;
 use super::facet::{self, TOLERANCE, Work};
@@ -14,7 +15,8 @@ use crate::geometry::Shape;
 /// Steps of an iteration; about five bring the residual to rounding.
 const STEPS: u32 = 20;
 
-/// Offers the roots that it finds. `conic` has the hierarchy, and the closed forms of flat facets and other shapes.
+/// Offers the roots that it finds. `conic` has the hierarchy, and the closed forms of flat facets and
+/// other shapes.
 pub(super) fn roots(
     conic: &Conic,
     shape: &Shape,

@@ -114,8 +114,8 @@ impl Facet {
         self.gradients().map(|gradient| gradient.dot(point - self.corner))
     }
 
-    /// Its surroundings at barycentric coordinates. Where interpolated normals vanish the shading normal is the
-    /// geometric one, as intersection has it.
+    /// Its surroundings at barycentric coordinates. Where interpolated normals vanish the shading normal
+    /// is the geometric one, as intersection has it.
     pub(super) fn patch(&self, place: [f64; 2]) -> Patch {
         let flat = Patch::plane(self.at(place), FaceId(self.index), self.normal);
         let Some((n, m)) = self.shading else { return flat };
@@ -129,9 +129,9 @@ impl Facet {
         Patch { shading: sum / length, turning, ..flat }
     }
 
-    /// Whether a point belongs to it. Of an edge between two facets the one owns it that runs along it from the
-    /// lower to the higher index, so that no point of an edge is lost or counted twice. Corners belong to any number
-    /// of facets.
+    /// Whether a point belongs to it. Of an edge between two facets the one owns it that runs along it
+    /// from the lower to the higher index, so that no point of an edge is lost or counted twice. Corners
+    /// belong to any number of facets.
     pub(super) fn owns(&self, [u, v]: [f64; 2]) -> bool {
         let [a, b, c] = self.vertices;
         let on = |weight: f64, from: u32, to: u32| if from < to { weight >= 0.0 } else { weight > 0.0 };

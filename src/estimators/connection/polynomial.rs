@@ -1,9 +1,10 @@
 //! Real roots of polynomials on [0, 1], none lost: Bernstein form, the rule of signs, and subdivision.
 //!
-//! In Bernstein form, p(t) = sum_i c_i B_i(t), the number of roots in (0, 1) is at most the number of sign changes
-//! of the c_i, and differs from it by an even number (the variation diminishing property; Lane & Riesenfeld 1981,
-//! "Bounds on a polynomial"). So no change means no root, and one change means exactly one. Everything else is cut
-//! in halves by de Casteljau's algorithm, whose steps are means: rounding stays at the size of the c_i.
+//! In Bernstein form, p(t) = sum_i c_i B_i(t), the number of roots in (0, 1) is at most the number of
+//! sign changes of the c_i, and differs from it by an even number (the variation diminishing property;
+//! Lane & Riesenfeld 1981, "Bounds on a polynomial"). So no change means no root, and one change means
+//! exactly one. Everything else is cut in halves by de Casteljau's algorithm, whose steps are means:
+//! rounding stays at the size of the c_i.
 
 /// Degree of the polynomials that are solved here.
 pub(super) const DEGREE: usize = 6;
@@ -11,11 +12,12 @@ pub(super) const DEGREE: usize = 6;
 /// Bernstein coefficients on [0, 1].
 pub(super) type Coefficients = [f64; DEGREE + 1];
 
-/// Halvings after which what still changes its sign more than once is one candidate: a multiple root to rounding.
+/// Halvings after which what still changes its sign more than once is one candidate: a multiple root to
+/// rounding.
 const HALVINGS: u32 = 40;
 
-/// Length of an interval on which a polynomial of separate roots does not vanish: a double root spoils the square root
-/// of the precision, 2^-26.
+/// Length of an interval on which a polynomial of separate roots does not vanish: a double root spoils
+/// the square root of the precision, 2^-26.
 const WIDE: f64 = 1.0 / (1 << 24) as f64;
 
 /// The polynomial's value.
@@ -55,8 +57,8 @@ enum Signs {
     Zero,
 }
 
-/// By the rule of signs, where it holds whatever coefficients below `noise` are: one such coefficient between
-/// opposite signs changes nothing.
+/// By the rule of signs, where it holds whatever coefficients below `noise` are: one such coefficient
+/// between opposite signs changes nothing.
 fn signs(coefficients: &Coefficients, noise: f64) -> Signs {
     let (mut count, mut last, mut run) = (0, 0.0f64, 0);
     for &c in coefficients {
@@ -79,16 +81,17 @@ fn signs(coefficients: &Coefficients, noise: f64) -> Signs {
     }
 }
 
-/// The polynomial vanishes, to rounding, on more than a point: roots of high order, which it cannot tell apart.
+/// The polynomial vanishes, to rounding, on more than a point: roots of high order, which it cannot tell
+/// apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Degenerate;
 
 /// Polynomials of degree 3 at most that must have one sign, all of them, where a root counts.
 pub(super) type Conditions<const N: usize> = [[f64; 4]; N];
 
-/// Calls `found` for every root in [0, 1] at which the conditions may hold, and for the middle of every interval
-/// shorter than 2^-40 in which rounding leaves it open whether there are roots. `noise` bounds the rounding of the
-/// coefficients. A double root to rounding is found once, twice or
+/// Calls `found` for every root in [0, 1] at which the conditions may hold, and for the middle of every
+/// interval shorter than 2^-40 in which rounding leaves it open whether there are roots. `noise` bounds
+/// the rounding of the coefficients. A double root to rounding is found once, twice or
 /// not; a root at which an interval is cut may be found twice, 2^-40 apart.
 ///
 /// # Errors
@@ -135,8 +138,8 @@ fn isolate<const N: usize>(
     Ok(())
 }
 
-/// The root where the coefficients change their sign once: bisection, sped up by the secant (the Illinois variant of
-/// regula falsi), to rounding.
+/// The root where the coefficients change their sign once: bisection, sped up by the secant (the
+/// Illinois variant of regula falsi), to rounding.
 fn single_root(c: &Coefficients) -> f64 {
     let first = c.iter().copied().find(|c| *c != 0.0).unwrap_or(0.0);
     let last = c.iter().rev().copied().find(|c| *c != 0.0).unwrap_or(0.0);
@@ -177,8 +180,8 @@ const BINOMIALS: [[f64; 7]; 7] = [
     [1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0],
 ];
 
-/// Adds `factor` times the product of two polynomials, in Bernstein form, to one of degree [`DEGREE`]; the product
-/// is raised to it (by a factor 1 of the degree that is missing).
+/// Adds `factor` times the product of two polynomials, in Bernstein form, to one of degree [`DEGREE`];
+/// the product is raised to it (by a factor 1 of the degree that is missing).
 pub(super) fn add_product(sum: &mut Coefficients, factor: f64, p: &[f64], q: &[f64]) {
     let (m, n) = (p.len() - 1, q.len() - 1);
     let missing = DEGREE - m - n;
@@ -243,7 +246,8 @@ mod tests {
         }
     }
 
-    /// Roots at the ends, a double root (which rounding may part or remove), and the zero polynomial, which has candidates and no end.
+    /// Roots at the ends, a double root (which rounding may part or remove), and the zero polynomial,
+    /// which has candidates and no end.
     #[test]
     fn special_cases() {
         let ends = solve(&with_roots(&[0.0, 1.0, 2.0, 3.0, -1.0, -2.0]));

@@ -1,8 +1,8 @@
 //! The straight line: light that reaches a point as if the boundary did not bend it.
 //!
-//! p is where the ray from x towards the light leaves the body; Fresnel's factor and the attenuation are those of
-//! p, the focusing is 1. Wrong in place, number and strength wherever eta is not 1 (Walter et al. 2009 compare it),
-//! and light where the truth is dark.
+//! p is where the ray from x towards the light leaves the body; Fresnel's factor and the attenuation are
+//! those of p, the focusing is 1. Wrong in place, number and strength wherever eta is not 1 (Walter et
+//! al. 2009 compare it), and light where the truth is dark.
 
 use super::facet::Work;
 use super::patch::Patch;
@@ -31,7 +31,8 @@ fn first(shape: &Shape, query: &Query) -> Option<Hit> {
     shape.intersect(&ray, Side::Inside, None, f64::INFINITY)
 }
 
-/// The root without refraction, eta = 1, where w is w_L: all later crossings are hidden behind the first.
+/// The root without refraction, eta = 1, where w is w_L: all later crossings are hidden behind the
+/// first.
 pub(super) fn crossings(shape: &Shape, query: &Query, work: &mut Work, found: &mut impl FnMut(Root)) {
     work.solves += 1;
     let Some(root) = root(shape, query, work) else { return };

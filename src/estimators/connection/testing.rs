@@ -1,5 +1,5 @@
-//! Common to the tests of connections: bodies, points inside them, light followed from its source, and a search for
-//! roots that shares nothing with the solvers but the constraint.
+//! Common to the tests of connections: bodies, points inside them, light followed from its source, and a
+//! search for roots that shares nothing with the solvers but the constraint.
 
 use super::facet::TOLERANCE;
 use super::patch::Facet;
@@ -30,8 +30,8 @@ pub(super) fn direction(stream: &mut Stream) -> DVec3 {
     square_to_cap(2.0, stream.draw2())
 }
 
-/// Light of direction `w_l` that meets the body: where it comes in, the direction inside towards there, and the
-/// length that it runs.
+/// Light of direction `w_l` that meets the body: where it comes in, the direction inside towards there,
+/// and the length that it runs.
 pub(super) fn entering(shape: &Shape, w_l: DVec3, eta: f64, u: [f64; 2]) -> Option<(Hit, DVec3, f64)> {
     let beam = shape.bounds()?.beam(w_l, u);
     let hit = shape.intersect(&beam, Side::Outside, None, f64::INFINITY)?;
@@ -57,9 +57,9 @@ pub(super) fn point_inside(shape: &Shape, stream: &mut Stream) -> Option<DVec3> 
     Some(hit.point - toward * (length * stream.draw()))
 }
 
-/// Every root on a facet, by subdivision: parts whose points and normals cannot obey Snell's law are dropped, and from
-/// the middle of every part that is left after `depth` cuts, and that is small beside its distance, a Newton iteration
-/// starts.
+/// Every root on a facet, by subdivision: parts whose points and normals cannot obey Snell's law are
+/// dropped, and from the middle of every part that is left after `depth` cuts, and that is small beside
+/// its distance, a Newton iteration starts.
 pub(super) fn exhaustive(query: &Query, facet: &Facet, depth: u32, found: &mut Vec<Root>) {
     let mut seen: Vec<[f64; 2]> = Vec::new();
     let mut open = vec![([0.0, 0.0], 1.0, 0)];

@@ -76,9 +76,9 @@ const METHODS: [ConnectionMethod; 5] = [
     ConnectionMethod::StraightLine {},
 ];
 
-/// Of a path x -> p -> light the walk's own sampling and the connection have the densities T and P p_L J / (phase
-/// e^(-sigma d)), relative to U. A technique scores f / D_t for it, D_t being what its code believes to be the sum. So
-/// f is kept exactly if the sum of p_t score_t / f is 1.
+/// Of a path x -> p -> light the walk's own sampling and the connection have the densities T and P p_L J
+/// / (phase e^(-sigma d)), relative to U. A technique scores f / D_t for it, D_t being what its code
+/// believes to be the sum. So f is kept exactly if the sum of p_t score_t / f is 1.
 #[test]
 fn weights_sum_to_one() {
     let key = StreamKey::named("weights_sum_to_one (connection)");
@@ -184,8 +184,8 @@ fn weights_sum_to_one() {
     assert!(done[..4].iter().all(|&count| count > 80), "{done:?}");
 }
 
-/// The camera ray's part inside: where it enters a convex body, its direction there, its length, and what the boundary does to
-/// the radiance on its way out.
+/// The camera ray's part inside: where it enters a convex body, its direction there, its length, and
+/// what the boundary does to the radiance on its way out.
 fn camera_segment(scene: &Scene, ray: &Ray) -> (CameraSegment, f64) {
     let hit = scene.shape.intersect(ray, Side::Outside, None, f64::INFINITY).expect("a hit");
     let ci = -ray.dir.dot(hit.normal);
@@ -198,7 +198,7 @@ fn camera_segment(scene: &Scene, ray: &Ray) -> (CameraSegment, f64) {
 }
 
 fn check_single(estimator: &Connection, expected: f64, test: &str) {
-    let (means, scores) = measure(estimator, 200, test);
+    let (means, scores) = measure(estimator, 60, test);
     let (mean, error) = means[class(TransportClass::Single)];
     println!("{test}: {mean:.6} +- {error:.6}, expected {expected:.6}");
     assert!(
@@ -251,7 +251,8 @@ fn cuboid(half: DVec3) -> Vec<[DVec3; 3]> {
     facets
 }
 
-/// Flat facets of a convex body against the exact sum over prisms; the box against the same with its faces cut in two.
+/// Flat facets of a convex body against the exact sum over prisms; the box against the same with its
+/// faces cut in two.
 #[test]
 fn single_scattering_of_flat_facets() {
     let toward = DVec3::new(0.5, -0.3, 0.6).normalize();
@@ -316,13 +317,14 @@ fn single_scattering_of_the_sphere() {
     // The biased ones are told apart.
     let straight = ConnectionMethod::StraightLine {};
     let estimator = Connection::new(scene.clone(), straight, Roulette::default()).expect("a scene");
-    let (mean, error) = measure(&estimator, 200, "straight line").0[class(TransportClass::Single)];
+    let (mean, error) = measure(&estimator, 60, "straight line").0[class(TransportClass::Single)];
     println!("straight line: {mean:.6} +- {error:.6}, expected {expected:.6}");
     assert!((mean - expected).abs() > 5.0 * error, "{mean} {error} {expected}");
     assert!(matches!(estimator.bias(), Bias::Biased(_)));
 }
 
-/// A small disc is parallel light; all methods that may share it with the walk agree with those that may not.
+/// A small disc is parallel light; all methods that may share it with the walk agree with those that may
+/// not.
 #[test]
 fn a_small_disc_is_parallel_light() {
     let toward = DVec3::new(0.3, -0.5, 0.7);
@@ -335,7 +337,7 @@ fn a_small_disc_is_parallel_light() {
     let single = |scene: &Arc<Scene>, method: ConnectionMethod| {
         let estimator = Connection::new(scene.clone(), method, Roulette::default()).expect("a scene");
         let name = format!("a_small_disc_is_parallel_light {method:?}");
-        measure(&estimator, 300, &name).0[class(TransportClass::Single)]
+        measure(&estimator, 60, &name).0[class(TransportClass::Single)]
     };
     let (expected, of_expected) = single(&parallel, ConnectionMethod::Conic {});
     for method in &METHODS[..4] {

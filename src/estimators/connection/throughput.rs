@@ -1,24 +1,25 @@
-//! Light that reaches a point x inside through one point p of a smooth boundary: the constraint, its derivative, and
-//! the focusing.
+//! Light that reaches a point x inside through one point p of a smooth boundary: the constraint, its
+//! derivative, and the focusing.
 //!
-//! w is the unit direction from x to p, w_L from p to the light, N the shading normal at p, d = |p - x|. Snell's law
-//! in one vector equation: eta w - w_L is along N,
+//! w is the unit direction from x to p, w_L from p to the light, N the shading normal at p, d = |p - x|.
+//! Snell's law in one vector equation: eta w - w_L is along N,
 //!   r = (1 - N N^T)(eta w - w_L) = 0,   w . N > 0,   w_L . N > 0.
-//! It is the projected half vector of Jakob & Marschner 2012 ("Manifold exploration") without its normalisation, so
-//! that it is regular at eta = 1, too.
+//! It is the projected half vector of Jakob & Marschner 2012 ("Manifold exploration") without its
+//! normalisation, so that it is regular at eta = 1, too.
 //!
-//! Focusing. A camera ray from x along w leaves towards w_L(w) = eta w + mu N, mu = cl - eta ct, cl = w_L . N, ct =
-//! w . N. Parallel light of irradiance E from w_L is radiance E delta(w_L(w) - w_L) eta^2 T in the direction w, hence
-//! the irradiance
+//! Focusing. A camera ray from x along w leaves towards w_L(w) = eta w + mu N, mu = cl - eta ct, cl =
+//! w_L . N, ct = w . N. Parallel light of irradiance E from w_L is radiance E delta(w_L(w) - w_L) eta^2
+//! T in the direction w, hence the irradiance
 //!   E T eta^2 / J,   J = |d w_L / d w|,
-//! across the ray at x. (Walter, Zhao, Holzschuch & Bala 2009, "Single scattering in refractive media with triangle mesh
-//! boundaries", have the same for a point light.) The derivative: for u across w
+//! across the ray at x. (Walter, Zhao, Holzschuch & Bala 2009, "Single scattering in refractive media
+//! with triangle mesh boundaries", have the same for a point light.) The derivative: for u across w
 //!   dp = d (u - (u . Ng) / (w . Ng) w),    dN = change of N along dp,
 //!   dmu = -eta (mu / cl) (N . u + w . dN),  from  dcl = eta^2 ct dct / cl,
 //!   dw_L = eta u + dmu N + mu dN.
-//! This is the camera's side, which defines what an estimator of this crate measures. The light's side, by which
-//! rays spread behind the boundary, gives M = eta^2 / J times (clg ct) / (ctg cl), clg and ctg being cosines to the
-//! geometric normal Ng: 1 for true normals, else the factor by which shading normals break symmetry (Veach 1997, 5.3).
+//! This is the camera's side, which defines what an estimator of this crate measures. The light's side,
+//! by which rays spread behind the boundary, gives M = eta^2 / J times (clg ct) / (ctg cl), clg and ctg
+//! being cosines to the geometric normal Ng: 1 for true normals, else the factor by which shading
+//! normals break symmetry (Veach 1997, 5.3).
 
 use super::patch::Patch;
 use crate::geometry::FaceId;
@@ -55,7 +56,8 @@ pub(super) struct Root {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Judgement {
     Root(Root),
-    /// Snell's law holds for the shading normal, but the geometric one has the light, or x, on its other side.
+    /// Snell's law holds for the shading normal, but the geometric one has the light, or x, on its other
+    /// side.
     WrongSide,
     /// Snell's law does not hold.
     None,
@@ -85,7 +87,8 @@ impl Query {
 
     /// The Newton step in the tangent plane; `None` where the derivative is singular.
     ///
-    /// Along dp the vector eta w - w_L changes by eta (1 - w w^T) dp / d, and the tangents s, t of N by -(s . dN) N.
+    /// Along dp the vector eta w - w_L changes by eta (1 - w w^T) dp / d, and the tangents s, t of N by
+    /// -(s . dN) N.
     pub(super) fn step(&self, patch: &Patch, at: &Constraint) -> Option<DVec3> {
         let Frame { s, t, .. } = Frame::about(patch.normal);
         let [a, b] = [s, t].map(|dp| {
@@ -121,7 +124,8 @@ impl Query {
     }
 }
 
-/// J = |d w_L / d w| at the point from which a ray runs to `patch` along `dir`; see the head of the file.
+/// J = |d w_L / d w| at the point from which a ray runs to `patch` along `dir`; see the head of the
+/// file.
 pub(super) fn solid_angle_ratio(patch: &Patch, dir: DVec3, distance: f64, w_l: DVec3, eta: f64) -> f64 {
     let (n, across) = (patch.shading, Frame::about(dir));
     let (cl, ct) = (w_l.dot(n), dir.dot(n));

@@ -6,8 +6,9 @@ use super::*;
 use crate::geometry::{Ray, Shape, Side};
 use crate::reference::differences;
 
-/// Irradiance across the ray at x over that outside, without T, from the light's side: the area across w onto which the
-/// rays through a unit of the surface spread. With p on the surface, x = p - d w and w = (w_L + m N) / eta, m = eta ct
+/// Irradiance across the ray at x over that outside, without T, from the light's side: the area across w
+/// onto which the rays through a unit of the surface spread. With p on the surface, x = p - d w and w =
+/// (w_L + m N) / eta, m = eta ct
 /// - cl, dm = (cl / (eta ct) - 1) w_L . dN at fixed w_L.
 fn light_side(patch: &Patch, dir: DVec3, distance: f64, w_l: DVec3, eta: f64) -> f64 {
     let n = patch.shading;
@@ -22,7 +23,8 @@ fn light_side(patch: &Patch, dir: DVec3, distance: f64, w_l: DVec3, eta: f64) ->
     w_l.dot(patch.normal) / a.cross(b).length()
 }
 
-/// eta^2 (ctg / d^2) |dp / dw_L| at fixed x, by the implicit function of the constraint: (d r / d p) dp = -(d r / d w_L) dw_L.
+/// eta^2 (ctg / d^2) |dp / dw_L| at fixed x, by the implicit function of the constraint: (d r / d p) dp
+/// = -(d r / d w_L) dw_L.
 fn implicit(patch: &Patch, query: &Query) -> f64 {
     let at = query.constraint(patch);
     let Frame { s, t, .. } = Frame::about(patch.normal);
@@ -42,9 +44,9 @@ fn patch_at(shape: &Shape, face: FaceId, point: DVec3, normal: DVec3) -> Patch {
     Patch::at(shape, face, point, normal)
 }
 
-/// On spheres, flat and bumpy meshes with interpolated normals: form by the implicit function to 1e-9, the light's side with
-/// Veach's factor to 1e-9, and finite differences through intersection and Snell's law to 1e-7 where the ray
-/// stays on its facet.
+/// On spheres, flat and bumpy meshes with interpolated normals: form by the implicit function to 1e-9,
+/// the light's side with Veach's factor to 1e-9, and finite differences through intersection and Snell's
+/// law to 1e-7 where the ray stays on its facet.
 #[test]
 fn all_forms_agree() {
     let mut stream = stream("all_forms_agree");
@@ -78,7 +80,8 @@ fn all_forms_agree() {
                 let of_light = light_side(&patch, dir, distance, w_l, eta);
                 assert!((of_light / (m * veach) - 1.0).abs() < 1e-9, "{name} {eta}");
                 most_veach = most_veach.max((veach - 1.0).abs());
-                // Through the surface that the patch stands for: its own facet, continued, or the sphere.
+                // Through the surface that the patch stands for: its own facet, continued, or the
+                // sphere.
                 let map = |w: DVec3| -> Option<DVec3> {
                     let n = match shape {
                         Shape::Mesh(mesh) => {

@@ -1,13 +1,14 @@
 //! What a walk does at its medium vertices, and the density of a path's end under the connection.
 //!
-//! x is a medium vertex of the walk, p the boundary point after it, w the direction from x to p, w_L that from p to a
-//! light. The walk draws w with the density U = phase(w) e^(-sigma_t d) per solid angle and is refracted with the
-//! probability T. The connection draws a light with probability P and w_L with the light's density p_L (1 for
-//! parallel light), and finds all w that it refracts to, so per solid angle of w it has P p_L J, J = |d w_L / d w|.
-//! Relative to U, as walks have it, that is P p_L J / (phase e^(-sigma_t d)), and both techniques score
+//! x is a medium vertex of the walk, p the boundary point after it, w the direction from x to p, w_L
+//! that from p to a light. The walk draws w with the density U = phase(w) e^(-sigma_t d) per solid angle
+//! and is refracted with the probability T. The connection draws a light with probability P and w_L with
+//! the light's density p_L (1 for parallel light), and finds all w that it refracts to, so per solid
+//! angle of w it has P p_L J, J = |d w_L / d w|. Relative to U, as walks have it, that is P p_L J /
+//! (phase e^(-sigma_t d)), and both techniques score
 //!   throughput * T eta^2 L / (T + P p_L J / (phase e^(-sigma_t d))),
-//! the walk only where it can: not parallel light. A method that does not know whether it finds a root (`Solver::finds`) has
-//! its lights to itself: the walk's hits score 0 there.
+//! the walk only where it can: not parallel light. A method that does not know whether it finds a root
+//! (`Solver::finds`) has its lights to itself: the walk's hits score 0 there.
 
 use super::ConnectionSetup;
 use super::facet::Work;
@@ -52,7 +53,8 @@ pub(super) struct Drawn {
     pub light: usize,
     /// Radiance, or irradiance of parallel light.
     pub radiance: f64,
-    /// Probability of the light times the density of the direction; of parallel light the probability alone.
+    /// Probability of the light times the density of the direction; of parallel light the probability
+    /// alone.
     pub density: f64,
     /// Whether the walk may find it, too.
     pub is_shared: bool,
