@@ -11,6 +11,7 @@ pub mod bssrdf_probe;
 pub mod bssrdf_rays;
 mod bssrdf_single;
 mod choice;
+pub mod connection;
 mod crossing;
 mod emergence;
 mod estimator;
@@ -39,6 +40,7 @@ pub const KINDS: &[EstimatorKind] = &[
     snee::Snee::KIND,
     snee::TwoBounce::KIND,
     snee::Bidirectional::KIND,
+    connection::Connection::KIND,
     light_trace::LightTracer::KIND,
     point_cloud::PointCloud::KIND,
     bssrdf_probe::BssrdfProbe::KIND,

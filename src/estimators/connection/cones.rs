@@ -1,0 +1,117 @@
+//! A hierarchy over the triangles of a mesh, with the bounds of their points and normals: which of them
+//! may refract the light of a query.
+
+use super::bounds::Bounds;
+use super::patch::Facet;
+use super::throughput::Query;
+use crate::geometry::Mesh;
+
+/// A node: its bounds, and its facets or its second child (the first follows it).
+#[derive(Clone, Debug)]
+struct Node {
+    bounds: Bounds,
+    /// Facets `first..first + count`; of inner nodes the count is 0 and `first` the second child.
+    first: u32,
+    count: u32,
+}
+
+/// The hierarchy.
+#[derive(Clone, Debug)]
+pub(super) struct ConeTree {
+    nodes: Vec<Node>,
+    facets: Vec<(Bounds, Facet)>,
+}
+
+/// Facets of a leaf.
+const LEAF: usize = 4;
+
+impl ConeTree {
+    pub(super) fn new(mesh: &Mesh) -> ConeTree {
+        let count = mesh.triangles().len() as u32;
+        let mut facets: Vec<(Bounds, Facet)> = (0..count)
+            .map(|index| {
+                let facet = Facet::new(mesh, index);
+                (ConeTree::bounds(std::iter::once(&facet)), facet)
+            })
+            .collect();
+        let mut nodes = Vec::with_capacity(facets.len());
+        let size = mesh.bounds().radius;
+        ConeTree::build(&mut nodes, &mut facets, 0, size);
+        ConeTree { nodes, facets }
+    }
+
+    fn bounds<'a>(facets: impl Iterator<Item = &'a Facet> + Clone) -> Bounds {
+        let corners =
+            facets.clone().flat_map(|f| [f.corner, f.corner + f.edges[0], f.corner + f.edges[1]]);
+        let normals = facets.flat_map(|f| match f.shading {
+            Some((n, m)) => [n, n + m[0], n + m[1]],
+            None => [f.normal; 3],
+        });
+        Bounds::new(corners, normals)
+    }
+
+    /// Splits at the median along the direction, of place and normal together, in which facets differ
+    /// most.
+    fn build(nodes: &mut Vec<Node>, facets: &mut [(Bounds, Facet)], first: u32, size: f64) {
+        let bounds = ConeTree::bounds(facets.iter().map(|(_, facet)| facet));
+        let at = nodes.len();
+        nodes.push(Node { bounds, first, count: facets.len() as u32 });
+        if facets.len() <= LEAF {
+            return;
+        }
+        let key =
+            |b: &Bounds, axis: usize| if axis < 3 { b.center[axis] / size } else { b.axis[axis - 3] };
+        let spread = |axis: usize| {
+            let keys = facets.iter().map(|(b, _)| key(b, axis));
+            let (low, high) =
+                keys.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), k| (l.min(k), h.max(k)));
+            high - low
+        };
+        let spreads: [f64; 6] = std::array::from_fn(spread);
+        let widest = (0..6).max_by(|&i, &j| spreads[i].total_cmp(&spreads[j])).unwrap_or(0);
+        let middle = facets.len() / 2;
+        facets.select_nth_unstable_by(middle, |(a, f), (b, g)| {
+            key(a, widest).total_cmp(&key(b, widest)).then(f.index.cmp(&g.index))
+        });
+        let (left, right) = facets.split_at_mut(middle);
+        ConeTree::build(nodes, left, first, size);
+        nodes[at].first = nodes.len() as u32;
+        nodes[at].count = 0;
+        ConeTree::build(nodes, right, first + middle as u32, size);
+    }
+
+    /// Calls `visit` for every facet that may hold a root; returns how many nodes it looked at.
+    pub(super) fn visit(&self, query: &Query, mut visit: impl FnMut(&Facet)) -> u64 {
+        let mut looked = 0;
+        let mut open = Vec::with_capacity(64);
+        open.push(0u32);
+        while let Some(at) = open.pop() {
+            let node = &self.nodes[at as usize];
+            looked += 1;
+            if !node.bounds.may_hold(query) {
+                continue;
+            }
+            if node.count == 0 {
+                open.extend([node.first, at + 1]);
+                continue;
+            }
+            for (bounds, facet) in &self.facets[node.first as usize..][..node.count as usize] {
+                if bounds.may_hold(query) {
+                    visit(facet);
+                }
+            }
+        }
+        looked
+    }
+
+    /// Memory behind it, bytes.
+    pub(super) fn heap_bytes(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.facets)
+    }
+
+    /// All facets, in its order.
+    #[cfg(test)]
+    pub(super) fn facets(&self) -> impl Iterator<Item = &Facet> {
+        self.facets.iter().map(|(_, facet)| facet)
+    }
+}

@@ -1,0 +1,323 @@
+//! All points of one triangle with interpolated normals that refract the light of a query: a conic,
+//! parametrised, and one polynomial on it.
+//!
+//! With P(u, v) = p - x and N(u, v), both linear, Snell's law reads
+//!   P = k N + s w_L,    |P| = eta s,    s > 0,    sign k = sign(eta - 1),
+//! since eta P / |P| = w_L + (k / s) N is what `throughput` states. The first equation alone is the
+//! coplanarity N . (P x w_L) = 0, a conic in (u, v), which k parametrises: with a = e_0 - k m_0, b = e_1
+//! - k m_1, c = P_0 - k N_0, linear in k, it is u a + v b + c = s w_L, and by Cramer's rule
+//!   D = (a x b) . w_L,   u D = (b x c) . w_L,   v D = (c x a) . w_L,   s D = (a x b) . c.
+//! So u, v are quotients of quadratics, and the second equation becomes, with Q = D P = D P_0 + u D e_0
+//! + v D e_1,
+//!   |Q|^2 - eta^2 (s D)^2 = 0,
+//! a polynomial of degree 6 in k: a triangle has at most 6 candidates. k is bounded: k |N| = s |eta ct -
+//! cl| with s =
+//! |P| / eta and |eta ct - cl| = |eta^2 - 1| / (eta ct + cl), which falls as cl grows. On that interval the roots are
+//! isolated in Bernstein form (`polynomial`), so none is lost, and intervals whose u, v, 1 - u - v
+//! cannot all be positive are dropped at once. A Newton step on the triangle removes what rounding the
+//! polynomial has left.
+//!
+//! With one normal for the whole facet the root is closed: cl is known, hence ct, w and p.
+
+use super::bounds::Bounds;
+use super::patch::{Facet, Patch};
+use super::polynomial::{self, Coefficients};
+use super::throughput::{Judgement, Query, Root};
+use crate::geometry::FaceId;
+use crate::math::DVec3;
+
+/// Residual of Snell's law (sines) that counts as 0.
+pub(super) const TOLERANCE: f64 = 1e-9;
+
+/// How often a triangle is cut in four where its interpolated normals may vanish.
+const CUTS: u32 = 6;
+
+/// Part of the size of what is summed up that bounds the rounding of the polynomial.
+const ROUNDING: f64 = 1e-14;
+
+/// How often a part on which the conic degenerates is cut in four: at least, and at most.
+const LEAST_CUTS: u32 = 5;
+const PARTS: u32 = 30;
+
+/// Barycentric coordinates at which a Newton iteration has gone astray.
+const FAR: f64 = 10.0;
+
+/// Newton steps from the middle of a part.
+const ITERATIONS: u32 = 50;
+
+/// What the search for roots has met.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Work {
+    /// Nodes of a hierarchy that were looked at.
+    pub nodes: u64,
+    /// Triangles, or starts of a walk, that were solved for roots.
+    pub solves: u64,
+    /// Newton steps.
+    pub steps: u64,
+    /// Closest-hit queries.
+    pub rays: u64,
+    /// Roots of the shading normal that the geometric one excludes.
+    pub wrong_side: u64,
+}
+
+/// The point of a plane through `point` with this outward normal that refracts the light to x, and w:
+/// closed.
+pub(super) fn plane_root(query: &Query, point: DVec3, normal: DVec3) -> Option<DVec3> {
+    let height = (point - query.x).dot(normal);
+    let cl = query.w_l.dot(normal);
+    let eta_ct2 = (query.eta * query.eta - 1.0) + cl * cl;
+    if height <= 0.0 || cl <= 0.0 || eta_ct2 <= 0.0 {
+        return None;
+    }
+    let eta_ct = eta_ct2.sqrt();
+    // (eta w) height / (eta ct)
+    Some(query.x + (query.w_l + normal * (eta_ct - cl)) * (height / eta_ct))
+}
+
+/// Offers every root on the facet to `found`.
+pub(super) fn roots(query: &Query, facet: &Facet, work: &mut Work, found: &mut impl FnMut(Root)) {
+    work.solves += 1;
+    let Some((n, m)) = facet.shading else {
+        if let Some(point) = plane_root(query, facet.corner, facet.normal) {
+            let place = facet.place(point);
+            let patch = Patch::plane(point, FaceId(facet.index), facet.normal);
+            if facet.owns(place)
+                && let Judgement::Root(root) = query.judge(&patch, TOLERANCE)
+            {
+                found(root);
+            }
+        }
+        return;
+    };
+    let mut places = Places { query, facet, work, found, seen: Vec::new() };
+    let whole = Linear { p: facet.corner - query.x, e: facet.edges, n, m };
+    places.search(&whole, [0.0; 2], [[1.0, 0.0], [0.0, 1.0]], CUTS);
+}
+
+/// Positions, from x, and normals of a triangle or of a part of it.
+#[derive(Clone, Copy)]
+struct Linear {
+    p: DVec3,
+    e: [DVec3; 2],
+    n: DVec3,
+    m: [DVec3; 2],
+}
+
+impl Linear {
+    /// Values at the corners.
+    fn corners(base: DVec3, change: [DVec3; 2]) -> [DVec3; 3] {
+        [base, base + change[0], base + change[1]]
+    }
+
+    /// The part with the corner `at` and these sides, in this one's coordinates.
+    fn part(&self, at: [f64; 2], sides: [[f64; 2]; 2]) -> Linear {
+        let map = |change: [DVec3; 2], [u, v]: [f64; 2]| change[0] * u + change[1] * v;
+        Linear {
+            p: self.p + map(self.e, at),
+            e: sides.map(|side| map(self.e, side)),
+            n: self.n + map(self.m, at),
+            m: sides.map(|side| map(self.m, side)),
+        }
+    }
+}
+
+/// Roots of one facet, as they are found.
+struct Places<'a, F> {
+    query: &'a Query,
+    facet: &'a Facet,
+    work: &'a mut Work,
+    found: &'a mut F,
+    /// Places of the roots found so far: rounding may offer a double root twice.
+    seen: Vec<[f64; 2]>,
+}
+
+impl<F: FnMut(Root)> Places<'_, F> {
+    /// Searches a part of the facet, whose corner and sides have the coordinates `at` and `sides`.
+    fn search(&mut self, part: &Linear, at: [f64; 2], sides: [[f64; 2]; 2], cuts: u32) {
+        let Query { w_l, eta, .. } = *self.query;
+        let normals = Linear::corners(part.n, part.m);
+        let heights = normals.map(|n| n.dot(w_l));
+        let highest = heights.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        if highest <= 0.0 {
+            return;
+        }
+        // |N|^2 is at least the least product of two corners' normals.
+        let mut least = f64::INFINITY;
+        for i in 0..3 {
+            for j in i..3 {
+                least = least.min(normals[i].dot(normals[j]));
+            }
+        }
+        let is_wide = least < 0.25 * normals[0].length_squared();
+        if is_wide && cuts > 0 {
+            let map = |[u, v]: [f64; 2]| [0, 1].map(|i| at[i] + sides[0][i] * u + sides[1][i] * v);
+            for (corner, size) in
+                [([0.0, 0.0], 0.5), ([0.5, 0.0], 0.5), ([0.0, 0.5], 0.5), ([0.5, 0.5], -0.5)]
+            {
+                let steps = [[size, 0.0], [0.0, size]];
+                let finer = sides.map(|side| side.map(|s| s * size));
+                self.search(&part.part(corner, steps), map(corner), finer, cuts - 1);
+            }
+            return;
+        }
+        // Below a cosine of 1e-3 between corners' normals the triangle has no normal to speak of.
+        let shortest = least.max(1e-6).sqrt();
+        let longest = normals.into_iter().map(DVec3::length).fold(0.0, f64::max);
+        let lowest = heights.into_iter().fold(f64::INFINITY, f64::min).max(0.0);
+        let deviation = |cl: f64| {
+            let eta_ct = ((eta * eta - 1.0) + cl * cl).max(0.0).sqrt();
+            (eta * eta - 1.0).abs() / (eta_ct + cl)
+        };
+        let corners = Linear::corners(part.p, part.e);
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let radius = corners.into_iter().map(|c| c.distance(middle)).fold(0.0, f64::max);
+        let distances = [(middle.length() - radius).max(0.0), middle.length() + radius];
+        // For eta < 1 light from below the critical angle is refracted, and no other.
+        let critical = (1.0 - eta * eta).max(0.0).sqrt();
+        let cosines = [(highest / shortest).min(1.0), (lowest / longest).clamp(critical, 1.0)];
+        const PAD: f64 = 1e-6;
+        let k_least = distances[0] * deviation(cosines[0]) / (eta * longest) * (1.0 - PAD);
+        let k_most = distances[1] * deviation(cosines[1]) / (eta * shortest) * (1.0 + PAD);
+        let sign = (eta - 1.0).signum();
+        self.solve(part, at, sides, [sign * k_least, sign * k_most]);
+    }
+
+    /// Roots with k in this interval.
+    fn solve(&mut self, part: &Linear, at: [f64; 2], sides: [[f64; 2]; 2], k: [f64; 2]) {
+        let Query { w_l, eta, .. } = *self.query;
+        // Linear in k: values at the ends, which are the Bernstein coefficients.
+        let [a, b, c] = [(part.e[0], part.m[0]), (part.e[1], part.m[1]), (part.p, part.n)]
+            .map(|(e, m)| k.map(|k| e - m * k));
+        let cross = |p: [DVec3; 2], q: [DVec3; 2]| {
+            [p[0].cross(q[0]), (p[0].cross(q[1]) + p[1].cross(q[0])) * 0.5, p[1].cross(q[1])]
+        };
+        let area = cross(a, b);
+        let u = cross(b, c).map(|n| n.dot(w_l));
+        let v = cross(c, a).map(|n| n.dot(w_l));
+        let d = area.map(|n| n.dot(w_l));
+        let w: [f64; 3] = std::array::from_fn(|i| d[i] - u[i] - v[i]);
+        let s = [
+            area[0].dot(c[0]),
+            (area[0].dot(c[1]) + 2.0 * area[1].dot(c[0])) / 3.0,
+            (2.0 * area[1].dot(c[1]) + area[2].dot(c[0])) / 3.0,
+            area[2].dot(c[1]),
+        ];
+        // Raised to degree 3.
+        let raised = |c: [f64; 3]| [c[0], (c[0] + 2.0 * c[1]) / 3.0, (2.0 * c[1] + c[2]) / 3.0, c[2]];
+        let conditions = [raised(u), raised(v), raised(w), s];
+        if polynomial::excludes(&conditions) {
+            return;
+        }
+        let q: [DVec3; 3] = std::array::from_fn(|i| part.p * d[i] + part.e[0] * u[i] + part.e[1] * v[i]);
+        // |Q|^2, of degree 4.
+        let middle = (q[0].dot(q[2]) + 2.0 * q[1].length_squared()) / 3.0;
+        let square =
+            [q[0].length_squared(), q[0].dot(q[1]), middle, q[1].dot(q[2]), q[2].length_squared()];
+        let mut f: Coefficients = [0.0; polynomial::DEGREE + 1];
+        polynomial::add_product(&mut f, 1.0, &square, &[1.0]);
+        polynomial::add_product(&mut f, -eta * eta, &s, &s);
+        let size2 = |q: &[DVec3]| q.iter().map(|q| q.length_squared()).fold(0.0, f64::max);
+        let most = s.iter().fold(0.0f64, |most, s| most.max(s.abs()));
+        let noise = ROUNDING * (size2(&q) + eta * eta * most * most);
+        let mut candidates = Vec::new();
+        if polynomial::roots(&f, noise, &conditions, &mut |t| candidates.push(t)).is_err() {
+            self.subdivide(at, sides, PARTS);
+            return;
+        }
+        for t in candidates {
+            let quadratic = |c: &[f64; 3]| {
+                let r = 1.0 - t;
+                c[0] * (r * r) + c[1] * (2.0 * r * t) + c[2] * (t * t)
+            };
+            let d = quadratic(&d);
+            let place = [quadratic(&u) / d, quadratic(&v) / d];
+            // Newton's step decides what lies near an edge.
+            if place.iter().all(|c| c.is_finite() && c.abs() < 2.0) {
+                let place = [0, 1].map(|i| at[i] + sides[0][i] * place[0] + sides[1][i] * place[1]);
+                self.offer(place);
+            }
+        }
+    }
+
+    /// Searches a part on which the conic degenerates (points near an axis of symmetry of the normals)
+    /// by its bounds: it is cut in four until it is small, and beside its distance, too; then a Newton
+    /// iteration starts.
+    fn subdivide(&mut self, at: [f64; 2], sides: [[f64; 2]; 2], cuts: u32) {
+        let [p, q] = sides.map(|side| [at[0] + side[0], at[1] + side[1]]);
+        let corners = [at, p, q];
+        let normals = corners.map(|corner| self.facet.patch(corner).shading);
+        let bounds = Bounds::new(corners.map(|c| self.facet.at(c)).into_iter(), normals.into_iter());
+        if !bounds.may_hold(self.query) {
+            return;
+        }
+        let is_near = bounds.radius > 0.25 * bounds.center.distance(self.query.x);
+        if cuts > 0 && (is_near || cuts > PARTS - LEAST_CUTS) {
+            let half = sides.map(|side| side.map(|s| 0.5 * s));
+            let along = |i: usize| [at[0] + half[i][0], at[1] + half[i][1]];
+            let opposite = [along(0)[0] + half[1][0], along(0)[1] + half[1][1]];
+            let turned = half.map(|side| side.map(|s| -s));
+            for (corner, sides) in [(at, half), (along(0), half), (along(1), half), (opposite, turned)] {
+                self.subdivide(corner, sides, cuts - 1);
+            }
+            return;
+        }
+        let mut place = [0, 1].map(|i| at[i] + (sides[0][i] + sides[1][i]) / 3.0);
+        for _ in 0..ITERATIONS {
+            self.work.steps += 1;
+            let patch = self.facet.patch(place);
+            let Some(step) = self.query.step(&patch, &self.query.constraint(&patch)) else { return };
+            let next = self.facet.place(patch.point + step);
+            let moved = (0..2).map(|i| (next[i] - place[i]).abs()).fold(0.0, f64::max);
+            place = next;
+            if moved < 1e-10 {
+                break;
+            }
+            if !place.iter().all(|c| c.abs() < FAR) {
+                return;
+            }
+        }
+        self.offer(place);
+    }
+
+    /// Offers a place where a root is to rounding.
+    fn offer(&mut self, place: [f64; 2]) {
+        let place = polish(self.query, self.facet, place);
+        let is_seen = |other: &[f64; 2]| (0..2).all(|i| (place[i] - other[i]).abs() < 1e-10);
+        if !self.facet.owns(place) || self.seen.iter().any(is_seen) {
+            return;
+        }
+        match self.query.judge(&self.facet.patch(place), TOLERANCE) {
+            Judgement::Root(root) => {
+                self.seen.push(place);
+                (self.found)(root);
+            }
+            Judgement::WrongSide => {
+                self.seen.push(place);
+                self.work.wrong_side += 1;
+            }
+            Judgement::None => {}
+        }
+    }
+}
+
+/// Newton's steps from a place close to a root, as long as they are small and make the residual smaller.
+pub(super) fn polish(query: &Query, facet: &Facet, place: [f64; 2]) -> [f64; 2] {
+    const NEAR: f64 = 1e-3;
+    let mut best = place;
+    let mut patch = facet.patch(best);
+    let mut at = query.constraint(&patch);
+    for _ in 0..4 {
+        let Some(step) = query.step(&patch, &at) else { return best };
+        let next = facet.place(patch.point + step);
+        if (0..2).any(|i| (next[i] - place[i]).abs() > NEAR) {
+            return best;
+        }
+        let next_patch = facet.patch(next);
+        let next_at = query.constraint(&next_patch);
+        if next_at.residual.length() >= at.residual.length() {
+            return best;
+        }
+        (best, patch, at) = (next, next_patch, next_at);
+    }
+    best
+}

@@ -1,0 +1,215 @@
+//! Connections through a smooth boundary: at every medium vertex x of a camera walk, the boundary points
+//! p at which light from a chosen light is refracted to x.
+//!
+//! A root p obeys Snell's law for w = unit(p - x) and the direction w_L to the light; what it
+//! contributes is in `throughput`, its weight against the walk's own sampling in `vertex`. A root counts
+//! where p is the first boundary point that x sees along w, and nothing is between p and the light.
+//! Methods differ in which roots they find:
+//!
+//! | method | roots | parallel light | disc of directions |
+//! |---|---|---|---|
+//! | `conic` | all | unbiased | unbiased, MIS with the walk |
+//! | `newton` | one a triangle at most | biased on interpolated normals | unbiased, MIS with the walk |
+//! | `mnee` | one at most | biased: light is missing | unbiased, MIS with the walk |
+//! | `sms` | one, weighted | unbiased | unbiased, alone |
+//! | `straight_line` | one that is none | biased | biased, alone |
+//!
+//! Lights that are not concentrated (environments) are left to the walk.
+//!
+//! What the connection finds are paths whose light is refracted once, at the last boundary point before
+//! it meets the last medium vertex: whatever the camera's part of the path does. In the record's
+//! classes:
+//!
+//! | light reaches the last medium vertex | class by the camera's part | found |
+//! |---|---|---|
+//! | by one refraction, one vertex | `single`; `single_internal` after reflections on the camera's side | yes |
+//! | by one refraction, more vertices | `multiple`; `multiple_internal` after reflections on the camera's side | yes |
+//! | by a refraction and internal reflections | `single_internal`, `multiple_internal` | from a disc, by the walk; parallel light: no |
+//! | through another part of a body that is not convex | any of the four | from a disc, by the walk; parallel light: no |
+//!
+//! So under parallel light `single` and `multiple` are complete on convex bodies. `single_internal` and
+//! `multiple_internal` lack what is reflected inside on the light's side; a record does not tell it from
+//! what is reflected on the camera's side, so there `light_trace` has more. On the path to the sensor
+//! a body is entered and left any number of times.
+
+mod bounds;
+mod cones;
+mod conic;
+mod facet;
+mod manifold;
+mod method;
+mod newton;
+mod patch;
+mod polynomial;
+mod straight_line;
+mod throughput;
+mod vertex;
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::bands::OneBand;
+use super::walk::{CameraWalk, Field, Path, Unrivalled};
+use super::{Bias, BoundaryKind, Estimator, EstimatorKind, Roulette, Scores, Serves, read_options};
+use crate::error::Result;
+use crate::geometry::Shape;
+use crate::sampling::stream::{PassKey, Purpose};
+use crate::scene::{Emission, Light, Scene};
+
+use method::Solver;
+use vertex::Connected;
+
+pub use method::ConnectionMethod;
+
+/// Options of `connection`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ConnectionOptions {
+    /// How a vertex is connected to a light through the boundary.
+    #[serde(default = "complete")]
+    pub method: ConnectionMethod,
+    /// When a path is ended by chance; both ways are unbiased.
+    #[serde(default)]
+    pub roulette: Roulette,
+}
+
+fn complete() -> ConnectionMethod {
+    ConnectionMethod::Conic {}
+}
+
+/// Least concentration 4 pi int L^2 / (int L)^2 of a light that is connected to, 2 / height of a cap:
+/// 0.4 pi sr.
+const LEAST_CONCENTRATION: f64 = 10.0;
+
+/// What connections share.
+#[derive(Debug)]
+struct ConnectionSetup {
+    solver: Solver,
+    /// Per band: probability of choosing each light; 0 for those that are left to the walk.
+    shares: Vec<Vec<f64>>,
+    /// Whether the method knows the density of what it finds.
+    is_density_known: bool,
+}
+
+/// The estimator, for one scene.
+#[derive(Debug)]
+pub struct Connection {
+    field: Field,
+    method: ConnectionMethod,
+    setup: ConnectionSetup,
+}
+
+impl Connection {
+    /// `connection` in experiment files.
+    pub const KIND: EstimatorKind = EstimatorKind {
+        kind: "connection",
+        doc: "path tracing with connections to lights through a smooth boundary, by five methods; conic and sms are unbiased",
+        serves: Serves {
+            boundaries: &[BoundaryKind::Smooth],
+            emission: true,
+            ..Serves::WITHOUT_ENTRIES
+        },
+        options_schema: || schemars::schema_for!(ConnectionOptions),
+        build: |options, scene| {
+            let ConnectionOptions { method, roulette } = read_options(options)?;
+            Ok(Box::new(Connection::new(scene, method, roulette)?))
+        },
+    };
+
+    /// For a scene.
+    ///
+    /// # Errors
+    /// A scene that it does not serve.
+    pub fn new(scene: Arc<Scene>, method: ConnectionMethod, roulette: Roulette) -> Result<Connection> {
+        Connection::KIND.check(&scene)?;
+        let shares = (0..scene.bands()).map(|band| shares(&scene.lights, band)).collect();
+        let is_density_known =
+            !matches!(method, ConnectionMethod::Sms {} | ConnectionMethod::StraightLine {});
+        let setup =
+            ConnectionSetup { solver: Solver::new(method, &scene.shape), shares, is_density_known };
+        Ok(Connection { field: Field::new(scene, roulette), method, setup })
+    }
+
+    fn has_parallel_light(&self) -> bool {
+        self.field.scene.lights.iter().any(Light::is_directional)
+    }
+}
+
+fn is_connected(light: &Light) -> bool {
+    match &light.emission {
+        Emission::Directional { .. } => true,
+        Emission::Cap { height, .. } => 2.0 / height >= LEAST_CONCENTRATION,
+        Emission::Map(_) => false,
+    }
+}
+
+/// Probability of choosing each light that is connected to, in proportion to its strength.
+fn shares(lights: &[Light], band: usize) -> Vec<f64> {
+    let strength = |light: &Light| if is_connected(light) { light.strength(band) } else { 0.0 };
+    let total: f64 = lights.iter().map(strength).sum();
+    lights.iter().map(|light| if total > 0.0 { strength(light) / total } else { 0.0 }).collect()
+}
+
+impl Estimator for Connection {
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        for &band in bands {
+            let is_called = self.setup.shares[band].iter().any(|share| *share > 0.0);
+            for index in 0..self.field.scene.sensor.rays_per_pass() {
+                let path = Path { field: &self.field, band, index, key };
+                if is_called {
+                    let stream = key.stream(index as u64, Purpose::Connection);
+                    CameraWalk::trace(path, scores, Connected::new(&self.setup, stream), OneBand);
+                } else {
+                    CameraWalk::trace(path, scores, Unrivalled, OneBand);
+                }
+            }
+        }
+    }
+
+    fn bias(&self) -> Bias {
+        let scene = &self.field.scene;
+        let is_parallel = self.has_parallel_light();
+        let interpolated = matches!(&*scene.shape, Shape::Mesh(mesh) if mesh.normals().is_some());
+        match self.method {
+            ConnectionMethod::StraightLine {} => {
+                Bias::Biased("light goes straight through the boundary, which refracts it".into())
+            }
+            ConnectionMethod::Mnee {} if is_parallel => Bias::Biased(
+                "manifold next-event estimation finds one boundary point at most for a vertex; parallel light by all \
+                 others is missing"
+                    .into(),
+            ),
+            ConnectionMethod::Newton {} if is_parallel && interpolated => Bias::Biased(
+                "one Newton iteration a triangle may lose boundary points where normals are interpolated; \
+                 parallel light that comes through them is missing"
+                    .into(),
+            ),
+            _ => Bias::Unbiased,
+        }
+    }
+
+    fn working_bytes(&self) -> usize {
+        self.setup.solver.heap_bytes()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let lights = self.field.scene.lights.iter().filter(|light| light.is_directional());
+        lights
+            .map(|light| {
+                format!(
+                    "of directional light `{}`, what is reflected inside before its last scattering event, what goes through \
+                     another part of a body that is not convex before, and what is not scattered are excluded from this \
+                     estimator's result",
+                    light.name
+                )
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
