@@ -37,6 +37,7 @@ pub use walk::Roulette;
 pub const KINDS: &[EstimatorKind] = &[
     path::PathTracer::KIND,
     snee::Snee::KIND,
+    snee::Snee::CONNECT_KIND,
     snee::TwoBounce::KIND,
     snee::Bidirectional::KIND,
     connection::Connection::KIND,

@@ -18,6 +18,8 @@ pub(super) fn root(shape: &Shape, query: &Query) -> Option<Root> {
     (cl > 0.0).then(|| Root {
         point: hit.point,
         face: hit.face,
+        normal: hit.normal,
+        shading: hit.shading_normal,
         dir,
         distance: hit.t,
         ratio: eta * eta,
