@@ -48,13 +48,16 @@ fn measure(scene: &Arc<Scene>, estimator: &dyn Estimator, passes: u64, test: &st
     moments.into_iter().map(|(mean, m2)| (mean, (m2 / (n * (n - 1.0))).sqrt())).collect()
 }
 
-/// Four standard errors, which may be at most 3 % of the mean.
+/// Four standard errors, which may be at most 3 % of the mean; 10 % of the small classes with an internal reflection.
 fn agree(name: &str, class: TransportClass, [a, b]: [&[(f64, f64)]; 2]) {
     let [(a, of_a), (b, of_b)] = [a, b].map(|all| all[1 + class as usize]);
     println!("{name}, {class:?}: {a:.5} +- {of_a:.5}, {b:.5} +- {of_b:.5}");
     let error = (of_a * of_a + of_b * of_b).sqrt();
     assert!((a - b).abs() < 4.0 * error, "{name}, {class:?}: {a} +- {of_a}, {b} +- {of_b}");
-    assert!(error < 0.03 * b, "{name}, {class:?}: the error {error} of {b} is too large to tell");
+    let is_internal =
+        matches!(class, TransportClass::SingleInternal | TransportClass::MultipleInternal);
+    let most = if is_internal { 0.1 } else { 0.03 };
+    assert!(error < most * b, "{name}, {class:?}: the error {error} of {b} is too large to tell");
 }
 
 fn joined(scene: &Arc<Scene>, preset: SneePreset) -> Snee {
@@ -103,7 +106,7 @@ fn bodies_that_are_not_convex_agree() {
         for lamp in [Lamp::Sun, Lamp::WideDisc] {
             let scene = flux(shape.clone(), medium(2.0, 0.9, 0.8), lamp);
             let test = format!("bodies_that_are_not_convex_agree, {name}, {lamp:?}");
-            let own = measure(&scene, &joined(&scene, SneePreset::Guided), 300, &test);
+            let own = measure(&scene, &joined(&scene, SneePreset::Guided), 600, &test);
             let other: Box<dyn Estimator> = if lamp == Lamp::Sun {
                 let conic =
                     Connection::new(scene.clone(), ConnectionMethod::Conic {}, Roulette::default());
@@ -111,7 +114,7 @@ fn bodies_that_are_not_convex_agree() {
             } else {
                 Box::new(PathTracer::new(scene.clone(), Roulette::default()).expect("a scene for it"))
             };
-            let passes = if lamp == Lamp::Sun { 300 } else { 3000 };
+            let passes = if lamp == Lamp::Sun { 600 } else { 4000 };
             let other = measure(&scene, &*other, passes, &format!("{test}, other"));
             for class in SCATTERED {
                 agree(&test, class, [&own, &other]);
@@ -120,16 +123,16 @@ fn bodies_that_are_not_convex_agree() {
     }
 }
 
-/// Of two segments from vertices all over the sphere, class C: at equal samples the second moment of both parts together
-/// is at most half that of either.
+/// Of two segments from vertices all over the sphere both parts together have, at equal samples, at most half the variance
+/// of either, and the same mean.
 ///
-/// Per vertex E[X^2], and I^2 by the mean of all samples; the sums over vertices are compared, so that vertices weigh by what
-/// they contribute.
+/// Per vertex E[X^2] - I^2, I by all samples; the sums over vertices are compared, so that vertices weigh by what they
+/// contribute. (The second moment of the connection alone does not exist: what is printed of it is a lower bound.)
 #[test]
-fn together_the_parts_have_less_than_half_the_second_moment() {
+fn together_the_parts_have_less_than_half_the_variance() {
     const VERTICES: usize = 400;
     const PATHS: u64 = 2000;
-    let key = StreamKey::named("less_than_half_the_second_moment");
+    let key = StreamKey::named("less_than_half_the_variance");
     let mut stream = key.pass(0).stream(0, Purpose::Sensor);
     let guided = SneePreset::Guided.options();
     let options = |top_to_bottom: bool, connection: bool| SneeOptions {
@@ -182,6 +185,12 @@ fn together_the_parts_have_less_than_half_the_second_moment() {
             largest / (second * PATHS as f64)
         );
     }
-    let [[_, of_subdivision, _], [_, of_connection, _], [_, of_both, _]] = sums;
+    let variances = sums.map(|[_, second, _]| second - squares);
+    println!("relative variances {:?}", variances.map(|variance| variance / squares));
+    let [of_subdivision, of_connection, of_both] = variances;
     assert!(of_both <= 0.5 * of_subdivision.min(of_connection), "{sums:?}");
+    for part in 0..2 {
+        let error = ((variances[part] + of_both) / PATHS as f64).sqrt();
+        assert!((sums[part][0] - sums[2][0]).abs() < 4.0 * error, "{part}: {sums:?}, {error}");
+    }
 }

@@ -148,7 +148,7 @@ fn weights_with_connections_sum_to_one() {
         &[Lamp::Disc, Lamp::WideDisc],
         &[Lamp::WideDisc, Lamp::Sun, Lamp::Disc],
     ];
-    // How often a technique has more than a thousandth of the weight: by what is before x_j, hidden or seen.
+    // How often a technique takes part: by what is before x_j, and whether x_i sees x_k.
     let mut seen = [[0u32; 5]; 4];
     for (name, shape) in bodies() {
         for (which, options) in options() {
@@ -171,8 +171,9 @@ fn weights_with_connections_sum_to_one() {
                     let reference = [true, false].map(|from_above| end(from_above, lamp));
                     let is_parallel = lamp == Lamp::Sun;
                     let mut done = 0;
-                    while done < 6 {
-                        let Some(path) = FixedPath::draw(&scene, light, &mut stream, done % 2 == 1)
+                    while done < 12 {
+                        // Of paths to points that another vertex sees x_i sees most.
+                        let Some(path) = FixedPath::draw(&scene, light, &mut stream, done % 4 > 0)
                         else {
                             continue;
                         };
@@ -237,7 +238,7 @@ fn weights_with_connections_sum_to_one() {
                             for (t, share) in shares.into_iter().enumerate() {
                                 let weight = share * densities[t] * by[t] / f;
                                 sum += weight;
-                                seen[row][t] += u32::from(weight > 1e-3);
+                                seen[row][t] += u32::from(weight > 0.0);
                             }
                             assert!(
                                 (sum - 1.0).abs() < 1e-12,
@@ -314,7 +315,7 @@ fn connections_are_as_dense_as_they_state() {
             let measured = 0.7 * exp(-0.2 * 3.0 * depth) * choice / (a * d - b * c).abs();
             let mut scores = Scores::new(Layout::new(&scene));
             let pass = key.pass(1);
-            let mut walk = led(&snee, &pass, &mut scores, &path, Before::Nothing, |_| {});
+            let walk = led(&snee, &pass, &mut scores, &path, Before::Nothing, |_| {});
             let Root { point, face, normal, shading, dir, distance, .. } = root;
             let hit = Hit { t: distance, point, normal, shading_normal: shading, face };
             let frame = Frame::about(shading);
@@ -327,7 +328,6 @@ fn connections_are_as_dense_as_they_state() {
                 * transmittance(3.0, distance)
                 * dir.dot(normal)
                 / (distance * distance);
-            walk.scores.clear();
             let stated = over * walked;
             assert!(
                 (measured / stated - 1.0).abs() < 1e-5,
