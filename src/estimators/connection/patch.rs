@@ -44,12 +44,7 @@ impl Patch {
     }
 
     /// About a point of a body, as intersection reports it.
-    pub(in crate::estimators) fn at(
-        shape: &Shape,
-        face: FaceId,
-        point: DVec3,
-        normal: DVec3,
-    ) -> Patch {
+    pub(in crate::estimators) fn at(shape: &Shape, face: FaceId, point: DVec3, normal: DVec3) -> Patch {
         match shape {
             Shape::Sphere { radius } => Patch::sphere(*radius, normal),
             Shape::Mesh(mesh) => {

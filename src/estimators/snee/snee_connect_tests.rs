@@ -54,8 +54,7 @@ fn agree(name: &str, class: TransportClass, [a, b]: [&[(f64, f64)]; 2]) {
     println!("{name}, {class:?}: {a:.5} +- {of_a:.5}, {b:.5} +- {of_b:.5}");
     let error = (of_a * of_a + of_b * of_b).sqrt();
     assert!((a - b).abs() < 4.0 * error, "{name}, {class:?}: {a} +- {of_a}, {b} +- {of_b}");
-    let is_internal =
-        matches!(class, TransportClass::SingleInternal | TransportClass::MultipleInternal);
+    let is_internal = matches!(class, TransportClass::SingleInternal | TransportClass::MultipleInternal);
     let most = if is_internal { 0.1 } else { 0.03 };
     assert!(error < most * b, "{name}, {class:?}: the error {error} of {b} is too large to tell");
 }

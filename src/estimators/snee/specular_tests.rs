@@ -10,6 +10,7 @@ use super::subdivision::{self, Subdivided};
 use super::testing::*;
 use super::*;
 use crate::estimators::Layout;
+use crate::estimators::bands::WalkBands;
 use crate::estimators::connection::{Query, Root, Work};
 use crate::estimators::walk::{Rivals, WalkExit};
 use crate::geometry::{Hit, Shape, procedural};
@@ -33,7 +34,7 @@ enum Before {
     Reflection,
 }
 
-type Walk<'a> = CameraWalk<'a, Connections<'a>, OneBand>;
+type Walk<'a, B> = CameraWalk<'a, Connections<'a>, B>;
 
 /// Everything together, with two shares of probes; the kind's defaults; connections alone.
 fn options() -> [(&'static str, SneeOptions); 4] {
@@ -71,18 +72,17 @@ fn bodies() -> [(&'static str, Arc<Shape>); 4] {
 }
 
 /// Leads a new walk to x_j; `stop` is called where it stands at x_i, if that is a medium vertex of the end.
-fn led<'a>(
-    snee: &'a Snee,
-    key: &'a PassKey,
+fn led<'a, B: WalkBands>(
+    (snee, key, hero, bands): (&'a Snee, &'a PassKey, usize, B),
     scores: &'a mut Scores,
     path: &FixedPath,
     before: Before,
-    mut stop: impl FnMut(&mut Walk<'a>),
-) -> Walk<'a> {
-    let on = Path { field: &snee.field, band: 0, index: 0, key };
+    mut stop: impl FnMut(&mut Walk<'a, B>),
+) -> Walk<'a, B> {
+    let on = Path { field: &snee.field, band: hero, index: 0, key };
     let start = if before == Before::Nothing { path.x_i } else { path.start };
     let connections = Connections::new(&snee.setups[0], key.stream(0, Purpose::Connection));
-    let mut walk = CameraWalk::led(on, scores, connections, OneBand, start);
+    let mut walk = CameraWalk::led(on, scores, connections, bands, start);
     if before != Before::Nothing {
         walk.lead_to(path.x_i, false);
     }
@@ -96,7 +96,7 @@ fn led<'a>(
 }
 
 /// The root of a path's light that is its x_k, as the technique hands it over.
-fn connected<'a>(walk: &mut Walk<'a>, path: &FixedPath) -> GuidedEnd<'a> {
+fn connected<'a, B: WalkBands>(walk: &mut Walk<'a, B>, path: &FixedPath) -> GuidedEnd<'a> {
     let setup = walk.rivals.setup;
     let guide = setup.guides.iter().find(|guide| guide.light == path.light).expect("a guide");
     let x = walk.rivals.vertex(Slot::Latest).point;
@@ -117,7 +117,7 @@ fn alone(snee: &[Snee; 2], path: &FixedPath, before: Before, end: &GuidedEnd<'_>
     let mut densities = [0.0; 5];
     for (from_above, snee) in [(true, &snee[0]), (false, &snee[1])] {
         let mut scores = Scores::new(Layout::new(&snee.field.scene));
-        let mut walk = led(snee, &key, &mut scores, path, before, |_| {});
+        let mut walk = led((snee, &key, 0, OneBand), &mut scores, path, before, |_| {});
         let GuidedEnd { exit, leg, w_l, .. } = end;
         let guide = &walk.rivals.setup.guides[0];
         let keep = walk.rivals.unidirectional();
@@ -181,7 +181,8 @@ fn weights_with_connections_sum_to_one() {
                         for before in [Before::Nothing, Before::Vertex, Before::Reflection] {
                             let pass = key.pass(1);
                             let mut scores = Scores::new(Layout::new(&scene));
-                            let mut scout = led(&snee, &pass, &mut scores, &path, before, |_| {});
+                            let mut scout =
+                                led((&snee, &pass, 0, OneBand), &mut scores, &path, before, |_| {});
                             let end = connected(&mut scout, &path);
                             let [x_i, x_j] =
                                 [Slot::Previous, Slot::Latest].map(|s| scout.rivals.vertex(s).point);
@@ -199,23 +200,24 @@ fn weights_with_connections_sum_to_one() {
                             let mut by = [0.0; 5];
                             let mut scores = Scores::new(Layout::new(&scene));
                             let strategies = options.strategies;
-                            let mut walk = led(&snee, &pass, &mut scores, &path, before, |walk| {
-                                if !sees {
-                                    return;
-                                }
-                                let middle = Middle::new(x_i, x_j, &exit.hit).expect("from inside");
-                                let radiance = Some(path.radiance);
-                                let found = Subdivided { guide, x_j, middle, exit, w_l, radiance };
-                                for (t, takes_part) in
-                                    [(1, strategies.top_to_bottom), (2, strategies.bottom_to_top)]
-                                {
-                                    if takes_part {
-                                        walk.scores.clear();
-                                        score_subdivided(walk, &found);
-                                        by[t] = walk.scores.observables[observed];
+                            let mut walk =
+                                led((&snee, &pass, 0, OneBand), &mut scores, &path, before, |walk| {
+                                    if !sees {
+                                        return;
                                     }
-                                }
-                            });
+                                    let middle = Middle::new(x_i, x_j, &exit.hit).expect("from inside");
+                                    let radiance = Some(path.radiance);
+                                    let found = Subdivided { guide, x_j, middle, exit, w_l, radiance };
+                                    for (t, takes_part) in
+                                        [(1, strategies.top_to_bottom), (2, strategies.bottom_to_top)]
+                                    {
+                                        if takes_part {
+                                            walk.scores.clear();
+                                            score_subdivided(walk, &found);
+                                            by[t] = walk.scores.observables[observed];
+                                        }
+                                    }
+                                });
                             walk.scores.clear();
                             score_guided(&mut walk, &end);
                             // One score for both: whichever technique has drawn the end.
@@ -264,7 +266,7 @@ fn weights_with_connections_sum_to_one() {
 fn drawn(snee: &Snee, at: &FixedPath, numbers: &[f64]) -> Option<(usize, DVec3, Vec<Root>)> {
     let key = StreamKey::named("drawn").pass(0);
     let mut scores = Scores::new(Layout::new(&snee.field.scene));
-    let mut walk = led(snee, &key, &mut scores, at, Before::Nothing, |_| {});
+    let mut walk = led((snee, &key, 0, OneBand), &mut scores, at, Before::Nothing, |_| {});
     walk.rivals.stream = Stream::scripted(numbers);
     let technique = walk.rivals.setup.specular.as_ref().expect("takes part");
     let LitVertex { guide, w_l, roots, .. } = specular::draw(&mut walk, technique)?;
@@ -315,7 +317,7 @@ fn connections_are_as_dense_as_they_state() {
             let measured = 0.7 * exp(-0.2 * 3.0 * depth) * choice / (a * d - b * c).abs();
             let mut scores = Scores::new(Layout::new(&scene));
             let pass = key.pass(1);
-            let walk = led(&snee, &pass, &mut scores, &path, Before::Nothing, |_| {});
+            let walk = led((&snee, &pass, 0, OneBand), &mut scores, &path, Before::Nothing, |_| {});
             let Root { point, face, normal, shading, dir, distance, .. } = root;
             let hit = Hit { t: distance, point, normal, shading_normal: shading, face };
             let frame = Frame::about(shading);
@@ -377,16 +379,21 @@ fn subdivision_bounds_the_weights_at_a_caustic() {
             light: 0,
         };
         let full = |top_to_bottom: bool, connection: bool| {
-            let strategies =
-                Strategies { bsdf: true, light: true, top_to_bottom, bottom_to_top: false };
+            let strategies = Strategies { bsdf: true, light: true, top_to_bottom, bottom_to_top: false };
             let call = Call { most: 1.0, decay: 0.0 };
             let connection = connection.then_some(ConnectionCall { most: 1.0, decay: 0.0 });
             let guided = SneePreset::Guided.options();
-            let options =
-                SneeOptions { strategies, call, call_alone: call, connection, last_vertex: None, ..guided };
+            let options = SneeOptions {
+                strategies,
+                call,
+                call_alone: call,
+                connection,
+                last_vertex: None,
+                ..guided
+            };
             let snee = Snee::new(scene.clone(), options).expect("a scene for it");
             let mut scores = Scores::new(Layout::new(&scene));
-            let mut walk = led(&snee, &key, &mut scores, &path, Before::Vertex, |_| {});
+            let mut walk = led((&snee, &key, 0, OneBand), &mut scores, &path, Before::Vertex, |_| {});
             walk.scores.clear();
             let guide = &walk.rivals.setup.guides[0];
             let (leg, radiance) = (Leg { dir: w, length: distance }, Some(irradiance[0]));
@@ -401,7 +408,66 @@ fn subdivision_bounds_the_weights_at_a_caustic() {
         let near = scores_at(off);
         println!("{off:e}: top to bottom, connection, both score {near:?}");
         assert!(near[CONNECTION] > 50.0 * last[CONNECTION], "{off}: {near:?}");
-        assert!(near[BOTH] <= near[TOP_TO_BOTTOM] && near[BOTH] < 2.0 * far[TOP_TO_BOTTOM], "{off}: {near:?}");
+        assert!(
+            near[BOTH] <= near[TOP_TO_BOTTOM] && near[BOTH] < 2.0 * far[TOP_TO_BOTTOM],
+            "{off}: {near:?}"
+        );
         last = near;
+    }
+}
+
+/// Of a walk that bands share, an end scores the same in each band, whichever technique makes it and whichever band has
+/// steered the walk.
+#[test]
+fn shared_walks_score_connections_alike() {
+    let name = "shared_walks_score_connections_alike";
+    let pass = StreamKey::named(name).pass(0);
+    let mut stream = StreamKey::named(name).pass(1).stream(0, Purpose::Sensor);
+    let media = [medium(3.0, 0.95, 0.2), medium(4.0, 0.9, 0.5), medium(6.0, 0.7, 0.0)];
+    let [.., (_, everything), _] = options();
+    let scene = body(&sphere(), SMOOTH, &media, &[Lamp::WideDisc, Lamp::Sun]);
+    let shared = SneeOptions { share_bands: true, ..everything };
+    let snee = Snee::connected(scene.clone(), shared).expect("a scene for it");
+    let mut done = 0;
+    while done < 10 {
+        let Some(path) = FixedPath::draw(&scene, done % 2, &mut stream, false) else { continue };
+        done += 1;
+        for before in [Before::Nothing, Before::Vertex, Before::Reflection] {
+            let mut of_bands = [const { Vec::<f64>::new() }; 3];
+            for hero in 0..media.len() {
+                let on = || (&snee, &pass, hero, SharedBands::new(&media, hero));
+                let mut scores = Scores::new(Layout::new(&scene));
+                let mut scout = led(on(), &mut scores, &path, before, |_| {});
+                let end = connected(&mut scout, &path);
+                let [x_i, x_j] = [Slot::Previous, Slot::Latest].map(|s| scout.rivals.vertex(s).point);
+                let GuidedEnd { guide, exit, w_l, .. } = end;
+                let mut keep = |walk: &Walk<'_, SharedBands>| {
+                    for (band, kept) in of_bands.iter_mut().enumerate() {
+                        kept.push(walk.scores.observables[band]);
+                    }
+                };
+                let mut scores = Scores::new(Layout::new(&scene));
+                let mut walk = led(on(), &mut scores, &path, before, |walk| {
+                    let middle = Middle::new(x_i, x_j, &exit.hit).expect("from inside");
+                    let radiance = Some(path.radiance);
+                    walk.scores.clear();
+                    score_subdivided(walk, &Subdivided { guide, x_j, middle, exit, w_l, radiance });
+                    keep(walk);
+                });
+                walk.scores.clear();
+                score_guided(&mut walk, &end);
+                keep(&walk);
+                walk.lead_out(&exit);
+                if path.light == 0 {
+                    walk.scores.clear();
+                    walk.score_own_sample(w_l);
+                    keep(&walk);
+                }
+            }
+            for scores in of_bands {
+                let is_alike = |score: &f64| (score / scores[0] - 1.0).abs() < 1e-12;
+                assert!(scores.iter().all(is_alike), "light {}, {before:?}: {scores:?}", path.light);
+            }
+        }
     }
 }
