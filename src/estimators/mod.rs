@@ -38,6 +38,7 @@ pub use serves::{Bodies, BoundaryKind, Sensors, Serves};
 pub const KINDS: &[EstimatorKind] = &[
     path::PathTracer::KIND,
     snee::Snee::KIND,
+    snee::Snee::CONNECT_KIND,
     snee::TwoBounce::KIND,
     snee::Bidirectional::KIND,
     connection::Connection::KIND,

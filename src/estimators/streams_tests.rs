@@ -44,6 +44,7 @@ fn no_stream_is_opened_twice() {
         ("snee", json!({ "preset": "guided" }), &probe),
         ("snee", json!({ "preset": "paper" }), &probe),
         ("snee", json!({ "bands": "shared" }), &probe),
+        ("snee_connect", json!({}), &probe),
         ("bidirectional", json!({}), &probe),
         ("light_trace", json!({}), &flux),
         ("point_cloud", json!({ "model": model, "samples": 16 }), &probe),

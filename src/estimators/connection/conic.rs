@@ -21,17 +21,22 @@ use crate::math::DVec3;
 
 /// The solver, for one body.
 #[derive(Clone, Debug)]
-pub(super) struct Conic {
+pub(in crate::estimators) struct Conic {
     tree: Option<ConeTree>,
 }
 
 impl Conic {
-    pub(super) fn new(shape: &Shape) -> Conic {
+    pub(in crate::estimators) fn new(shape: &Shape) -> Conic {
         let tree = match shape {
             Shape::Mesh(mesh) => Some(ConeTree::new(mesh)),
             _ => None,
         };
         Conic { tree }
+    }
+
+    /// Memory behind it, bytes.
+    pub(in crate::estimators) fn heap_bytes(&self) -> usize {
+        self.tree.as_ref().map_or(0, ConeTree::heap_bytes)
     }
 
     /// The hierarchy of a mesh.
@@ -40,7 +45,7 @@ impl Conic {
     }
 
     /// Offers every root to `found`, hidden ones included.
-    pub(super) fn roots(
+    pub(in crate::estimators) fn roots(
         &self,
         shape: &Shape,
         query: &Query,

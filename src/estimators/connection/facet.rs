@@ -47,7 +47,7 @@ const ITERATIONS: u32 = 50;
 
 /// What the search for roots has met.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Work {
+pub(in crate::estimators) struct Work {
     /// Nodes of a hierarchy that were looked at.
     pub nodes: u64,
     /// Triangles, or starts of a walk, that were solved for roots.

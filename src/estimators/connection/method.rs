@@ -94,6 +94,6 @@ impl Solver {
 
     /// Memory behind it, bytes.
     pub(super) fn heap_bytes(&self) -> usize {
-        self.conic.tree().map_or(0, |tree| tree.heap_bytes())
+        self.conic.heap_bytes()
     }
 }

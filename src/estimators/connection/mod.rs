@@ -63,6 +63,12 @@ use vertex::Connected;
 
 pub use method::ConnectionMethod;
 
+// The complete solver, for estimators that weight its connections against other techniques.
+pub(super) use conic::Conic;
+pub(super) use facet::Work;
+pub(super) use patch::Patch;
+pub(super) use throughput::{Query, Root, solid_angle_ratio};
+
 /// Options of `connection`.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -195,18 +201,23 @@ impl Estimator for Connection {
     }
 
     fn notes(&self) -> Vec<String> {
-        let lights = self.field.scene.lights.iter().filter(|light| light.is_directional());
-        lights
-            .map(|light| {
-                format!(
-                    "of directional light `{}`, what is reflected inside before its last scattering event, what goes through \
-                     another part of a body that is not convex before, and what is not scattered are excluded from this \
-                     estimator's result",
-                    light.name
-                )
-            })
-            .collect()
+        missing_notes(&self.field.scene)
     }
+}
+
+/// What no connection through one boundary point finds of parallel light.
+pub(super) fn missing_notes(scene: &Scene) -> Vec<String> {
+    let lights = scene.lights.iter().filter(|light| light.is_directional());
+    lights
+        .map(|light| {
+            format!(
+                "of directional light `{}`, what is reflected inside before its last scattering event, what goes through \
+                 another part of a body that is not convex before, and what is not scattered are excluded from this \
+                 estimator's result",
+                light.name
+            )
+        })
+        .collect()
 }
 
 #[cfg(test)]

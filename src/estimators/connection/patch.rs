@@ -5,7 +5,7 @@ use crate::math::DVec3;
 
 /// A point of the boundary with its first-order surroundings.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Patch {
+pub(in crate::estimators) struct Patch {
     pub point: DVec3,
     pub face: FaceId,
     /// Geometric outward unit normal.
@@ -44,7 +44,7 @@ impl Patch {
     }
 
     /// About a point of a body, as intersection reports it.
-    pub(super) fn at(shape: &Shape, face: FaceId, point: DVec3, normal: DVec3) -> Patch {
+    pub(in crate::estimators) fn at(shape: &Shape, face: FaceId, point: DVec3, normal: DVec3) -> Patch {
         match shape {
             Shape::Sphere { radius } => Patch::sphere(*radius, normal),
             Shape::Mesh(mesh) => {

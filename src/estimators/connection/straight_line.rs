@@ -19,6 +19,8 @@ pub(super) fn root(shape: &Shape, query: &Query, work: &mut Work) -> Option<Root
     (cl > 0.0).then(|| Root {
         point: hit.point,
         face: hit.face,
+        normal: hit.normal,
+        shading: hit.shading_normal,
         dir,
         distance: hit.t,
         ratio: eta * eta,

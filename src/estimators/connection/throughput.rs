@@ -28,7 +28,7 @@ use crate::optics::fresnel::fresnel;
 
 /// What is asked for: the light from one direction that reaches a point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Query {
+pub(in crate::estimators) struct Query {
     /// Point inside, mm.
     pub x: DVec3,
     /// Unit direction towards the light.
@@ -39,9 +39,13 @@ pub(super) struct Query {
 
 /// A point of the boundary that refracts the light of a query to its point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Root {
+pub(in crate::estimators) struct Root {
     pub point: DVec3,
     pub face: FaceId,
+    /// Geometric outward unit normal there.
+    pub normal: DVec3,
+    /// Shading normal there, unit.
+    pub shading: DVec3,
     /// Unit direction from x.
     pub dir: DVec3,
     /// Distance from x, mm.
@@ -116,6 +120,8 @@ impl Query {
         Judgement::Root(Root {
             point: patch.point,
             face: patch.face,
+            normal: patch.normal,
+            shading: patch.shading,
             dir: at.dir,
             distance: at.distance,
             ratio: solid_angle_ratio(patch, at.dir, at.distance, self.w_l, self.eta),
@@ -126,7 +132,13 @@ impl Query {
 
 /// J = |d w_L / d w| at the point from which a ray runs to `patch` along `dir`; see the head of the
 /// file.
-pub(super) fn solid_angle_ratio(patch: &Patch, dir: DVec3, distance: f64, w_l: DVec3, eta: f64) -> f64 {
+pub(in crate::estimators) fn solid_angle_ratio(
+    patch: &Patch,
+    dir: DVec3,
+    distance: f64,
+    w_l: DVec3,
+    eta: f64,
+) -> f64 {
     let (n, across) = (patch.shading, Frame::about(dir));
     let (cl, ct) = (w_l.dot(n), dir.dot(n));
     let mu = cl - eta * ct;

@@ -11,11 +11,11 @@
 //! factors are the pair's. Refraction by a smooth surface, drawn from the light's side, is a delta in
 //! w_kj; written in w_L it gains J = dw_L / dw_kj = eta^2 |n.w_kj| / |n.w_L|.
 //!
-//!   lobe x light          BSDF   light   top to bottom   bottom to top   last vertex
-//!   rough x finite        yes    yes     yes             yes             yes
-//!   rough x parallel      -      yes     yes             -               yes
-//!   smooth x finite       yes    -       yes             yes             yes
-//!   smooth x parallel     -      -       yes             -               -
+//!   lobe x light          BSDF   light   top to bottom   bottom to top   last vertex   connection
+//!   rough x finite        yes    yes     yes             yes             yes           -
+//!   rough x parallel      -      yes     yes             -               yes           -
+//!   smooth x finite       yes    -       yes             yes             yes           yes
+//!   smooth x parallel     -      -       yes             -               -             yes
 //!
 //! Since value / density = f U / (U sum) for each technique, every sample scores
 //!   throughput * albedo * f_k L / (p_B + p_L + sum of rivals / U),
@@ -23,6 +23,7 @@
 
 use super::end::{End, Leg, Middle};
 use super::last_vertex::{self, GuidedEnd};
+use super::specular;
 use super::state::{Connections, Slot, WalkVertex};
 use super::subdivision::{self, Subdivided};
 use crate::estimators::Cost;
@@ -43,6 +44,17 @@ impl Rivals for Connections<'_> {
             && let Some(found) = last_vertex::draw(walk, technique)
         {
             score_guided(walk, &found);
+        }
+        if let Some(technique) = &walk.rivals.setup.specular
+            && (is_free || !is_first)
+            && let Some(connected) = specular::draw(walk, technique)
+        {
+            for root in &connected.roots {
+                if let Some(found) = connected.end(walk, root) {
+                    score_guided(walk, &found);
+                }
+            }
+            walk.rivals.roots = connected.roots;
         }
         if options.strategies.subdivides()
             && (is_free || is_first)
@@ -124,7 +136,8 @@ impl Rivals for Connections<'_> {
         let x_j = walk.rivals.vertex(Slot::Latest);
         let dir = -exit.frame.to_world(exit.wo);
         let leg = Leg { dir, length: (exit.hit.point - x_j.point).length() };
-        let mut sum = last_vertex::density(walk, Slot::Latest, &leg, &end);
+        let mut sum = last_vertex::density(walk, Slot::Latest, &leg, &end)
+            + specular::density(walk, Slot::Latest, &leg, exit, &end);
         if walk.rivals.count >= 2 && setup.options.strategies.subdivides() && walk.sees(exit) {
             let x_i = walk.rivals.vertex(Slot::Previous);
             if let Some(middle) = Middle::new(x_i.point, x_j.point, &exit.hit) {
@@ -135,7 +148,8 @@ impl Rivals for Connections<'_> {
     }
 }
 
-/// Scores an end that the light-guided last vertex has drawn at the walk's latest vertex.
+/// Scores an end that the light-guided last vertex or the connection has drawn at the walk's latest vertex, which
+/// sees the exit.
 pub(super) fn score_guided<B: WalkBands>(
     walk: &mut CameraWalk<'_, Connections<'_>, B>,
     found: &GuidedEnd<'_>,
@@ -147,7 +161,8 @@ pub(super) fn score_guided<B: WalkBands>(
         return;
     }
     let x_j = walk.rivals.vertex(Slot::Latest);
-    let mut rivals = last_vertex::density(walk, Slot::Latest, leg, &end);
+    let mut rivals = last_vertex::density(walk, Slot::Latest, leg, &end)
+        + specular::density(walk, Slot::Latest, leg, exit, &end);
     if walk.rivals.count >= 2 && setup.options.strategies.subdivides() {
         let x_i = walk.rivals.vertex(Slot::Previous);
         if let Some(middle) = Middle::new(x_i.point, x_j.point, &exit.hit)
@@ -187,7 +202,8 @@ pub(super) fn score_subdivided<B: WalkBands>(
     bands.turn(media, middle.to_j.dir.dot(middle.to_k.dir));
     bands.flight(media, middle.to_k.length, false);
     let rivals = subdivision::density(walk, Slot::Latest, middle, exit, &end)
-        + last_vertex::density(walk, Slot::Drawn, &middle.to_k, &end);
+        + last_vertex::density(walk, Slot::Drawn, &middle.to_k, &end)
+        + specular::density(walk, Slot::Drawn, &middle.to_k, exit, &end);
     let survival = walk.bands.survival(&walk.medium);
     let value = walk.throughput * survival * end.value / (bands.density() * end.unidirectional + rivals);
     if value == 0.0 || walk.is_shadowed(exit, *w_l) {

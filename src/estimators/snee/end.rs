@@ -32,9 +32,14 @@ impl Call {
     pub(super) fn probability(&self, sigma: f64, guess: Option<&Guess>) -> f64 {
         match guess {
             _ if self.decay == 0.0 => self.most,
-            Some(guess) => self.most * exp(-self.decay * sigma * guess.distance),
+            Some(guess) => self.within(sigma, guess.distance),
             None => 0.0,
         }
+    }
+
+    /// The probability at this distance, mm.
+    pub(super) fn within(&self, sigma: f64, distance: f64) -> f64 {
+        if self.decay == 0.0 { self.most } else { self.most * exp(-self.decay * sigma * distance) }
     }
 
     /// The distance up to which the call is made, for one uniform number; `None` if it is not made at

@@ -10,7 +10,7 @@
 //!
 //! Unbiased for all that the walk or a rival can sample. Through a smooth boundary parallel light is
 //! only found by subdivision from the light's end: what lacks two medium vertices before the exit is
-//! missing there.
+//! missing there. `snee_connect` has the specular connection beside it (`specular`), which finds that, too.
 
 mod bidirectional;
 mod connections;
@@ -20,6 +20,8 @@ mod guide;
 mod last_vertex;
 mod options;
 mod probe;
+mod snee_connect;
+mod specular;
 mod state;
 mod subdivision;
 mod two_bounce;
@@ -27,6 +29,7 @@ mod two_bounce;
 use std::sync::Arc;
 
 use super::bands::{MAX_SHARED, OneBand, SharedBands};
+use super::connection::{self, Conic};
 use super::illumination::unscattered_notes;
 use super::walk::{CameraWalk, Field, Path, Unrivalled};
 use super::{BandUse, Estimator, EstimatorKind, Scores, Serves, read_options};
@@ -37,6 +40,7 @@ use crate::sampling::stream::{PassKey, Purpose};
 use crate::scene::Scene;
 
 use guide::Guide;
+use specular::Specular;
 use state::Connections;
 
 pub use bidirectional::Bidirectional;
@@ -44,6 +48,7 @@ pub use end::Call;
 pub use last_vertex::LastVertex;
 pub use options::{EdgeTechnique, JointKind, SneeChoices, SneeOptions, SneePreset, Strategies};
 pub use probe::ProbeShares;
+pub use specular::ConnectionCall;
 pub use two_bounce::TwoBounce;
 
 /// Data of connections, for one band.
@@ -54,6 +59,7 @@ struct BandSetup {
     /// Extinction that steers samplers, 1/mm: the medium's, or the least of those that share a walk.
     sigma: f64,
     joint: JointDirections,
+    specular: Option<Specular>,
 }
 
 /// The estimator, for one scene.
@@ -94,6 +100,8 @@ impl Snee {
             check_shared(&scene)?;
         }
         let options = Arc::new(options);
+        let is_connected = options.connection.is_some() && scene.boundary.iter().any(specular::is_served);
+        let solver = is_connected.then(|| Arc::new(Conic::new(&scene.shape)));
         let setup = |band: usize| {
             let media = if options.share_bands { &scene.medium[..] } else { &scene.medium[band..=band] };
             let sigma = media.iter().map(|m| m.sigma_t).fold(f64::INFINITY, f64::min);
@@ -111,7 +119,13 @@ impl Snee {
                 }
                 _ => JointDirections::Mixture(phase),
             };
-            BandSetup { options: options.clone(), guides, sigma, joint }
+            let specular = match (options.connection, &solver) {
+                (Some(call), Some(solver)) if specular::is_served(&scene.boundary[band]) => {
+                    Some(Specular { call, solver: solver.clone() })
+                }
+                _ => None,
+            };
+            BandSetup { options: options.clone(), guides, sigma, joint, specular }
         };
         let count = if options.share_bands { 1 } else { scene.bands() };
         let setups = (0..count).map(setup).collect();
@@ -162,9 +176,19 @@ impl Estimator for Snee {
         if self.options.share_bands { BandUse::Shared } else { BandUse::EachAlone }
     }
 
+    fn working_bytes(&self) -> usize {
+        let technique = self.setups.iter().find_map(|setup| setup.specular.as_ref());
+        technique.map_or(0, |technique| technique.solver.heap_bytes())
+    }
+
     fn notes(&self) -> Vec<String> {
         let Strategies { bsdf, light, .. } = self.options.strategies;
-        let mut notes = missing_notes(&self.field.scene, "subdivision from its end");
+        let scene = &self.field.scene;
+        let mut notes = if self.setups.iter().any(|setup| setup.specular.is_some()) {
+            connection::missing_notes(scene)
+        } else {
+            missing_notes(scene, "subdivision from its end")
+        };
         if !(bsdf && light) {
             notes.push(
                 "`strategies` leaves out a part of unidirectional sampling: of paths whose last two medium vertices \
@@ -212,6 +236,10 @@ impl Snee {
 
 #[cfg(test)]
 mod draws_tests;
+#[cfg(test)]
+mod snee_connect_tests;
+#[cfg(test)]
+mod specular_tests;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]

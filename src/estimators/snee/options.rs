@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::end::Call;
 use super::last_vertex::LastVertex;
 use super::probe::ProbeShares;
+use super::specular::ConnectionCall;
 use crate::error::{Error, Result};
 use crate::estimators::Roulette;
 
@@ -28,6 +29,8 @@ pub struct SneeOptions {
     pub joint: JointKind,
     /// The light-guided last vertex.
     pub last_vertex: Option<LastVertex>,
+    /// Connections of the last vertex through a smooth boundary.
+    pub connection: Option<ConnectionCall>,
     /// Whether a smooth boundary's reflection of a light that is connected to is scored by its
     /// expectation, wherever a walk meets the boundary from outside, instead of by the walks that take
     /// it.
@@ -95,6 +98,10 @@ pub struct SneeChoices {
     pub joint: Option<JointKind>,
     /// The light-guided last vertex; `most = 0` switches it off.
     pub last_vertex: Option<LastVertex>,
+    /// Connections of the last vertex through a smooth boundary; `most = 0` switches them off.
+    ///
+    /// Without it `snee` has none, and `snee_connect` has one with `most = 1, decay = 0.5` and no `last_vertex`.
+    pub connection: Option<ConnectionCall>,
     /// Whether a smooth boundary's reflection of a concentrated light is scored by its expectation.
     pub expected_reflection: Option<bool>,
     /// Lights of a smaller concentration are skipped: sampled by path tracing only.
@@ -185,6 +192,7 @@ impl SneePreset {
                 probe: ProbeShares { uniform: 1.0, plane: 0.0, guided: 0.0 },
                 joint: JointKind::Table,
                 last_vertex: None,
+                connection: None,
                 expected_reflection: false,
                 least_concentration: 1.0,
                 share_bands: false,
@@ -198,6 +206,7 @@ impl SneePreset {
                 probe: ProbeShares { uniform: 0.2, plane: 0.4, guided: 0.4 },
                 joint: JointKind::Table,
                 last_vertex: Some(LastVertex { most: 1.0, decay: 0.75, wide_share: 0.25, wide: 0.2 }),
+                connection: None,
                 expected_reflection: true,
                 least_concentration: 10.0,
                 share_bands: false,
@@ -220,6 +229,7 @@ impl SneeChoices {
             call_alone: self.call_alone.or(self.call).unwrap_or(preset.call_alone),
             joint: self.joint.unwrap_or(preset.joint),
             last_vertex: self.last_vertex.or(preset.last_vertex).filter(|last| last.most > 0.0),
+            connection: self.connection.filter(|call| call.most > 0.0),
             expected_reflection: self.expected_reflection.unwrap_or(preset.expected_reflection),
             least_concentration: self.least_concentration.unwrap_or(preset.least_concentration),
             share_bands: self.bands == BandWalks::Shared,
@@ -251,7 +261,8 @@ impl SneeChoices {
             options.probe = ProbeShares { uniform, plane, guided };
         }
         let Strategies { bsdf, light, .. } = options.strategies;
-        if !(bsdf || light || options.strategies.subdivides() || options.last_vertex.is_some()) {
+        let is_guided = options.last_vertex.is_some() || options.connection.is_some();
+        if !(bsdf || light || options.strategies.subdivides() || is_guided) {
             return Err(Error::input(
                 "snee: nothing takes part; name one of bsdf, light, top_to_bottom, bottom_to_top in `strategies`",
             ));
@@ -264,6 +275,17 @@ impl SneeChoices {
             ));
         }
         Ok(options)
+    }
+
+    /// The same with the connection, and without the last vertex unless it is named.
+    ///
+    /// # Errors
+    /// As [`SneeChoices::options`].
+    pub fn connected(&self) -> Result<SneeOptions> {
+        let connection = Some(self.connection.unwrap_or_default());
+        let options = SneeChoices { connection, ..self.clone() }.options()?;
+        let last_vertex = options.last_vertex.filter(|_| self.last_vertex.is_some());
+        Ok(SneeOptions { last_vertex, ..options })
     }
 }
 

@@ -4,6 +4,7 @@ use super::BandSetup;
 use super::guess::Guess;
 use super::guide::Guide;
 use crate::estimators::bands::WalkBands;
+use crate::estimators::connection::Root;
 use crate::estimators::walk::{CameraWalk, WalkExit};
 use crate::math::DVec3;
 use crate::sampling::discrete::choose_share;
@@ -50,13 +51,16 @@ pub(super) struct Connections<'a> {
     pub is_edge_alone: bool,
     /// Cached visibility between the vertex before the last and the last exit.
     seen: Option<(DVec3, bool)>,
+    /// Memory for the roots of a connection.
+    pub roots: Vec<Root>,
 }
 
 impl<'a> Connections<'a> {
     pub(super) fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
         let nowhere = WalkVertex { point: DVec3::NAN, arrival: DVec3::Z, walks: 1.0 };
         let held = [Held { vertex: nowhere, guess: None }; 3];
-        Connections { setup, stream, held, count: 0, is_edge_alone: false, seen: None }
+        let roots = Vec::new();
+        Connections { setup, stream, held, count: 0, is_edge_alone: false, seen: None, roots }
     }
 
     /// The walk has come to a new medium vertex.

@@ -130,7 +130,8 @@ pub(super) fn density<B: WalkBands>(
 impl SneeOptions {
     /// How often an edge is subdivided for a guide.
     fn call_for(&self, boundary: &Boundary, guide: &Guide) -> Call {
-        let is_alone = matches!(boundary, Boundary::Smooth { .. }) && guide.half_angle == 0.0;
+        let is_smooth = matches!(boundary, Boundary::Smooth { .. });
+        let is_alone = is_smooth && guide.half_angle == 0.0 && self.connection.is_none();
         if is_alone { self.call_alone } else { self.call }
     }
 }

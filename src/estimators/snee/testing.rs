@@ -216,7 +216,7 @@ fn is_free(scene: &Scene, from: DVec3, to: DVec3) -> bool {
 }
 
 /// A point on a random chord of the body.
-fn point_inside(scene: &Scene, stream: &mut Stream) -> Option<DVec3> {
+pub(super) fn point_inside(scene: &Scene, stream: &mut Stream) -> Option<DVec3> {
     let out = square_to_cap(2.0, stream.draw2());
     let beam = scene.shape.bounds()?.beam(out, stream.draw2());
     let entry = scene.shape.intersect(&beam, Side::Outside, None, f64::INFINITY)?;

@@ -28,6 +28,7 @@ fn guided() -> SneeOptions {
         probe: ProbeShares { uniform: 0.2, plane: 0.4, guided: 0.4 },
         joint: JointKind::Mixture,
         last_vertex: Some(LastVertex { most: 1.0, decay: 0.5, wide_share: 0.25, wide: 0.2 }),
+        connection: None,
         expected_reflection: true,
         least_concentration: 10.0,
         share_bands: false,
