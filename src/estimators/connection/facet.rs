@@ -4,18 +4,17 @@
 //! With P(u, v) = p - x and N(u, v), both linear, Snell's law reads
 //!   P = k N + s w_L,    |P| = eta s,    s > 0,    sign k = sign(eta - 1),
 //! since eta P / |P| = w_L + (k / s) N is what `throughput` states. The first equation alone is the
-//! coplanarity N . (P x w_L) = 0, a conic in (u, v), which k parametrises: with a = e_0 - k m_0, b = e_1
-//! - k m_1, c = P_0 - k N_0, linear in k, it is u a + v b + c = s w_L, and by Cramer's rule
+//! coplanarity N . (P x w_L) = 0, a conic in (u, v), which k parametrises: with a = e_0 - k m_0,
+//! b = e_1 - k m_1, c = P_0 - k N_0, linear in k, it is u a + v b + c = s w_L, and by Cramer's rule
 //!   D = (a x b) . w_L,   u D = (b x c) . w_L,   v D = (c x a) . w_L,   s D = (a x b) . c.
-//! So u, v are quotients of quadratics, and the second equation becomes, with Q = D P = D P_0 + u D e_0
-//! + v D e_1,
+//! So u, v are quotients of quadratics, and the second equation becomes, with the quadratic
+//! Q = D P = D P_0 + u D e_0 + v D e_1,
 //!   |Q|^2 - eta^2 (s D)^2 = 0,
-//! a polynomial of degree 6 in k: a triangle has at most 6 candidates. k is bounded: k |N| = s |eta ct -
-//! cl| with s =
-//! |P| / eta and |eta ct - cl| = |eta^2 - 1| / (eta ct + cl), which falls as cl grows. On that interval the roots are
-//! isolated in Bernstein form (`polynomial`), so none is lost, and intervals whose u, v, 1 - u - v
-//! cannot all be positive are dropped at once. A Newton step on the triangle removes what rounding the
-//! polynomial has left.
+//! a polynomial of degree 6 in k: a triangle has at most 6 candidates. k is bounded: its size is
+//!   k |N| = s |eta ct - cl|,   s = |P| / eta,   |eta ct - cl| = |eta^2 - 1| / (eta ct + cl),
+//! and the last falls as cl grows. On that interval the roots are isolated in Bernstein form
+//! (`polynomial`), so none is lost, and intervals whose u, v, 1 - u - v cannot all be positive are
+//! dropped at once. A Newton step on the triangle removes what rounding the polynomial has left.
 //!
 //! With one normal for the whole facet the root is closed: cl is known, hence ct, w and p.
 

@@ -7,9 +7,8 @@ use crate::geometry::{Ray, Shape, Side};
 use crate::reference::differences;
 
 /// Irradiance across the ray at x over that outside, without T, from the light's side: the area across w
-/// onto which the rays through a unit of the surface spread. With p on the surface, x = p - d w and w =
-/// (w_L + m N) / eta, m = eta ct
-/// - cl, dm = (cl / (eta ct) - 1) w_L . dN at fixed w_L.
+/// onto which the rays through a unit of the surface spread. With p on the surface, x = p - d w and
+/// w = (w_L + m N) / eta, where m = eta ct - cl and dm = (cl / (eta ct) - 1) w_L . dN at fixed w_L.
 fn light_side(patch: &Patch, dir: DVec3, distance: f64, w_l: DVec3, eta: f64) -> f64 {
     let n = patch.shading;
     let (cl, eta_ct) = (w_l.dot(n), eta * dir.dot(n));
