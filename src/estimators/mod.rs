@@ -39,7 +39,7 @@ pub const KINDS: &[EstimatorKind] = &[
     snee::Snee::KIND,
     snee::TwoBounce::KIND,
     snee::Bidirectional::KIND,
-    connection::Connection::KIND,
+    connection::SpecularConnection::KIND,
     light_trace::LightTracer::KIND,
     point_cloud::PointCloud::KIND,
     bssrdf_probe::BssrdfProbe::KIND,

@@ -19,8 +19,8 @@
 //! With one normal for the whole facet the root is closed: cl is known, hence ct, w and p.
 
 use super::bounds::Bounds;
-use super::patch::{Facet, Patch};
-use super::polynomial::{self, Coefficients};
+use super::patch::{Facet, SurfacePatch};
+use super::polynomial::{self, BernsteinForm};
 use super::throughput::{Judgement, Query, Root};
 use crate::geometry::FaceId;
 use crate::math::DVec3;
@@ -46,7 +46,7 @@ const ITERATIONS: u32 = 50;
 
 /// What the search for roots has met.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Work {
+pub(super) struct SolverWork {
     /// Nodes of a hierarchy that were looked at.
     pub nodes: u64,
     /// Triangles, or starts of a walk, that were solved for roots.
@@ -74,12 +74,12 @@ pub(super) fn plane_root(query: &Query, point: DVec3, normal: DVec3) -> Option<D
 }
 
 /// Offers every root on the facet to `found`.
-pub(super) fn roots(query: &Query, facet: &Facet, work: &mut Work, found: &mut impl FnMut(Root)) {
+pub(super) fn roots(query: &Query, facet: &Facet, work: &mut SolverWork, found: &mut impl FnMut(Root)) {
     work.solves += 1;
     let Some((n, m)) = facet.shading else {
         if let Some(point) = plane_root(query, facet.corner, facet.normal) {
             let place = facet.place(point);
-            let patch = Patch::plane(point, FaceId(facet.index), facet.normal);
+            let patch = SurfacePatch::plane(point, FaceId(facet.index), facet.normal);
             if facet.owns(place)
                 && let Judgement::Root(root) = query.judge(&patch, TOLERANCE)
             {
@@ -88,7 +88,7 @@ pub(super) fn roots(query: &Query, facet: &Facet, work: &mut Work, found: &mut i
         }
         return;
     };
-    let mut places = Places { query, facet, work, found, seen: Vec::new() };
+    let mut places = FacetRoots { query, facet, work, found, seen: Vec::new() };
     let whole = Linear { p: facet.corner - query.x, e: facet.edges, n, m };
     places.search(&whole, [0.0; 2], [[1.0, 0.0], [0.0, 1.0]], CUTS);
 }
@@ -121,16 +121,16 @@ impl Linear {
 }
 
 /// Roots of one facet, as they are found.
-struct Places<'a, F> {
+struct FacetRoots<'a, F> {
     query: &'a Query,
     facet: &'a Facet,
-    work: &'a mut Work,
+    work: &'a mut SolverWork,
     found: &'a mut F,
-    /// Places of the roots found so far: rounding may offer a double root twice.
+    /// FacetRoots of the roots found so far: rounding may offer a double root twice.
     seen: Vec<[f64; 2]>,
 }
 
-impl<F: FnMut(Root)> Places<'_, F> {
+impl<F: FnMut(Root)> FacetRoots<'_, F> {
     /// Searches a part of the facet, whose corner and sides have the coordinates `at` and `sides`.
     fn search(&mut self, part: &Linear, at: [f64; 2], sides: [[f64; 2]; 2], cuts: u32) {
         let Query { w_l, eta, .. } = *self.query;
@@ -212,7 +212,7 @@ impl<F: FnMut(Root)> Places<'_, F> {
         let middle = (q[0].dot(q[2]) + 2.0 * q[1].length_squared()) / 3.0;
         let square =
             [q[0].length_squared(), q[0].dot(q[1]), middle, q[1].dot(q[2]), q[2].length_squared()];
-        let mut f: Coefficients = [0.0; polynomial::DEGREE + 1];
+        let mut f: BernsteinForm = [0.0; polynomial::DEGREE + 1];
         polynomial::add_product(&mut f, 1.0, &square, &[1.0]);
         polynomial::add_product(&mut f, -eta * eta, &s, &s);
         let size2 = |q: &[DVec3]| q.iter().map(|q| q.length_squared()).fold(0.0, f64::max);
