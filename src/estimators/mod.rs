@@ -41,7 +41,7 @@ pub const KINDS: &[EstimatorKind] = &[
     snee::Snee::CONNECT_KIND,
     snee::TwoBounce::KIND,
     snee::Bidirectional::KIND,
-    connection::Connection::KIND,
+    connection::SpecularConnection::KIND,
     light_trace::LightTracer::KIND,
     point_cloud::PointCloud::KIND,
     bssrdf_probe::BssrdfProbe::KIND,

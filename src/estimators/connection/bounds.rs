@@ -6,8 +6,8 @@
 //!   where all its normals face away from the light, or from w;
 //!   where w and w_L differ by more than refraction ever turns light, acos(min(eta, 1 / eta)) (the
 //!   spindle of Walter et al. 2009);
-//!   where eta w - w_L, which has to be along +-N, is outside the cone: it changes by 2 eta sin(theta /
-//!   2) at most.
+//!   where eta w - w_L, which has to be along +-N, is outside the cone: it changes by
+//!   2 eta sin(theta / 2) at most.
 
 use super::throughput::Query;
 use crate::math::DVec3;

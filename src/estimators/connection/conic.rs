@@ -11,9 +11,9 @@
 //! the sphere. For eta = 1 there is nothing to solve: the light comes straight.
 
 use super::cones::ConeTree;
-use super::facet::{self, TOLERANCE, Work, plane_root};
-use super::patch::Patch;
-use super::polynomial::{self, Coefficients};
+use super::facet::{self, SolverWork, TOLERANCE, plane_root};
+use super::patch::SurfacePatch;
+use super::polynomial::{self, BernsteinForm};
 use super::straight_line;
 use super::throughput::{Judgement, Query, Root};
 use crate::geometry::{FaceId, Shape};
@@ -49,7 +49,7 @@ impl Conic {
         &self,
         shape: &Shape,
         query: &Query,
-        work: &mut Work,
+        work: &mut SolverWork,
         found: &mut impl FnMut(Root),
     ) {
         if query.eta == 1.0 {
@@ -67,7 +67,7 @@ impl Conic {
     }
 }
 
-fn judged(query: &Query, patch: &Patch, work: &mut Work, found: &mut impl FnMut(Root)) {
+fn judged(query: &Query, patch: &SurfacePatch, work: &mut SolverWork, found: &mut impl FnMut(Root)) {
     match query.judge(patch, TOLERANCE) {
         Judgement::Root(root) => found(root),
         Judgement::WrongSide => work.wrong_side += 1,
@@ -76,13 +76,13 @@ fn judged(query: &Query, patch: &Patch, work: &mut Work, found: &mut impl FnMut(
 }
 
 /// Roots on the faces of a half-space, slab or box.
-fn planes(shape: &Shape, query: &Query, work: &mut Work, found: &mut impl FnMut(Root)) {
+fn planes(shape: &Shape, query: &Query, work: &mut SolverWork, found: &mut impl FnMut(Root)) {
     let mut face = |index: u32, on: DVec3, normal: DVec3, half: Option<DVec3>| {
         work.solves += 1;
         let Some(point) = plane_root(query, on, normal) else { return };
         let is_beside = |half: DVec3| (0..3).any(|i| normal[i] == 0.0 && point[i].abs() > half[i]);
         if !half.is_some_and(is_beside) {
-            judged(query, &Patch::plane(point, FaceId(index), normal), work, found);
+            judged(query, &SurfacePatch::plane(point, FaceId(index), normal), work, found);
         }
     };
     match *shape {
@@ -105,7 +105,7 @@ fn planes(shape: &Shape, query: &Query, work: &mut Work, found: &mut impl FnMut(
 }
 
 /// Roots on a sphere, in units of its radius.
-fn sphere(radius: f64, query: &Query, work: &mut Work, found: &mut impl FnMut(Root)) {
+fn sphere(radius: f64, query: &Query, work: &mut SolverWork, found: &mut impl FnMut(Root)) {
     work.solves += 1;
     let Query { x, w_l, eta } = *query;
     let center = -x / radius;
@@ -130,7 +130,7 @@ fn sphere(radius: f64, query: &Query, work: &mut Work, found: &mut impl FnMut(Ro
             square[i + j] += share[i][j] * p * q;
         }
     }
-    let mut f: Coefficients = [0.0; polynomial::DEGREE + 1];
+    let mut f: BernsteinForm = [0.0; polynomial::DEGREE + 1];
     polynomial::add_product(&mut f, 1.0, &q2, &square);
     polynomial::add_product(&mut f, -4.0, &line, &line);
     let mut seen: Vec<DVec3> = Vec::new();
@@ -148,7 +148,7 @@ fn sphere(radius: f64, query: &Query, work: &mut Work, found: &mut impl FnMut(Ro
         if normal == DVec3::ZERO {
             continue;
         }
-        let patch = polish(query, Patch::sphere(radius, normal));
+        let patch = polish(query, SurfacePatch::sphere(radius, normal));
         if !seen.iter().any(|n| n.distance(patch.normal) < 1e-12) {
             seen.push(patch.normal);
             judged(query, &patch, work, found);
@@ -157,7 +157,7 @@ fn sphere(radius: f64, query: &Query, work: &mut Work, found: &mut impl FnMut(Ro
 }
 
 /// Newton's steps on a sphere from a point close to a root.
-fn polish(query: &Query, patch: Patch) -> Patch {
+fn polish(query: &Query, patch: SurfacePatch) -> SurfacePatch {
     const NEAR: f64 = 1e-3;
     let radius = patch.point.length();
     let start = patch.normal;
@@ -165,7 +165,7 @@ fn polish(query: &Query, patch: Patch) -> Patch {
     let mut at = query.constraint(&best);
     for _ in 0..4 {
         let Some(step) = query.step(&best, &at) else { return best };
-        let next = Patch::sphere(radius, (best.point + step).normalize());
+        let next = SurfacePatch::sphere(radius, (best.point + step).normalize());
         let next_at = query.constraint(&next);
         if next.normal.distance(start) > NEAR || next_at.residual.length() >= at.residual.length() {
             return best;

@@ -6,7 +6,7 @@ use crate::geometry::procedural;
 use crate::reference::refracting_plane::PlaneBeam;
 use crate::reference::refracting_sphere::LitSphere;
 
-fn all(conic: &Conic, shape: &Shape, query: &Query, work: &mut Work) -> Vec<Root> {
+fn all(conic: &Conic, shape: &Shape, query: &Query, work: &mut SolverWork) -> Vec<Root> {
     let mut roots = Vec::new();
     conic.roots(shape, query, work, &mut |root| roots.push(root));
     roots
@@ -21,7 +21,7 @@ fn no_root_differs_from_exhaustive_subdivision() {
     for eta in [1.5, 0.8] {
         for (name, shape) in meshes(3) {
             let conic = Conic::new(&shape);
-            let (mut count, mut most, mut work) = (0, 0, Work::default());
+            let (mut count, mut most, mut work) = (0, 0, SolverWork::default());
             let mut done = 0;
             while done < CONNECTIONS {
                 let Some(x) = point_inside(&shape, &mut stream) else { continue };
@@ -82,7 +82,7 @@ fn light_that_enters_is_found() {
                 };
                 let distance = length * stream.draw();
                 let query = Query { x: hit.point - dir * distance, w_l, eta };
-                let roots = all(&conic, shape, &query, &mut Work::default());
+                let roots = all(&conic, shape, &query, &mut SolverWork::default());
                 tried += 1;
                 let miss =
                     roots.iter().map(|r| r.point.distance(hit.point)).fold(f64::INFINITY, f64::min);
@@ -119,7 +119,7 @@ fn the_sphere_has_the_roots_of_its_scalar_equation() {
             let mut expected: Vec<(f64, f64)> =
                 oracle.rays([rho, z]).iter().map(|ray| (ray.distance, ray.magnification)).collect();
             let query = Query { x, w_l, eta };
-            let roots = all(&conic, &shape, &query, &mut Work::default());
+            let roots = all(&conic, &shape, &query, &mut SolverWork::default());
             let mut got: Vec<(f64, f64)> =
                 roots.iter().map(|r| (r.distance, eta * eta / r.ratio)).collect();
             for list in [&mut expected, &mut got] {
@@ -147,7 +147,7 @@ fn planes_have_their_closed_form() {
     let (entry, distance) = beam.entry(x);
     for shape in [Shape::HalfSpace, Shape::Slab { thickness: 1.0 }] {
         let query = Query { x, w_l, eta: 1.4 };
-        let roots = all(&Conic::new(&shape), &shape, &query, &mut Work::default());
+        let roots = all(&Conic::new(&shape), &shape, &query, &mut SolverWork::default());
         let [root] = &roots[..] else { panic!("{roots:?}") };
         assert!(root.point.distance(entry) < 1e-15 && (root.distance - distance).abs() < 1e-15);
         assert!((1.4 * 1.4 / root.ratio / beam.magnification() - 1.0).abs() < 1e-14);
@@ -156,15 +156,16 @@ fn planes_have_their_closed_form() {
     // From below the half-space is dark, the slab is not.
     let query = Query { x, w_l: -w_l, eta: 1.4 };
     assert!(
-        all(&Conic::new(&Shape::HalfSpace), &Shape::HalfSpace, &query, &mut Work::default()).is_empty()
+        all(&Conic::new(&Shape::HalfSpace), &Shape::HalfSpace, &query, &mut SolverWork::default())
+            .is_empty()
     );
     let slab = Shape::Slab { thickness: 1.0 };
-    assert_eq!(all(&Conic::new(&slab), &slab, &query, &mut Work::default()).len(), 1);
+    assert_eq!(all(&Conic::new(&slab), &slab, &query, &mut SolverWork::default()).len(), 1);
     // At grazing light, below the critical angle, every face that is lit and whose refracted direction
     // leads through it.
     let cube = Shape::Box { half: DVec3::ONE };
     let query = Query { x: DVec3::new(0.2, 0.1, -0.1), w_l: DVec3::new(0.6, 0.64, 0.48), eta: 1.4 };
-    assert_eq!(all(&Conic::new(&cube), &cube, &query, &mut Work::default()).len(), 3);
+    assert_eq!(all(&Conic::new(&cube), &cube, &query, &mut SolverWork::default()).len(), 3);
 }
 
 /// Without refraction the light comes straight, to the last bit.
@@ -176,8 +177,8 @@ fn without_refraction_the_light_comes_straight() {
         for _ in 0..500 {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
             let query = Query { x, w_l: direction(&mut stream), eta: 1.0 };
-            let roots = all(&conic, &shape, &query, &mut Work::default());
-            let Some(straight) = straight_line::root(&shape, &query, &mut Work::default()) else {
+            let roots = all(&conic, &shape, &query, &mut SolverWork::default());
+            let Some(straight) = straight_line::root(&shape, &query, &mut SolverWork::default()) else {
                 assert!(roots.is_empty()); // the shading normal faces away
                 continue;
             };
@@ -200,9 +201,9 @@ fn the_limit_without_refraction_is_continuous() {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
             done += 1;
             let query = Query { x, w_l: direction(&mut stream), eta };
-            let roots = all(&conic, &shape, &query, &mut Work::default());
+            let roots = all(&conic, &shape, &query, &mut SolverWork::default());
             let straight =
-                straight_line::root(&shape, &query, &mut Work::default()).expect("a ray leaves");
+                straight_line::root(&shape, &query, &mut SolverWork::default()).expect("a ray leaves");
             let near = roots.iter().any(|r| r.point.distance(straight.point) < 1e-6);
             single += u32::from(near && roots.len() == 1);
         }
@@ -228,7 +229,7 @@ fn the_energy_budget_is_kept() {
             let (hit, dir, length) = entering(&shape, w_l, eta, stream.draw2()).expect("a sphere");
             let query = Query { x: hit.point - dir * (length * stream.draw()), w_l, eta };
             let (mut energy, mut density) = (0.0, 0.0);
-            conic.roots(&shape, &query, &mut Work::default(), &mut |root| {
+            conic.roots(&shape, &query, &mut SolverWork::default(), &mut |root| {
                 let m = eta * eta / root.ratio;
                 let chord = 2.0 * root.dir.dot(root.point);
                 energy += root.transmittance * m;
@@ -251,7 +252,8 @@ fn special_points_of_the_sphere() {
     let shape = Shape::Sphere { radius: 2.0 };
     let conic = Conic::new(&shape);
     let w_l = DVec3::Z;
-    let find = |x: DVec3, eta: f64| all(&conic, &shape, &Query { x, w_l, eta }, &mut Work::default());
+    let find =
+        |x: DVec3, eta: f64| all(&conic, &shape, &Query { x, w_l, eta }, &mut SolverWork::default());
     let middle = find(DVec3::ZERO, 1.5);
     assert_eq!(middle.len(), 1);
     assert!(middle[0].point.distance(DVec3::Z * 2.0) < 1e-12);
@@ -293,7 +295,7 @@ fn hard_meshes() {
                     continue;
                 };
                 let query = Query { x: hit.point - dir * (length * stream.draw()), w_l, eta };
-                let roots = all(&conic, &shape, &query, &mut Work::default());
+                let roots = all(&conic, &shape, &query, &mut SolverWork::default());
                 tried += 1;
                 let nearest = roots
                     .iter()

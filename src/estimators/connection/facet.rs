@@ -4,24 +4,23 @@
 //! With P(u, v) = p - x and N(u, v), both linear, Snell's law reads
 //!   P = k N + s w_L,    |P| = eta s,    s > 0,    sign k = sign(eta - 1),
 //! since eta P / |P| = w_L + (k / s) N is what `throughput` states. The first equation alone is the
-//! coplanarity N . (P x w_L) = 0, a conic in (u, v), which k parametrises: with a = e_0 - k m_0, b = e_1
-//! - k m_1, c = P_0 - k N_0, linear in k, it is u a + v b + c = s w_L, and by Cramer's rule
+//! coplanarity N . (P x w_L) = 0, a conic in (u, v), which k parametrises: with a = e_0 - k m_0,
+//! b = e_1 - k m_1, c = P_0 - k N_0, linear in k, it is u a + v b + c = s w_L, and by Cramer's rule
 //!   D = (a x b) . w_L,   u D = (b x c) . w_L,   v D = (c x a) . w_L,   s D = (a x b) . c.
-//! So u, v are quotients of quadratics, and the second equation becomes, with Q = D P = D P_0 + u D e_0
-//! + v D e_1,
+//! So u, v are quotients of quadratics, and the second equation becomes, with the quadratic
+//! Q = D P = D P_0 + u D e_0 + v D e_1,
 //!   |Q|^2 - eta^2 (s D)^2 = 0,
-//! a polynomial of degree 6 in k: a triangle has at most 6 candidates. k is bounded: k |N| = s |eta ct -
-//! cl| with s =
-//! |P| / eta and |eta ct - cl| = |eta^2 - 1| / (eta ct + cl), which falls as cl grows. On that interval the roots are
-//! isolated in Bernstein form (`polynomial`), so none is lost, and intervals whose u, v, 1 - u - v
-//! cannot all be positive are dropped at once. A Newton step on the triangle removes what rounding the
-//! polynomial has left.
+//! a polynomial of degree 6 in k: a triangle has at most 6 candidates. k is bounded: its size is
+//!   k |N| = s |eta ct - cl|,   s = |P| / eta,   |eta ct - cl| = |eta^2 - 1| / (eta ct + cl),
+//! and the last falls as cl grows. On that interval the roots are isolated in Bernstein form
+//! (`polynomial`), so none is lost, and intervals whose u, v, 1 - u - v cannot all be positive are
+//! dropped at once. A Newton step on the triangle removes what rounding the polynomial has left.
 //!
 //! With one normal for the whole facet the root is closed: cl is known, hence ct, w and p.
 
 use super::bounds::Bounds;
-use super::patch::{Facet, Patch};
-use super::polynomial::{self, Coefficients};
+use super::patch::{Facet, SurfacePatch};
+use super::polynomial::{self, BernsteinForm};
 use super::throughput::{Judgement, Query, Root};
 use crate::geometry::FaceId;
 use crate::math::DVec3;
@@ -47,7 +46,7 @@ const ITERATIONS: u32 = 50;
 
 /// What the search for roots has met.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::estimators) struct Work {
+pub(in crate::estimators) struct SolverWork {
     /// Nodes of a hierarchy that were looked at.
     pub nodes: u64,
     /// Triangles, or starts of a walk, that were solved for roots.
@@ -75,12 +74,12 @@ pub(super) fn plane_root(query: &Query, point: DVec3, normal: DVec3) -> Option<D
 }
 
 /// Offers every root on the facet to `found`.
-pub(super) fn roots(query: &Query, facet: &Facet, work: &mut Work, found: &mut impl FnMut(Root)) {
+pub(super) fn roots(query: &Query, facet: &Facet, work: &mut SolverWork, found: &mut impl FnMut(Root)) {
     work.solves += 1;
     let Some((n, m)) = facet.shading else {
         if let Some(point) = plane_root(query, facet.corner, facet.normal) {
             let place = facet.place(point);
-            let patch = Patch::plane(point, FaceId(facet.index), facet.normal);
+            let patch = SurfacePatch::plane(point, FaceId(facet.index), facet.normal);
             if facet.owns(place)
                 && let Judgement::Root(root) = query.judge(&patch, TOLERANCE)
             {
@@ -89,7 +88,7 @@ pub(super) fn roots(query: &Query, facet: &Facet, work: &mut Work, found: &mut i
         }
         return;
     };
-    let mut places = Places { query, facet, work, found, seen: Vec::new() };
+    let mut places = FacetRoots { query, facet, work, found, seen: Vec::new() };
     let whole = Linear { p: facet.corner - query.x, e: facet.edges, n, m };
     places.search(&whole, [0.0; 2], [[1.0, 0.0], [0.0, 1.0]], CUTS);
 }
@@ -122,16 +121,16 @@ impl Linear {
 }
 
 /// Roots of one facet, as they are found.
-struct Places<'a, F> {
+struct FacetRoots<'a, F> {
     query: &'a Query,
     facet: &'a Facet,
-    work: &'a mut Work,
+    work: &'a mut SolverWork,
     found: &'a mut F,
-    /// Places of the roots found so far: rounding may offer a double root twice.
+    /// FacetRoots of the roots found so far: rounding may offer a double root twice.
     seen: Vec<[f64; 2]>,
 }
 
-impl<F: FnMut(Root)> Places<'_, F> {
+impl<F: FnMut(Root)> FacetRoots<'_, F> {
     /// Searches a part of the facet, whose corner and sides have the coordinates `at` and `sides`.
     fn search(&mut self, part: &Linear, at: [f64; 2], sides: [[f64; 2]; 2], cuts: u32) {
         let Query { w_l, eta, .. } = *self.query;
@@ -213,7 +212,7 @@ impl<F: FnMut(Root)> Places<'_, F> {
         let middle = (q[0].dot(q[2]) + 2.0 * q[1].length_squared()) / 3.0;
         let square =
             [q[0].length_squared(), q[0].dot(q[1]), middle, q[1].dot(q[2]), q[2].length_squared()];
-        let mut f: Coefficients = [0.0; polynomial::DEGREE + 1];
+        let mut f: BernsteinForm = [0.0; polynomial::DEGREE + 1];
         polynomial::add_product(&mut f, 1.0, &square, &[1.0]);
         polynomial::add_product(&mut f, -eta * eta, &s, &s);
         let size2 = |q: &[DVec3]| q.iter().map(|q| q.length_squared()).fold(0.0, f64::max);

@@ -16,8 +16,8 @@
 //! Starts are uniform in the cone about w_L of half angle acos(min(eta, 1 / eta)), seen from x, beyond
 //! which no refraction turns light.
 
-use super::facet::{TOLERANCE, Work};
-use super::patch::Patch;
+use super::facet::{SolverWork, TOLERANCE};
+use super::patch::SurfacePatch;
 use super::throughput::{Constraint, Judgement, Query, Root};
 use crate::geometry::{Hit, Ray, Shape, Side};
 use crate::math::{DVec3, Frame};
@@ -42,12 +42,12 @@ fn first_hit(shape: &Shape, x: DVec3, dir: DVec3) -> Option<Hit> {
     shape.intersect(&Ray { origin: x, dir }, Side::Inside, None, f64::INFINITY)
 }
 
-fn patch_of(shape: &Shape, hit: &Hit) -> Patch {
-    Patch::at(shape, hit.face, hit.point, hit.normal)
+fn patch_of(shape: &Shape, hit: &Hit) -> SurfacePatch {
+    SurfacePatch::at(shape, hit.face, hit.point, hit.normal)
 }
 
 /// The root that a walk from the boundary point in direction `start` finds.
-fn walk(shape: &Shape, query: &Query, start: DVec3, work: &mut Work) -> Option<Root> {
+fn walk(shape: &Shape, query: &Query, start: DVec3, work: &mut SolverWork) -> Option<Root> {
     work.solves += 1;
     work.rays += 1;
     let mut patch = patch_of(shape, &first_hit(shape, query.x, start)?);
@@ -74,10 +74,10 @@ fn walk(shape: &Shape, query: &Query, start: DVec3, work: &mut Work) -> Option<R
 fn step(
     shape: &Shape,
     query: &Query,
-    (patch, at): (&Patch, &Constraint),
+    (patch, at): (&SurfacePatch, &Constraint),
     share: &mut f64,
-    work: &mut Work,
-) -> Option<(Patch, Constraint)> {
+    work: &mut SolverWork,
+) -> Option<(SurfacePatch, Constraint)> {
     let newton = query.step(patch, at)?;
     loop {
         work.steps += 1;
@@ -104,7 +104,7 @@ pub(super) fn is_same(root: &Root, point: DVec3) -> bool {
 }
 
 /// The root that MNEE finds.
-pub(super) fn mnee(shape: &Shape, query: &Query, work: &mut Work) -> Option<Root> {
+pub(super) fn mnee(shape: &Shape, query: &Query, work: &mut SolverWork) -> Option<Root> {
     walk(shape, query, query.w_l, work)
 }
 
@@ -113,12 +113,12 @@ pub(super) fn sms(
     shape: &Shape,
     query: &Query,
     stream: &mut Stream,
-    work: &mut Work,
+    work: &mut SolverWork,
 ) -> Option<(Root, f64)> {
     let frame = Frame::about(query.w_l);
     // Without refraction the cone is one direction.
     let height = 1.0 - query.eta.min(1.0 / query.eta);
-    let mut trial = |work: &mut Work| {
+    let mut trial = |work: &mut SolverWork| {
         let start = frame.to_world(square_to_cap(height, stream.draw2()));
         walk(shape, query, start, work)
     };

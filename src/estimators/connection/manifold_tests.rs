@@ -7,7 +7,7 @@ use super::*;
 
 fn visible(conic: &Conic, shape: &Shape, query: &Query) -> Vec<Root> {
     let mut roots = Vec::new();
-    conic.roots(shape, query, &mut Work::default(), &mut |root| {
+    conic.roots(shape, query, &mut SolverWork::default(), &mut |root| {
         let hit = first_hit(shape, query.x, root.dir);
         if hit.is_some_and(|hit| hit.t > root.distance * (1.0 - 1e-7)) {
             roots.push(root);
@@ -31,14 +31,14 @@ fn newton_and_mnee_find_roots_only() {
     for (name, shape) in bodies() {
         let conic = Conic::new(&shape);
         let (mut all, mut by_newton, mut by_mnee, mut several) = (0, 0, 0, 0);
-        let (mut work, mut walks) = (Work::default(), Work::default());
+        let (mut work, mut walks) = (SolverWork::default(), SolverWork::default());
         let mut done = 0;
         while done < 3000 {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
             done += 1;
             let query = Query { x, w_l: direction(&mut stream), eta: 1.5 };
             let mut roots = Vec::new();
-            conic.roots(&shape, &query, &mut Work::default(), &mut |root| roots.push(root));
+            conic.roots(&shape, &query, &mut SolverWork::default(), &mut |root| roots.push(root));
             let seen = visible(&conic, &shape, &query);
             newton::roots(&conic, &shape, &query, &mut work, &mut |root| {
                 assert!(
@@ -75,7 +75,7 @@ fn weighted_trials_sum_over_all_roots() {
     let mut stream = stream("weighted_trials_sum_over_all_roots");
     for (name, shape) in bodies() {
         let conic = Conic::new(&shape);
-        let (mut done, mut work, mut trials) = (0, Work::default(), 0);
+        let (mut done, mut work, mut trials) = (0, SolverWork::default(), 0);
         let mut worst = 0.0f64;
         while done < 6 {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
@@ -122,10 +122,10 @@ fn without_refraction_all_methods_are_the_straight_line() {
         for _ in 0..300 {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
             let query = Query { x, w_l: direction(&mut stream), eta: 1.0 };
-            let Some(straight) = straight_line::root(&shape, &query, &mut Work::default()) else {
+            let Some(straight) = straight_line::root(&shape, &query, &mut SolverWork::default()) else {
                 continue;
             };
-            let mut work = Work::default();
+            let mut work = SolverWork::default();
             let by_mnee = mnee(&shape, &query, &mut work);
             let by_sms = sms(&shape, &query, &mut stream, &mut work).map(|(root, weight)| {
                 assert_eq!(weight, 1.0);

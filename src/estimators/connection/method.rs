@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::conic::Conic;
-use super::facet::Work;
+use super::facet::SolverWork;
 use super::throughput::{Query, Root};
 use super::{manifold, newton, straight_line};
 use crate::geometry::Shape;
@@ -52,7 +52,7 @@ impl Solver {
         shape: &Shape,
         query: &Query,
         stream: &mut Stream,
-        work: &mut Work,
+        work: &mut SolverWork,
         found: &mut Vec<WeightedRoot>,
     ) {
         let mut all = |root: Root| found.push(WeightedRoot { root, weight: 1.0 });
@@ -77,7 +77,7 @@ impl Solver {
         shape: &Shape,
         query: &Query,
         point: DVec3,
-        work: &mut Work,
+        work: &mut SolverWork,
     ) -> Option<bool> {
         let mut is_found = false;
         let mut compare = |root: Root| is_found |= manifold::is_same(&root, point);

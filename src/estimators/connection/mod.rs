@@ -65,8 +65,8 @@ pub use method::ConnectionMethod;
 
 // The complete solver, for estimators that weight its connections against other techniques.
 pub(super) use conic::Conic;
-pub(super) use facet::Work;
-pub(super) use patch::Patch;
+pub(super) use facet::SolverWork;
+pub(super) use patch::SurfacePatch;
 pub(super) use throughput::{Query, Root, solid_angle_ratio};
 
 /// Options of `connection`.
@@ -101,13 +101,13 @@ struct ConnectionSetup {
 
 /// The estimator, for one scene.
 #[derive(Debug)]
-pub struct Connection {
+pub struct SpecularConnection {
     field: Field,
     method: ConnectionMethod,
     setup: ConnectionSetup,
 }
 
-impl Connection {
+impl SpecularConnection {
     /// `connection` in experiment files.
     pub const KIND: EstimatorKind = EstimatorKind {
         kind: "connection",
@@ -120,7 +120,7 @@ impl Connection {
         options_schema: || schemars::schema_for!(ConnectionOptions),
         build: |options, scene| {
             let ConnectionOptions { method, roulette } = read_options(options)?;
-            Ok(Box::new(Connection::new(scene, method, roulette)?))
+            Ok(Box::new(SpecularConnection::new(scene, method, roulette)?))
         },
     };
 
@@ -128,14 +128,18 @@ impl Connection {
     ///
     /// # Errors
     /// A scene that it does not serve.
-    pub fn new(scene: Arc<Scene>, method: ConnectionMethod, roulette: Roulette) -> Result<Connection> {
-        Connection::KIND.check(&scene)?;
+    pub fn new(
+        scene: Arc<Scene>,
+        method: ConnectionMethod,
+        roulette: Roulette,
+    ) -> Result<SpecularConnection> {
+        SpecularConnection::KIND.check(&scene)?;
         let shares = (0..scene.bands()).map(|band| shares(&scene.lights, band)).collect();
         let is_density_known =
             !matches!(method, ConnectionMethod::Sms {} | ConnectionMethod::StraightLine {});
         let setup =
             ConnectionSetup { solver: Solver::new(method, &scene.shape), shares, is_density_known };
-        Ok(Connection { field: Field::new(scene, roulette), method, setup })
+        Ok(SpecularConnection { field: Field::new(scene, roulette), method, setup })
     }
 
     fn has_parallel_light(&self) -> bool {
@@ -158,7 +162,7 @@ fn shares(lights: &[Light], band: usize) -> Vec<f64> {
     lights.iter().map(|light| if total > 0.0 { strength(light) / total } else { 0.0 }).collect()
 }
 
-impl Estimator for Connection {
+impl Estimator for SpecularConnection {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         for &band in bands {
             let is_called = self.setup.shares[band].iter().any(|share| *share > 0.0);

@@ -7,7 +7,7 @@
 //! normals it is not.
 
 use super::conic::Conic;
-use super::facet::{self, TOLERANCE, Work};
+use super::facet::{self, SolverWork, TOLERANCE};
 use super::patch::Facet;
 use super::throughput::{Judgement, Query, Root};
 use crate::geometry::Shape;
@@ -21,7 +21,7 @@ pub(super) fn roots(
     conic: &Conic,
     shape: &Shape,
     query: &Query,
-    work: &mut Work,
+    work: &mut SolverWork,
     found: &mut impl FnMut(Root),
 ) {
     let is_interpolated = matches!(shape, Shape::Mesh(mesh) if mesh.normals().is_some());
@@ -45,7 +45,7 @@ pub(super) fn roots(
 }
 
 /// Barycentric coordinates of a root, from the middle of a facet.
-fn iterate(query: &Query, facet: &Facet, work: &mut Work) -> Option<[f64; 2]> {
+fn iterate(query: &Query, facet: &Facet, work: &mut SolverWork) -> Option<[f64; 2]> {
     /// Residual at which the last digits are left to `polish`.
     const CLOSE: f64 = 1e-10;
     let mut place = [1.0 / 3.0; 2];

@@ -5,7 +5,7 @@ use crate::math::DVec3;
 
 /// A point of the boundary with its first-order surroundings.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::estimators) struct Patch {
+pub(in crate::estimators) struct SurfacePatch {
     pub point: DVec3,
     pub face: FaceId,
     /// Geometric outward unit normal.
@@ -31,27 +31,32 @@ enum Turning {
     },
 }
 
-impl Patch {
+impl SurfacePatch {
     /// About a point of a plane.
-    pub(super) fn plane(point: DVec3, face: FaceId, normal: DVec3) -> Patch {
-        Patch { point, face, normal, shading: normal, turning: Turning::None }
+    pub(super) fn plane(point: DVec3, face: FaceId, normal: DVec3) -> SurfacePatch {
+        SurfacePatch { point, face, normal, shading: normal, turning: Turning::None }
     }
 
     /// About a point of a sphere around the origin, given by the outward normal.
-    pub(super) fn sphere(radius: f64, normal: DVec3) -> Patch {
+    pub(super) fn sphere(radius: f64, normal: DVec3) -> SurfacePatch {
         let turning = Turning::Sphere(1.0 / radius);
-        Patch { point: normal * radius, face: FaceId(0), normal, shading: normal, turning }
+        SurfacePatch { point: normal * radius, face: FaceId(0), normal, shading: normal, turning }
     }
 
     /// About a point of a body, as intersection reports it.
-    pub(in crate::estimators) fn at(shape: &Shape, face: FaceId, point: DVec3, normal: DVec3) -> Patch {
+    pub(in crate::estimators) fn at(
+        shape: &Shape,
+        face: FaceId,
+        point: DVec3,
+        normal: DVec3,
+    ) -> SurfacePatch {
         match shape {
-            Shape::Sphere { radius } => Patch::sphere(*radius, normal),
+            Shape::Sphere { radius } => SurfacePatch::sphere(*radius, normal),
             Shape::Mesh(mesh) => {
                 let facet = Facet::new(mesh, face.0);
                 facet.patch(facet.place(point))
             }
-            _ => Patch::plane(point, face, normal),
+            _ => SurfacePatch::plane(point, face, normal),
         }
     }
 
@@ -116,8 +121,8 @@ impl Facet {
 
     /// Its surroundings at barycentric coordinates. Where interpolated normals vanish the shading normal
     /// is the geometric one, as intersection has it.
-    pub(super) fn patch(&self, place: [f64; 2]) -> Patch {
-        let flat = Patch::plane(self.at(place), FaceId(self.index), self.normal);
+    pub(super) fn patch(&self, place: [f64; 2]) -> SurfacePatch {
+        let flat = SurfacePatch::plane(self.at(place), FaceId(self.index), self.normal);
         let Some((n, m)) = self.shading else { return flat };
         let sum = n + m[0] * place[0] + m[1] * place[1];
         let length = sum.length();
@@ -126,7 +131,7 @@ impl Facet {
         }
         let slopes = m.map(|m| m / length);
         let turning = Turning::Interpolated { gradients: self.gradients(), slopes };
-        Patch { shading: sum / length, turning, ..flat }
+        SurfacePatch { shading: sum / length, turning, ..flat }
     }
 
     /// Whether a point belongs to it. Of an edge between two facets the one owns it that runs along it

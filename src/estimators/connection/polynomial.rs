@@ -10,7 +10,7 @@
 pub(super) const DEGREE: usize = 6;
 
 /// Bernstein coefficients on [0, 1].
-pub(super) type Coefficients = [f64; DEGREE + 1];
+pub(super) type BernsteinForm = [f64; DEGREE + 1];
 
 /// Halvings after which what still changes its sign more than once is one candidate: a multiple root to
 /// rounding.
@@ -21,7 +21,7 @@ const HALVINGS: u32 = 40;
 const WIDE: f64 = 1.0 / (1 << 24) as f64;
 
 /// The polynomial's value.
-pub(super) fn value(coefficients: &Coefficients, t: f64) -> f64 {
+pub(super) fn value(coefficients: &BernsteinForm, t: f64) -> f64 {
     let mut c = *coefficients;
     for end in (1..=DEGREE).rev() {
         for i in 0..end {
@@ -59,7 +59,7 @@ enum Signs {
 
 /// By the rule of signs, where it holds whatever coefficients below `noise` are: one such coefficient
 /// between opposite signs changes nothing.
-fn signs(coefficients: &Coefficients, noise: f64) -> Signs {
+fn signs(coefficients: &BernsteinForm, noise: f64) -> Signs {
     let (mut count, mut last, mut run) = (0, 0.0f64, 0);
     for &c in coefficients {
         if c.abs() <= noise {
@@ -97,7 +97,7 @@ pub(super) type Conditions<const N: usize> = [[f64; 4]; N];
 /// # Errors
 /// Where the polynomial vanishes on an interval longer than 2^-24.
 pub(super) fn roots<const N: usize>(
-    coefficients: &Coefficients,
+    coefficients: &BernsteinForm,
     noise: f64,
     conditions: &Conditions<N>,
     found: &mut impl FnMut(f64),
@@ -112,7 +112,7 @@ pub(super) fn excludes<const N: usize>(conditions: &Conditions<N>) -> bool {
 }
 
 fn isolate<const N: usize>(
-    c: &Coefficients,
+    c: &BernsteinForm,
     noise: f64,
     conditions: &Conditions<N>,
     [from, size]: [f64; 2],
@@ -140,7 +140,7 @@ fn isolate<const N: usize>(
 
 /// The root where the coefficients change their sign once: bisection, sped up by the secant (the
 /// Illinois variant of regula falsi), to rounding.
-fn single_root(c: &Coefficients) -> f64 {
+fn single_root(c: &BernsteinForm) -> f64 {
     let first = c.iter().copied().find(|c| *c != 0.0).unwrap_or(0.0);
     let last = c.iter().rev().copied().find(|c| *c != 0.0).unwrap_or(0.0);
     // At an end that is zero the sign is that of its neighbourhood.
@@ -182,7 +182,7 @@ const BINOMIALS: [[f64; 7]; 7] = [
 
 /// Adds `factor` times the product of two polynomials, in Bernstein form, to one of degree [`DEGREE`];
 /// the product is raised to it (by a factor 1 of the degree that is missing).
-pub(super) fn add_product(sum: &mut Coefficients, factor: f64, p: &[f64], q: &[f64]) {
+pub(super) fn add_product(sum: &mut BernsteinForm, factor: f64, p: &[f64], q: &[f64]) {
     let (m, n) = (p.len() - 1, q.len() - 1);
     let missing = DEGREE - m - n;
     for (i, p) in p.iter().enumerate() {
@@ -201,7 +201,7 @@ mod tests {
     use super::*;
 
     /// prod (t - r_i), from linear factors in Bernstein form.
-    fn with_roots(roots: &[f64; DEGREE]) -> Coefficients {
+    fn with_roots(roots: &[f64; DEGREE]) -> BernsteinForm {
         let mut product = vec![1.0];
         for root in roots {
             let n = product.len() - 1;
@@ -217,7 +217,7 @@ mod tests {
         std::array::from_fn(|i| product[i])
     }
 
-    fn solve(c: &Coefficients) -> Vec<f64> {
+    fn solve(c: &BernsteinForm) -> Vec<f64> {
         let mut all = Vec::new();
         let noise = 1e-15 * c.iter().fold(0.0f64, |most, c| most.max(c.abs()));
         roots::<0>(c, noise, &[], &mut |t| all.push(t)).expect("separate roots");

@@ -4,14 +4,14 @@
 //! those of p, the focusing is 1. Wrong in place, number and strength wherever eta is not 1 (Walter et
 //! al. 2009 compare it), and light where the truth is dark.
 
-use super::facet::Work;
-use super::patch::Patch;
+use super::facet::SolverWork;
+use super::patch::SurfacePatch;
 use super::throughput::{Query, Root, solid_angle_ratio};
 use crate::geometry::{Hit, Ray, Shape, Side};
 use crate::optics::fresnel::fresnel;
 
 /// The first crossing of the straight ray; its focusing as if it were the whole truth, eta^2 / J = 1.
-pub(super) fn root(shape: &Shape, query: &Query, work: &mut Work) -> Option<Root> {
+pub(super) fn root(shape: &Shape, query: &Query, work: &mut SolverWork) -> Option<Root> {
     work.rays += 1;
     let hit = first(shape, query)?;
     let cl = query.w_l.dot(hit.shading_normal);
@@ -35,11 +35,16 @@ fn first(shape: &Shape, query: &Query) -> Option<Hit> {
 
 /// The root without refraction, eta = 1, where w is w_L: all later crossings are hidden behind the
 /// first.
-pub(super) fn crossings(shape: &Shape, query: &Query, work: &mut Work, found: &mut impl FnMut(Root)) {
+pub(super) fn crossings(
+    shape: &Shape,
+    query: &Query,
+    work: &mut SolverWork,
+    found: &mut impl FnMut(Root),
+) {
     work.solves += 1;
     let Some(root) = root(shape, query, work) else { return };
     let Some(hit) = first(shape, query) else { return };
-    let patch = Patch::at(shape, hit.face, hit.point, hit.normal);
+    let patch = SurfacePatch::at(shape, hit.face, hit.point, hit.normal);
     let ratio = solid_angle_ratio(&patch, query.w_l, hit.t, query.w_l, query.eta);
     found(Root { ratio, ..root });
 }

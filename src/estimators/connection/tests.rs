@@ -46,7 +46,7 @@ fn scene(shape: Shape, medium: Medium, lights: Vec<Light>, ray: Ray, paths: usiz
 }
 
 /// Mean and standard error of every observable over passes, and the anomalies.
-fn measure(estimator: &Connection, passes: u64, test: &str) -> (Vec<(f64, f64)>, Scores) {
+fn measure(estimator: &SpecularConnection, passes: u64, test: &str) -> (Vec<(f64, f64)>, Scores) {
     let mut scores = Scores::new(Layout::new(&estimator.field.scene));
     let key = StreamKey::named(test);
     let mut moments = vec![(0.0, 0.0); scores.observables.len()];
@@ -103,8 +103,8 @@ fn weights_sum_to_one() {
     for body in bodies {
         let scene = scene(body, medium(4.0, 0.9, 0.3), lights(), ray, 1);
         for (index, method) in METHODS.into_iter().enumerate() {
-            let estimator =
-                Connection::new(scene.clone(), method, Roulette::Below(1e-12)).expect("a scene for it");
+            let estimator = SpecularConnection::new(scene.clone(), method, Roulette::Below(1e-12))
+                .expect("a scene for it");
             let mut tries = 0;
             while tries < 60 {
                 let light = tries % 4;
@@ -120,7 +120,7 @@ fn weights_sum_to_one() {
                 let frame = Frame::about(hit.shading_normal);
                 let exit = WalkExit { hit, frame, wo: frame.to_local(-dir) };
                 let query = Query { x, w_l: sample.wi, eta: ETA };
-                let patch = patch::Patch::at(&scene.shape, hit.face, hit.point, hit.normal);
+                let patch = patch::SurfacePatch::at(&scene.shape, hit.face, hit.point, hit.normal);
                 let Judgement::Root(root) = query.judge(&patch, 1e-9) else { panic!("no root") };
                 let is_found = match method {
                     ConnectionMethod::StraightLine {} => continue, // has no density
@@ -128,7 +128,7 @@ fn weights_sum_to_one() {
                         &scene.shape,
                         &query,
                         hit.point,
-                        &mut facet::Work::default(),
+                        &mut facet::SolverWork::default(),
                     ),
                 };
                 let share = estimator.setup.shares[0][light];
@@ -197,7 +197,7 @@ fn camera_segment(scene: &Scene, ray: &Ray) -> (CameraSegment, f64) {
     (CameraSegment { origin: hit.point, dir, length }, (1.0 - surface.reflectance) / (ETA * ETA))
 }
 
-fn check_single(estimator: &Connection, expected: f64, test: &str) {
+fn check_single(estimator: &SpecularConnection, expected: f64, test: &str) {
     let (means, scores) = measure(estimator, 60, test);
     let (mean, error) = means[class(TransportClass::Single)];
     println!("{test}: {mean:.6} +- {error:.6}, expected {expected:.6}");
@@ -227,7 +227,7 @@ fn single_scattering_below_a_plane() {
         let expected = out * beam.single_scattering(segment.dir, segment.length, phase, sigma);
         for method in [ConnectionMethod::Conic {}, ConnectionMethod::Mnee {}, ConnectionMethod::Sms {}] {
             let estimator =
-                Connection::new(scene.clone(), method, Roulette::default()).expect("a scene");
+                SpecularConnection::new(scene.clone(), method, Roulette::default()).expect("a scene");
             check_single(&estimator, expected, &format!("{name} {method:?}"));
         }
     }
@@ -273,7 +273,7 @@ fn single_scattering_of_flat_facets() {
             out * refracting_polyhedron::single_scattering(&facets, toward, ETA, &segment, phase, sigma);
         for method in UNBIASED {
             let estimator =
-                Connection::new(scene.clone(), method, Roulette::default()).expect("a scene");
+                SpecularConnection::new(scene.clone(), method, Roulette::default()).expect("a scene");
             check_single(&estimator, expected, &format!("{name} {method:?}"));
         }
     }
@@ -311,12 +311,14 @@ fn single_scattering_of_the_sphere() {
     println!("{integral:?}");
     assert!(integral.error < 1e-3 * integral.value);
     for method in UNBIASED {
-        let estimator = Connection::new(scene.clone(), method, Roulette::default()).expect("a scene");
+        let estimator =
+            SpecularConnection::new(scene.clone(), method, Roulette::default()).expect("a scene");
         check_single(&estimator, expected, &format!("sphere {method:?}"));
     }
     // The biased ones are told apart.
     let straight = ConnectionMethod::StraightLine {};
-    let estimator = Connection::new(scene.clone(), straight, Roulette::default()).expect("a scene");
+    let estimator =
+        SpecularConnection::new(scene.clone(), straight, Roulette::default()).expect("a scene");
     let (mean, error) = measure(&estimator, 60, "straight line").0[class(TransportClass::Single)];
     println!("straight line: {mean:.6} +- {error:.6}, expected {expected:.6}");
     assert!((mean - expected).abs() > 5.0 * error, "{mean} {error} {expected}");
@@ -335,7 +337,8 @@ fn a_small_disc_is_parallel_light() {
     let parallel = scene(sphere(), medium(1.0, 0.9, 0.2), vec![sun(toward, 1.0)], ray, 2000);
     let wide = scene(sphere(), medium(1.0, 0.9, 0.2), vec![light], ray, 2000);
     let single = |scene: &Arc<Scene>, method: ConnectionMethod| {
-        let estimator = Connection::new(scene.clone(), method, Roulette::default()).expect("a scene");
+        let estimator =
+            SpecularConnection::new(scene.clone(), method, Roulette::default()).expect("a scene");
         let name = format!("a_small_disc_is_parallel_light {method:?}");
         measure(&estimator, 60, &name).0[class(TransportClass::Single)]
     };
@@ -354,7 +357,7 @@ fn what_is_biased_says_so() {
     let ray = Ray { origin: DVec3::Z * 3.0, dir: -DVec3::Z };
     let bias = |light: Light, shape: Shape, method: ConnectionMethod| {
         let scene = scene(shape, medium(1.0, 0.9, 0.2), vec![light], ray, 1);
-        let estimator = Connection::new(scene, method, Roulette::default()).expect("a scene");
+        let estimator = SpecularConnection::new(scene, method, Roulette::default()).expect("a scene");
         (estimator.bias() != Bias::Unbiased, estimator.notes().len())
     };
     let mesh = || Shape::Mesh(procedural::icosphere(1.0, 1, true).expect("closed"));

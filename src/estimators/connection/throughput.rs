@@ -21,7 +21,7 @@
 //! being cosines to the geometric normal Ng: 1 for true normals, else the factor by which shading
 //! normals break symmetry (Veach 1997, 5.3).
 
-use super::patch::Patch;
+use super::patch::SurfacePatch;
 use crate::geometry::FaceId;
 use crate::math::{DVec2, DVec3, Frame};
 use crate::optics::fresnel::fresnel;
@@ -80,7 +80,7 @@ pub(super) struct Constraint {
 }
 
 impl Query {
-    pub(super) fn constraint(&self, patch: &Patch) -> Constraint {
+    pub(super) fn constraint(&self, patch: &SurfacePatch) -> Constraint {
         let leg = patch.point - self.x;
         let distance = leg.length();
         let dir = leg / distance;
@@ -93,7 +93,7 @@ impl Query {
     ///
     /// Along dp the vector eta w - w_L changes by eta (1 - w w^T) dp / d, and the tangents s, t of N by
     /// -(s . dN) N.
-    pub(super) fn step(&self, patch: &Patch, at: &Constraint) -> Option<DVec3> {
+    pub(super) fn step(&self, patch: &SurfacePatch, at: &Constraint) -> Option<DVec3> {
         let Frame { s, t, .. } = Frame::about(patch.normal);
         let [a, b] = [s, t].map(|dp| {
             let across = dp - at.dir * at.dir.dot(dp);
@@ -107,7 +107,7 @@ impl Query {
     }
 
     /// Whether a point is a root, `tolerance` being the residual that counts as 0.
-    pub(super) fn judge(&self, patch: &Patch, tolerance: f64) -> Judgement {
+    pub(super) fn judge(&self, patch: &SurfacePatch, tolerance: f64) -> Judgement {
         let at = self.constraint(patch);
         let (ct, cl) = (at.dir.dot(patch.shading), self.w_l.dot(patch.shading));
         let is_refracted = at.residual.length() <= tolerance && ct > 0.0 && cl > 0.0;
@@ -133,7 +133,7 @@ impl Query {
 /// J = |d w_L / d w| at the point from which a ray runs to `patch` along `dir`; see the head of the
 /// file.
 pub(in crate::estimators) fn solid_angle_ratio(
-    patch: &Patch,
+    patch: &SurfacePatch,
     dir: DVec3,
     distance: f64,
     w_l: DVec3,

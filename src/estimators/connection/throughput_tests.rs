@@ -1,16 +1,15 @@
 //! The forms of the focusing, against each other and against finite differences.
 
-use super::super::patch::{Facet, Patch};
+use super::super::patch::{Facet, SurfacePatch};
 use super::super::testing::{direction, entering, meshes, stream};
 use super::*;
 use crate::geometry::{Ray, Shape, Side};
 use crate::reference::differences;
 
 /// Irradiance across the ray at x over that outside, without T, from the light's side: the area across w
-/// onto which the rays through a unit of the surface spread. With p on the surface, x = p - d w and w =
-/// (w_L + m N) / eta, m = eta ct
-/// - cl, dm = (cl / (eta ct) - 1) w_L . dN at fixed w_L.
-fn light_side(patch: &Patch, dir: DVec3, distance: f64, w_l: DVec3, eta: f64) -> f64 {
+/// onto which the rays through a unit of the surface spread. With p on the surface, x = p - d w and
+/// w = (w_L + m N) / eta, where m = eta ct - cl and dm = (cl / (eta ct) - 1) w_L . dN at fixed w_L.
+fn light_side(patch: &SurfacePatch, dir: DVec3, distance: f64, w_l: DVec3, eta: f64) -> f64 {
     let n = patch.shading;
     let (cl, eta_ct) = (w_l.dot(n), eta * dir.dot(n));
     let Frame { s, t, .. } = Frame::about(patch.normal);
@@ -25,7 +24,7 @@ fn light_side(patch: &Patch, dir: DVec3, distance: f64, w_l: DVec3, eta: f64) ->
 
 /// eta^2 (ctg / d^2) |dp / dw_L| at fixed x, by the implicit function of the constraint: (d r / d p) dp
 /// = -(d r / d w_L) dw_L.
-fn implicit(patch: &Patch, query: &Query) -> f64 {
+fn implicit(patch: &SurfacePatch, query: &Query) -> f64 {
     let at = query.constraint(patch);
     let Frame { s, t, .. } = Frame::about(patch.normal);
     let [a, b] = [s, t].map(|dp| {
@@ -40,8 +39,8 @@ fn implicit(patch: &Patch, query: &Query) -> f64 {
 }
 
 /// A patch about a point of a body.
-fn patch_at(shape: &Shape, face: FaceId, point: DVec3, normal: DVec3) -> Patch {
-    Patch::at(shape, face, point, normal)
+fn patch_at(shape: &Shape, face: FaceId, point: DVec3, normal: DVec3) -> SurfacePatch {
+    SurfacePatch::at(shape, face, point, normal)
 }
 
 /// On spheres, flat and bumpy meshes with interpolated normals: form by the implicit function to 1e-9,

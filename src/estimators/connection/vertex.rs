@@ -11,9 +11,9 @@
 //! (`Solver::finds`) has its lights to itself: the walk's hits score 0 there.
 
 use super::ConnectionSetup;
-use super::facet::Work;
+use super::facet::SolverWork;
 use super::method::WeightedRoot;
-use super::patch::Patch;
+use super::patch::SurfacePatch;
 use super::throughput::{Query, Root, solid_angle_ratio};
 use crate::estimators::bands::WalkBands;
 use crate::estimators::choice::choose_light;
@@ -78,7 +78,7 @@ impl Rivals for Connected<'_> {
         let sample = walk.scene.lights[light].sample(walk.band, stream.draw2());
         let shape = &*walk.scene.shape;
         let query = Query { x: point, w_l: sample.wi, eta: walk.boundary.eta() };
-        let mut work = Work::default();
+        let mut work = SolverWork::default();
         let mut roots = std::mem::take(found);
         roots.clear();
         setup.solver.roots(shape, &query, stream, &mut work, &mut roots);
@@ -122,7 +122,7 @@ impl Rivals for Connected<'_> {
         }
         let shape = &*walk.scene.shape;
         let query = Query { x: departure.point, w_l: wi, eta: walk.boundary.eta() };
-        let mut work = Work::default();
+        let mut work = SolverWork::default();
         let is_found = setup.solver.finds(shape, &query, exit.hit.point, &mut work);
         walk.scores.count_many(Cost::Rays, work.rays);
         match is_found {
@@ -132,7 +132,7 @@ impl Rivals for Connected<'_> {
         }
         let leg = exit.hit.point - departure.point;
         let distance = leg.length();
-        let patch = Patch::at(shape, exit.hit.face, exit.hit.point, exit.hit.normal);
+        let patch = SurfacePatch::at(shape, exit.hit.face, exit.hit.point, exit.hit.normal);
         let ratio = solid_angle_ratio(&patch, leg / distance, distance, wi, query.eta);
         let phase = walk.medium.phase.pdf(departure.arrival.dot(leg / distance));
         let walked = phase * transmittance(walk.medium.sigma_t, distance);

@@ -2,7 +2,7 @@
 
 use super::testing::{Lamp, light, medium, sphere};
 use super::*;
-use crate::estimators::connection::{Connection, ConnectionMethod};
+use crate::estimators::connection::{ConnectionMethod, SpecularConnection};
 use crate::estimators::light_trace::LightTracer;
 use crate::estimators::path::PathTracer;
 use crate::estimators::{Anomaly, Layout, Roulette, TransportClass};
@@ -77,7 +77,7 @@ const SCATTERED: [TransportClass; 4] = [
 fn the_sphere_agrees_with_the_connection_and_with_light_tracing() {
     let name = "the_sphere_agrees";
     let scene = flux(sphere(), medium(1.0, 0.9, 0.0), Lamp::Sun);
-    let conic = Connection::new(scene.clone(), ConnectionMethod::Conic {}, Roulette::default());
+    let conic = SpecularConnection::new(scene.clone(), ConnectionMethod::Conic {}, Roulette::default());
     let conic = measure(&scene, &conic.expect("a scene for it"), 600, "the_sphere_agrees, conic");
     let light = LightTracer::new(scene.clone(), Some(4000)).expect("a scene for it");
     let light = measure(&scene, &light, 600, "the_sphere_agrees, light");
@@ -107,8 +107,11 @@ fn bodies_that_are_not_convex_agree() {
             let test = format!("bodies_that_are_not_convex_agree, {name}, {lamp:?}");
             let own = measure(&scene, &joined(&scene, SneePreset::Guided), 600, &test);
             let other: Box<dyn Estimator> = if lamp == Lamp::Sun {
-                let conic =
-                    Connection::new(scene.clone(), ConnectionMethod::Conic {}, Roulette::default());
+                let conic = SpecularConnection::new(
+                    scene.clone(),
+                    ConnectionMethod::Conic {},
+                    Roulette::default(),
+                );
                 Box::new(conic.expect("a scene for it"))
             } else {
                 Box::new(PathTracer::new(scene.clone(), Roulette::default()).expect("a scene for it"))

@@ -44,7 +44,7 @@ use super::last_vertex::GuidedEnd;
 use super::state::{Connections, Slot};
 use crate::estimators::Anomaly;
 use crate::estimators::bands::WalkBands;
-use crate::estimators::connection::{Conic, Patch, Query, Root, Work, solid_angle_ratio};
+use crate::estimators::connection::{Conic, Query, Root, SolverWork, SurfacePatch, solid_angle_ratio};
 use crate::estimators::walk::{CameraWalk, WalkExit};
 use crate::geometry::Hit;
 use crate::math::{DVec3, Frame};
@@ -105,7 +105,7 @@ pub(super) fn density<B: WalkBands>(
     let x_j = walk.rivals.vertex(x_j);
     let q = technique.call.call().within(setup.sigma, clearance(walk, x_j.point));
     let Hit { face, point, normal, .. } = exit.hit;
-    let patch = Patch::at(&walk.scene.shape, face, point, normal);
+    let patch = SurfacePatch::at(&walk.scene.shape, face, point, normal);
     let ratio = solid_angle_ratio(&patch, to_k.dir, to_k.length, end.w_l, walk.boundary.eta());
     let pdf = q * end.by_guide * ratio;
     if pdf == 0.0 {
@@ -141,7 +141,7 @@ pub(super) fn draw<'a, B: WalkBands>(
     let query = Query { x: x_j, w_l: sample.wi, eta: walk.boundary.eta() };
     let mut roots = std::mem::take(&mut walk.rivals.roots);
     roots.clear();
-    let mut work = Work::default();
+    let mut work = SolverWork::default();
     technique.solver.roots(&walk.scene.shape, &query, &mut work, &mut |root| roots.push(root));
     (0..work.wrong_side).for_each(|_| walk.scores.note(Anomaly::WrongSide));
     Some(LitVertex { guide, w_l: sample.wi, radiance: sample.radiance, roots })

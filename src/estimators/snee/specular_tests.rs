@@ -11,7 +11,7 @@ use super::testing::*;
 use super::*;
 use crate::estimators::Layout;
 use crate::estimators::bands::WalkBands;
-use crate::estimators::connection::{Query, Root, Work};
+use crate::estimators::connection::{Query, Root, SolverWork};
 use crate::estimators::walk::{Rivals, WalkExit};
 use crate::geometry::{Hit, Shape, procedural};
 use crate::math::{DVec3, Frame, exp};
@@ -103,7 +103,9 @@ fn connected<'a, B: WalkBands>(walk: &mut Walk<'a, B>, path: &FixedPath) -> Guid
     let query = Query { x, w_l: path.w_l, eta: walk.boundary.eta() };
     let mut roots: Vec<Root> = Vec::new();
     let technique = setup.specular.as_ref().expect("takes part");
-    technique.solver.roots(&walk.scene.shape, &query, &mut Work::default(), &mut |r| roots.push(r));
+    technique
+        .solver
+        .roots(&walk.scene.shape, &query, &mut SolverWork::default(), &mut |r| roots.push(r));
     let apart = |root: &Root| root.point.distance(path.exit.hit.point);
     let root = roots.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).copied().expect("a root");
     assert!(apart(&root) < 1e-6, "the nearest root is off by {}", apart(&root));
