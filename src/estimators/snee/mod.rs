@@ -100,7 +100,8 @@ impl Snee {
             check_shared(&scene)?;
         }
         let options = Arc::new(options);
-        let is_connected = options.connection.is_some() && scene.boundary.iter().any(specular::is_served);
+        let is_connected =
+            options.connection.is_some() && scene.boundary.iter().any(specular::is_served);
         let solver = is_connected.then(|| Arc::new(Conic::new(&scene.shape)));
         let setup = |band: usize| {
             let media = if options.share_bands { &scene.medium[..] } else { &scene.medium[band..=band] };

@@ -4,7 +4,6 @@ use super::testing::{Lamp, light, medium, sphere};
 use super::*;
 use crate::estimators::connection::{Connection, ConnectionMethod};
 use crate::estimators::light_trace::LightTracer;
-use crate::estimators::path::PathTracer;
 use crate::estimators::{Anomaly, Layout, Roulette, TransportClass};
 use crate::geometry::{BoundingSphere, Mesh, Ray, Shape, procedural};
 use crate::math::{DVec3, Frame};
@@ -92,8 +91,8 @@ fn the_sphere_agrees_with_the_connection_and_with_light_tracing() {
     }
 }
 
-/// Bodies that are not convex, forward scattering: parallel light as the connection alone has it, a disc as the path
-/// tracer has it, in every class.
+/// Bodies that are not convex, forward scattering: parallel light and a disc as the connection alone has them, in every
+/// class.
 #[test]
 fn bodies_that_are_not_convex_agree() {
     let mesh = |mesh: Result<Mesh>| Arc::new(Shape::Mesh(mesh.expect("closed")));
@@ -106,15 +105,9 @@ fn bodies_that_are_not_convex_agree() {
             let scene = flux(shape.clone(), medium(2.0, 0.9, 0.8), lamp);
             let test = format!("bodies_that_are_not_convex_agree, {name}, {lamp:?}");
             let own = measure(&scene, &joined(&scene, SneePreset::Guided), 600, &test);
-            let other: Box<dyn Estimator> = if lamp == Lamp::Sun {
-                let conic =
-                    Connection::new(scene.clone(), ConnectionMethod::Conic {}, Roulette::default());
-                Box::new(conic.expect("a scene for it"))
-            } else {
-                Box::new(PathTracer::new(scene.clone(), Roulette::default()).expect("a scene for it"))
-            };
-            let passes = if lamp == Lamp::Sun { 600 } else { 4000 };
-            let other = measure(&scene, &*other, passes, &format!("{test}, other"));
+            let conic = Connection::new(scene.clone(), ConnectionMethod::Conic {}, Roulette::default());
+            let conic = conic.expect("a scene for it");
+            let other = measure(&scene, &conic, 600, &format!("{test}, conic"));
             for class in SCATTERED {
                 agree(&test, class, [&own, &other]);
             }

@@ -42,10 +42,10 @@ use super::end::{Call, End, Leg};
 use super::guide::Guide;
 use super::last_vertex::GuidedEnd;
 use super::state::{Connections, Slot};
+use crate::estimators::Anomaly;
 use crate::estimators::bands::WalkBands;
 use crate::estimators::connection::{Conic, Patch, Query, Root, Work, solid_angle_ratio};
 use crate::estimators::walk::{CameraWalk, WalkExit};
-use crate::estimators::Anomaly;
 use crate::geometry::Hit;
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
@@ -66,7 +66,7 @@ pub struct ConnectionCall {
 
 impl Default for ConnectionCall {
     fn default() -> ConnectionCall {
-        ConnectionCall { most: 1.0, decay: 0.5 }
+        ConnectionCall { most: 1.0, decay: 1.0 }
     }
 }
 
