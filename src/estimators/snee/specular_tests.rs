@@ -13,7 +13,7 @@ use crate::estimators::Layout;
 use crate::estimators::bands::WalkBands;
 use crate::estimators::connection::{Query, Root, Work};
 use crate::estimators::walk::{Rivals, WalkExit};
-use crate::geometry::{Hit, Ray, Shape, Side, procedural};
+use crate::geometry::{Hit, Shape, procedural};
 use crate::math::{DVec3, Frame, exp};
 use crate::optics::medium::Medium;
 use crate::sampling::distance::transmittance;
@@ -258,32 +258,6 @@ fn weights_with_connections_sum_to_one() {
         let expected = [true, row == 1, row == 1, true, true];
         for (count, expected) in counts.into_iter().zip(expected) {
             assert_eq!(count > 0, expected, "{row}: {counts:?}");
-        }
-    }
-}
-
-/// A root that x_j does not see ends no path, one that it sees does.
-#[test]
-fn hidden_roots_end_no_path() {
-    let key = StreamKey::named("hidden_roots_end_no_path");
-    let mut stream = key.pass(0).stream(0, Purpose::Sensor);
-    let scene = body(&ring(), SMOOTH, &[medium(2.0, 0.9, 0.3)], &[Lamp::Sun]);
-    let [_, (_, options), ..] = options();
-    let snee = Snee::connected(scene.clone(), options).expect("a scene for it");
-    let mut counts = [0u32; 2];
-    while counts.iter().any(|&count| count < 50) {
-        let Some(path) = FixedPath::draw(&scene, 0, &mut stream, false) else { continue };
-        let (mut scores, pass) = (Scores::new(Layout::new(&scene)), key.pass(1));
-        let mut walk = led((&snee, &pass, 0, OneBand), &mut scores, &path, Before::Nothing, |_| {});
-        walk.rivals.stream = Stream::scripted(&[1e-9]);
-        let technique = walk.rivals.setup.specular.as_ref().expect("takes part");
-        let lit = specular::draw(&mut walk, technique).expect("a call");
-        for root in &lit.roots {
-            let ray = Ray { origin: walk.rivals.vertex(Slot::Latest).point, dir: root.dir };
-            let first = scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY).expect("a hit");
-            let sees = (first.t - root.distance).abs() < 1e-9;
-            assert_eq!(lit.end(&mut walk, root).is_some(), sees, "{root:?}, first at {}", first.t);
-            counts[usize::from(sees)] += 1;
         }
     }
 }
