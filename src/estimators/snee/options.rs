@@ -100,7 +100,7 @@ pub struct SneeChoices {
     pub last_vertex: Option<LastVertex>,
     /// Connections of the last vertex through a smooth boundary; `most = 0` switches them off.
     ///
-    /// Without it `snee` has none, and `snee_connect` has one with `most = 1, decay = 0.5` and no `last_vertex`.
+    /// Without it `snee` has none, and `snee_connect` has one with `most = 1, decay = 1` and no `last_vertex`.
     pub connection: Option<ConnectionCall>,
     /// Whether a smooth boundary's reflection of a concentrated light is scored by its expectation.
     pub expected_reflection: Option<bool>,
@@ -308,6 +308,20 @@ mod tests {
         assert!(fewer.truncated && fewer.strategies.bottom_to_top);
         let guided = words("last_vertex = { most = 0 }").options().expect("options");
         assert_eq!(SneeOptions { last_vertex: None, ..SneePreset::Guided.options() }, guided);
+    }
+
+    #[test]
+    fn connections_take_part_where_the_kind_or_the_file_asks() {
+        assert_eq!(words("").options().expect("options").connection, None);
+        let connected = |text| words(text).connected().expect("options");
+        let default = connected("");
+        assert_eq!((default.connection, default.last_vertex), (Some(ConnectionCall::default()), None));
+        let both = connected("connection = { most = 0.5 }\nlast_vertex = { most = 0.25 }");
+        assert_eq!(both.connection, Some(ConnectionCall { most: 0.5, decay: 0.0 }));
+        assert_eq!(both.last_vertex.map(|last| last.most), Some(0.25));
+        assert_eq!(connected("connection = { most = 0 }").connection, None, "which the kind refuses");
+        let alone = words("strategies = []\nconnection = { most = 1 }\nleast_concentration = 1");
+        assert!(alone.options().is_ok(), "the connection is left");
     }
 
     #[test]

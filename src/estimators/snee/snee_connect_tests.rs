@@ -4,9 +4,8 @@ use super::testing::{Lamp, light, medium, sphere};
 use super::*;
 use crate::estimators::connection::{ConnectionMethod, SpecularConnection};
 use crate::estimators::light_trace::LightTracer;
-use crate::estimators::path::PathTracer;
 use crate::estimators::{Anomaly, Layout, Roulette, TransportClass};
-use crate::geometry::{BoundingSphere, Mesh, Ray, Shape, procedural};
+use crate::geometry::{BoundingSphere, Ray, Shape};
 use crate::math::{DVec3, Frame};
 use crate::optics::medium::Medium;
 use crate::sampling::stream::StreamKey;
@@ -88,39 +87,6 @@ fn the_sphere_agrees_with_the_connection_and_with_light_tracing() {
         }
         for class in [TransportClass::Single, TransportClass::Multiple] {
             agree(&format!("{name}, {preset:?}, light"), class, [&own, &light]);
-        }
-    }
-}
-
-/// Bodies that are not convex, forward scattering: parallel light as the connection alone has it, a disc as the path
-/// tracer has it, in every class.
-#[test]
-fn bodies_that_are_not_convex_agree() {
-    let mesh = |mesh: Result<Mesh>| Arc::new(Shape::Mesh(mesh.expect("closed")));
-    let bodies = [
-        ("torus", mesh(procedural::torus(0.7, 0.3, [24, 12], false))),
-        ("bumpy", mesh(procedural::bumpy_sphere(1.0, 3, 0.05, 6.0, true))),
-    ];
-    for (name, shape) in bodies {
-        for lamp in [Lamp::Sun, Lamp::WideDisc] {
-            let scene = flux(shape.clone(), medium(2.0, 0.9, 0.8), lamp);
-            let test = format!("bodies_that_are_not_convex_agree, {name}, {lamp:?}");
-            let own = measure(&scene, &joined(&scene, SneePreset::Guided), 600, &test);
-            let other: Box<dyn Estimator> = if lamp == Lamp::Sun {
-                let conic = SpecularConnection::new(
-                    scene.clone(),
-                    ConnectionMethod::Conic {},
-                    Roulette::default(),
-                );
-                Box::new(conic.expect("a scene for it"))
-            } else {
-                Box::new(PathTracer::new(scene.clone(), Roulette::default()).expect("a scene for it"))
-            };
-            let passes = if lamp == Lamp::Sun { 600 } else { 4000 };
-            let other = measure(&scene, &*other, passes, &format!("{test}, other"));
-            for class in SCATTERED {
-                agree(&test, class, [&own, &other]);
-            }
         }
     }
 }

@@ -66,7 +66,7 @@ pub struct ConnectionCall {
 
 impl Default for ConnectionCall {
     fn default() -> ConnectionCall {
-        ConnectionCall { most: 1.0, decay: 0.5 }
+        ConnectionCall { most: 1.0, decay: 1.0 }
     }
 }
 

@@ -259,7 +259,7 @@ fn weights_with_connections_sum_to_one() {
     for (row, counts) in seen.into_iter().enumerate() {
         let expected = [true, row == 1, row == 1, true, true];
         for (count, expected) in counts.into_iter().zip(expected) {
-            assert_eq!(count > 20, expected, "{row}: {counts:?}");
+            assert_eq!(count > 0, expected, "{row}: {counts:?}");
         }
     }
 }
