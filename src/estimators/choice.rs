@@ -17,11 +17,16 @@ pub(super) fn source_shares(scene: &Scene, emitting: Option<f64>) -> Vec<Vec<f64
         .map(|band| {
             let mut strengths: Vec<f64> = scene.lights.iter().map(|l| l.strength(band)).collect();
             strengths.extend(emitting.map(|length| 4.0 * PI * length * scene.medium[band].emission));
-            let total: f64 = strengths.iter().sum();
-            let share = |s: &f64| if total > 0.0 { s / total } else { 0.0 };
-            strengths.iter().map(share).collect()
+            shares(&strengths)
         })
         .collect()
+}
+
+/// Each of the strengths over their sum; all 0 where they are.
+pub(super) fn shares(strengths: &[f64]) -> Vec<f64> {
+    let total: f64 = strengths.iter().sum();
+    let share = |s: &f64| if total > 0.0 { s / total } else { 0.0 };
+    strengths.iter().map(share).collect()
 }
 
 /// The light that `u` selects and the probability of that choice, from one band's shares.

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::super::Layout;
 use super::super::path::{PathTracer, Roulette};
+use super::super::testing::measure;
 use super::*;
 use crate::geometry::{Mesh, procedural};
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
@@ -72,30 +73,6 @@ fn image(shape: &Shape, size: f64, height: f64) -> Sensor {
 
 fn tracer(scene: Scene) -> LightTracer {
     LightTracer::new(Arc::new(scene), None).expect("a sensor that it serves")
-}
-
-/// Mean and standard error of every observable over passes.
-fn measure(
-    estimator: &dyn Estimator,
-    layout: &Layout,
-    passes: u64,
-    test: &str,
-) -> (Vec<(f64, f64)>, Scores) {
-    let mut scores = Scores::new(layout.clone());
-    let key = StreamKey::named(test);
-    let mut moments = vec![(0.0, 0.0); scores.observables.len()];
-    for pass in 0..passes {
-        scores.clear();
-        estimator.pass(&[0], &key.pass(pass), &mut scores);
-        for ((mean, m2), x) in moments.iter_mut().zip(&scores.observables) {
-            let before = x - *mean;
-            *mean += before / (pass + 1) as f64;
-            *m2 += before * (x - *mean);
-        }
-    }
-    let n = passes as f64;
-    let estimate = |(mean, m2): (f64, f64)| (mean, (m2 / (n * (n - 1.0).max(1.0))).sqrt());
-    (moments.into_iter().map(estimate).collect(), scores)
 }
 
 fn traced(scene: Scene, passes: u64, test: &str) -> (Vec<(f64, f64)>, Scores) {

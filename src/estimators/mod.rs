@@ -25,6 +25,7 @@ mod roulette;
 mod scores;
 mod serves;
 pub mod snee;
+mod visibility;
 mod walk;
 
 pub use estimator::{BandUse, Bias, Estimator, HeavyTail};
@@ -57,3 +58,5 @@ mod path_length_tests;
 mod rings_tests;
 #[cfg(test)]
 mod streams_tests;
+#[cfg(test)]
+mod testing;

@@ -2,6 +2,7 @@
 
 use super::super::Layout;
 use super::super::roulette::roulette;
+use super::super::testing;
 use super::*;
 use crate::geometry::{Ray, Shape, procedural};
 use crate::math::{DVec3, Frame};
@@ -31,26 +32,10 @@ fn down() -> Ray {
     Ray { origin: DVec3::new(0.0, 0.0, 3.0), dir: -DVec3::Z }
 }
 
-/// Mean and standard error of every observable over passes.
 fn measure(scene: Scene, roulette: Roulette, passes: u64, test: &str) -> (Vec<(f64, f64)>, Scores) {
     let layout = Layout::new(&scene);
     let tracer = PathTracer::new(Arc::new(scene), roulette).expect("a scene that it serves");
-    let mut scores = Scores::new(layout);
-    let key = StreamKey::named(test);
-    let mut moments = vec![(0.0, 0.0); scores.observables.len()];
-    for pass in 0..passes {
-        scores.clear();
-        tracer.pass(&[0], &key.pass(pass), &mut scores);
-        // Welford's update: a variance of 0 comes out as 0.
-        for ((mean, m2), x) in moments.iter_mut().zip(&scores.observables) {
-            let before = x - *mean;
-            *mean += before / (pass + 1) as f64;
-            *m2 += before * (x - *mean);
-        }
-    }
-    let n = passes as f64;
-    let estimate = |(mean, m2): (f64, f64)| (mean, (m2 / (n * (n - 1.0).max(1.0))).sqrt());
-    (moments.into_iter().map(estimate).collect(), scores)
+    testing::measure(&tracer, &layout, passes, test)
 }
 
 const SPHERE: Shape = Shape::Sphere { radius: 1.0 };

@@ -72,22 +72,27 @@ pub(super) trait Rivals: Sized {
     /// The walk has met a smooth boundary from outside: scores lights that it reflects by their
     /// expectation.
     fn reflect<B: WalkBands>(
-        walk: &mut CameraWalk<'_, Self, B>,
-        hit: &Hit,
-        reflected: DVec3,
-        reflectance: f64,
-    );
+        _: &mut CameraWalk<'_, Self, B>,
+        _: &Hit,
+        _reflected: DVec3,
+        _reflectance: f64,
+    ) {
+    }
 
     /// Whether [`Self::reflect`] scores a light from this direction.
     fn has_scored_reflection<B: WalkBands>(
-        walk: &CameraWalk<'_, Self, B>,
-        light: usize,
-        wi: DVec3,
-    ) -> bool;
+        _: &CameraWalk<'_, Self, B>,
+        _light: usize,
+        _wi: DVec3,
+    ) -> bool {
+        false
+    }
 
     /// Which of BSDF and light sampling take part at the end of a path that leaves from the walk's
     /// latest medium vertex: 1 or 0 each.
-    fn unidirectional(&self) -> [f64; 2];
+    fn unidirectional(&self) -> [f64; 2] {
+        [1.0, 1.0]
+    }
 
     /// Sum over the rivals of their densities of the path that ends at `exit` and continues towards
     /// `wi`, light `light`, relative to the density of the walk's medium vertices.
@@ -111,19 +116,6 @@ impl Rivals for Unrivalled {
     fn meet_surface(&mut self) {}
 
     #[inline]
-    fn reflect<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
-
-    #[inline]
-    fn has_scored_reflection<B: WalkBands>(_: &CameraWalk<'_, Self, B>, _: usize, _: DVec3) -> bool {
-        false
-    }
-
-    #[inline]
-    fn unidirectional(&self) -> [f64; 2] {
-        [1.0, 1.0]
-    }
-
-    #[inline]
     fn densities<B: WalkBands>(
         _: &mut CameraWalk<'_, Self, B>,
         _: &WalkExit,
@@ -132,6 +124,16 @@ impl Rivals for Unrivalled {
     ) -> f64 {
         0.0
     }
+}
+
+/// A medium vertex of a walk, from which techniques start.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WalkVertex {
+    pub point: DVec3,
+    /// Direction of travel on arrival.
+    pub arrival: DVec3,
+    /// Density of the walk up to here under any hero, over that under its own.
+    pub walks: f64,
 }
 
 /// Where a walk meets the boundary from inside.

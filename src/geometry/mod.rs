@@ -172,7 +172,7 @@ impl Shape {
     /// nothing. The end must be farther inside than the rounding of what [`Self::intersect`] computes: a
     /// crossing of a plane is known to some 2^-53 of the shape's size (of the half-space: of the depth
     /// of the start). On a sphere of radius 1 a chord that reaches a depth of 5e-10 is at least 6e-5
-    /// long, and its ends are known to 1e-11 of that.
+    /// long, so that the square root that its ends are found by has lost no more than 1e-11.
     #[inline]
     fn surely_holds(&self, start: DVec3, end: DVec3) -> bool {
         const MARGIN: f64 = 1e-9;

@@ -51,6 +51,16 @@ pub struct LightSample {
 }
 
 impl Light {
+    /// 4 pi int L^2 / (int L)^2: 1 for a constant sky, 4 pi over its solid angle for a disc, infinite for
+    /// parallel light. A map counts as a sky; its bright part has a concentration of its own.
+    pub(crate) fn concentration(&self) -> f64 {
+        match self.emission {
+            Emission::Directional { .. } => f64::INFINITY,
+            Emission::Cap { height, .. } => 2.0 / height,
+            Emission::Map(_) => 1.0,
+        }
+    }
+
     /// Draws a direction towards the light.
     #[inline]
     pub fn sample(&self, band: usize, u: [f64; 2]) -> LightSample {

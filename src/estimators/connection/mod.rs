@@ -51,12 +51,13 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::bands::OneBand;
+use super::choice::shares;
 use super::walk::{CameraWalk, Field, Path, Unrivalled};
 use super::{Bias, BoundaryKind, Estimator, EstimatorKind, Roulette, Scores, Serves, read_options};
 use crate::error::Result;
 use crate::geometry::Shape;
 use crate::sampling::stream::{PassKey, Purpose};
-use crate::scene::{Emission, Light, Scene};
+use crate::scene::{Light, Scene};
 
 use method::Solver;
 use vertex::Connected;
@@ -134,7 +135,12 @@ impl SpecularConnection {
         roulette: Roulette,
     ) -> Result<SpecularConnection> {
         SpecularConnection::KIND.check(&scene)?;
-        let shares = (0..scene.bands()).map(|band| shares(&scene.lights, band)).collect();
+        let is_connected = |light: &Light| light.concentration() >= LEAST_CONCENTRATION;
+        let of_band = |band: usize| {
+            let strength = |light: &Light| if is_connected(light) { light.strength(band) } else { 0.0 };
+            shares(&scene.lights.iter().map(strength).collect::<Vec<f64>>())
+        };
+        let shares = (0..scene.bands()).map(of_band).collect();
         let is_density_known =
             !matches!(method, ConnectionMethod::Sms {} | ConnectionMethod::StraightLine {});
         let setup =
@@ -145,21 +151,6 @@ impl SpecularConnection {
     fn has_parallel_light(&self) -> bool {
         self.field.scene.lights.iter().any(Light::is_directional)
     }
-}
-
-fn is_connected(light: &Light) -> bool {
-    match &light.emission {
-        Emission::Directional { .. } => true,
-        Emission::Cap { height, .. } => 2.0 / height >= LEAST_CONCENTRATION,
-        Emission::Map(_) => false,
-    }
-}
-
-/// Probability of choosing each light that is connected to, in proportion to its strength.
-fn shares(lights: &[Light], band: usize) -> Vec<f64> {
-    let strength = |light: &Light| if is_connected(light) { light.strength(band) } else { 0.0 };
-    let total: f64 = lights.iter().map(strength).sum();
-    lights.iter().map(|light| if total > 0.0 { strength(light) / total } else { 0.0 }).collect()
 }
 
 impl Estimator for SpecularConnection {

@@ -1,10 +1,12 @@
 //! Weights that sum to 1, and means against closed forms.
 
 use super::method::WeightedRoot;
+use super::testing::entering;
 use super::throughput::{Judgement, Query};
-use super::vertex::{self, Departure, Drawn};
+use super::vertex::{self, Drawn};
 use super::*;
-use crate::estimators::walk::WalkExit;
+use crate::estimators::testing::measure as measure_passes;
+use crate::estimators::walk::{WalkExit, WalkVertex};
 use crate::estimators::{Anomaly, Layout, TransportClass};
 use crate::geometry::{Ray, Side, procedural};
 use crate::math::{DVec3, Frame, cos, exp, integrate};
@@ -17,8 +19,8 @@ use crate::reference::refracting_polyhedron::{self, CameraSegment};
 use crate::reference::refracting_sphere::LitSphere;
 use crate::sampling::distance::transmittance;
 use crate::sampling::stream::StreamKey;
-use crate::scene::Sensor;
 use crate::scene::sensor::Probe;
+use crate::scene::{Emission, Sensor};
 
 const ETA: f64 = 1.4;
 
@@ -45,23 +47,8 @@ fn scene(shape: Shape, medium: Medium, lights: Vec<Light>, ray: Ray, paths: usiz
     Arc::new(Scene { shape: Arc::new(shape), boundary, medium: vec![medium], lights, sensor })
 }
 
-/// Mean and standard error of every observable over passes, and the anomalies.
 fn measure(estimator: &SpecularConnection, passes: u64, test: &str) -> (Vec<(f64, f64)>, Scores) {
-    let mut scores = Scores::new(Layout::new(&estimator.field.scene));
-    let key = StreamKey::named(test);
-    let mut moments = vec![(0.0, 0.0); scores.observables.len()];
-    for pass in 0..passes {
-        scores.clear();
-        estimator.pass(&[0], &key.pass(pass), &mut scores);
-        for ((mean, m2), x) in moments.iter_mut().zip(&scores.observables) {
-            let before = x - *mean;
-            *mean += before / (pass + 1) as f64;
-            *m2 += before * (x - *mean);
-        }
-    }
-    let n = passes as f64;
-    let estimate = |(mean, m2): (f64, f64)| (mean, (m2 / (n * (n - 1.0))).sqrt());
-    (moments.into_iter().map(estimate).collect(), scores)
+    measure_passes(estimator, &Layout::new(&estimator.field.scene), passes, test)
 }
 
 fn class(class: TransportClass) -> usize {
@@ -109,8 +96,7 @@ fn weights_sum_to_one() {
             while tries < 60 {
                 let light = tries % 4;
                 let sample = scene.lights[light].sample(0, stream.draw2());
-                let Some((hit, dir, length)) =
-                    testing::entering(&scene.shape, sample.wi, ETA, stream.draw2())
+                let Some((hit, dir, length)) = entering(&scene.shape, sample.wi, ETA, stream.draw2())
                 else {
                     continue;
                 };
@@ -145,7 +131,7 @@ fn weights_sum_to_one() {
                     x + DVec3::new(0.01, 0.02, -0.01),
                 );
                 walk.lead_to(x, false);
-                let departure = Departure { point: x, arrival: walk.ray.dir, walks: 1.0 };
+                let departure = WalkVertex { point: x, arrival: walk.ray.dir, walks: 1.0 };
                 let throughput = walk.throughput;
                 let observed = 1 + TransportClass::ALL.len() + light;
                 // What the connection scores for the root, if it draws this direction.
@@ -366,6 +352,10 @@ fn what_is_biased_says_so() {
     let wide = METHODS.map(|method| bias(disc(DVec3::Z, 0.01, 1.0), mesh(), method));
     assert_eq!(wide, [(false, 0), (false, 0), (false, 0), (false, 0), (true, 0)]);
     // An environment is left to the walk, whatever the method.
-    let sky = shares(&[disc(DVec3::Z, 2.0, 1.0), disc(DVec3::Z, 0.1, 1.0)], 0);
-    assert_eq!(sky, [0.0, 1.0]);
+    let lights = vec![disc(DVec3::Z, 2.0, 1.0), disc(DVec3::Z, 0.1, 1.0)];
+    let scene = scene(mesh(), medium(1.0, 0.9, 0.2), lights, ray, 1);
+    for method in METHODS {
+        let estimator = SpecularConnection::new(scene.clone(), method, Roulette::default());
+        assert_eq!(estimator.expect("a scene").setup.shares, [[0.0, 1.0]]);
+    }
 }

@@ -17,32 +17,19 @@ use super::patch::SurfacePatch;
 use super::throughput::{Query, Root, solid_angle_ratio};
 use crate::estimators::bands::WalkBands;
 use crate::estimators::choice::choose_light;
-use crate::estimators::walk::{CameraWalk, Rivals, WalkExit};
+use crate::estimators::walk::{CameraWalk, Rivals, WalkExit, WalkVertex};
 use crate::estimators::{Anomaly, Cost};
-use crate::geometry::{Hit, Ray, Side};
+use crate::geometry::Ray;
 use crate::math::DVec3;
 use crate::sampling::distance::transmittance;
 use crate::sampling::stream::Stream;
-
-/// Part of a leg's length within which two ways of meeting the same point of the boundary may differ.
-const LEG: f64 = 1e-7;
-
-/// A medium vertex from which a walk may leave.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Departure {
-    pub point: DVec3,
-    /// Direction of travel on arrival.
-    pub arrival: DVec3,
-    /// Density of the walk up to here under any hero, over that under its own.
-    pub walks: f64,
-}
 
 /// State that a walk carries.
 pub(super) struct Connected<'a> {
     setup: &'a ConnectionSetup,
     stream: Stream,
     /// The vertex that the walk came from, if it has not met the boundary since.
-    departure: Option<Departure>,
+    departure: Option<WalkVertex>,
     found: Vec<WeightedRoot>,
 }
 
@@ -69,7 +56,7 @@ impl<'a> Connected<'a> {
 impl Rivals for Connected<'_> {
     fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>) {
         let Ray { origin: point, dir: arrival } = walk.ray;
-        let departure = Departure { point, arrival, walks: walk.bands.density() };
+        let departure = WalkVertex { point, arrival, walks: walk.bands.density() };
         let Connected { setup, stream, departure: latest, found } = &mut walk.rivals;
         *latest = Some(departure);
         let Some((light, choice)) = choose_light(&setup.shares[walk.band], stream.draw()) else {
@@ -95,16 +82,6 @@ impl Rivals for Connected<'_> {
 
     fn meet_surface(&mut self) {
         self.departure = None;
-    }
-
-    fn reflect<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
-
-    fn has_scored_reflection<B: WalkBands>(_: &CameraWalk<'_, Self, B>, _: usize, _: DVec3) -> bool {
-        false
-    }
-
-    fn unidirectional(&self) -> [f64; 2] {
-        [1.0, 1.0]
     }
 
     fn densities<B: WalkBands>(
@@ -143,7 +120,7 @@ impl Rivals for Connected<'_> {
 /// Scores one root, where nothing hides it from x or from the light.
 pub(super) fn score<B: WalkBands>(
     walk: &mut CameraWalk<'_, Connected<'_>, B>,
-    departure: &Departure,
+    departure: &WalkVertex,
     drawn: &Drawn,
     found: &WeightedRoot,
     w_l: DVec3,
@@ -160,24 +137,12 @@ pub(super) fn score<B: WalkBands>(
     let eta = walk.boundary.eta();
     // A root at grazing light has T = 0 and an infinite J.
     let value = weight * root.transmittance * (eta * eta * drawn.radiance) * walked;
-    if value == 0.0 || density == f64::INFINITY || walk.is_hidden(departure.point, &root, w_l) {
+    if value == 0.0 || density == f64::INFINITY {
+        return;
+    }
+    if !walk.sees_point(departure.point, root.point) || walk.is_shadowed(root.point, root.face, w_l) {
         return;
     }
     let score = walk.throughput * value / density;
     walk.score_with(&bands, walk.history.class(), drawn.light, score);
-}
-
-impl<B: WalkBands> CameraWalk<'_, Connected<'_>, B> {
-    /// Whether something is between x and the boundary point, or between that and the light.
-    fn is_hidden(&mut self, x: DVec3, root: &Root, w_l: DVec3) -> bool {
-        let shape = &*self.scene.shape;
-        if shape.is_convex() {
-            return false;
-        }
-        self.scores.count_many(Cost::ShadowRays, 2);
-        let leg = Ray { origin: x, dir: root.dir };
-        let out = Ray { origin: root.point, dir: w_l };
-        shape.intersect(&leg, Side::Inside, None, root.distance * (1.0 - LEG)).is_some()
-            || shape.occluded(&out, Some(root.face))
-    }
 }

@@ -22,7 +22,7 @@ use crate::estimators::walk::{CameraWalk, Field, Path, Rivals, Unrivalled, WalkE
 use crate::estimators::{
     Bodies, Cost, Estimator, EstimatorKind, Roulette, Scores, Serves, read_options,
 };
-use crate::geometry::{BoundingSphere, Hit, Ray, Side};
+use crate::geometry::{BoundingSphere, Ray, Side};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 use crate::sampling::discrete::choose_share;
@@ -204,16 +204,6 @@ impl Rivals for OneLightVertex<'_> {
 
     fn meet_surface(&mut self) {
         self.count = 0;
-    }
-
-    fn reflect<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _: &Hit, _: DVec3, _: f64) {}
-
-    fn has_scored_reflection<B: WalkBands>(_: &CameraWalk<'_, Self, B>, _: usize, _: DVec3) -> bool {
-        false
-    }
-
-    fn unidirectional(&self) -> [f64; 2] {
-        [1.0, 1.0]
     }
 
     fn densities<B: WalkBands>(

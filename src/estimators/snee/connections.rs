@@ -24,11 +24,11 @@
 use super::end::{End, Leg, Middle};
 use super::last_vertex::{self, GuidedEnd};
 use super::specular;
-use super::state::{Connections, Slot, WalkVertex};
+use super::state::{Connections, Slot};
 use super::subdivision::{self, Subdivided};
 use crate::estimators::Cost;
 use crate::estimators::bands::WalkBands;
-use crate::estimators::walk::{CameraWalk, Rivals, WalkExit};
+use crate::estimators::walk::{CameraWalk, Rivals, WalkExit, WalkVertex};
 use crate::geometry::{Hit, Ray};
 use crate::math::DVec3;
 
@@ -171,7 +171,7 @@ pub(super) fn score_guided<B: WalkBands>(
             rivals += subdivision::density(walk, Slot::Previous, &middle, exit, &end);
         }
     }
-    if walk.is_shadowed(exit, *w_l) {
+    if walk.is_shadowed(exit.hit.point, exit.hit.face, *w_l) {
         return;
     }
     let mut bands = walk.bands.clone();
@@ -206,7 +206,7 @@ pub(super) fn score_subdivided<B: WalkBands>(
         + specular::density(walk, Slot::Drawn, &middle.to_k, exit, &end);
     let survival = walk.bands.survival(&walk.medium);
     let value = walk.throughput * survival * end.value / (bands.density() * end.unidirectional + rivals);
-    if value == 0.0 || walk.is_shadowed(exit, *w_l) {
+    if value == 0.0 || walk.is_shadowed(exit.hit.point, exit.hit.face, *w_l) {
         return;
     }
     // The leg that closes the path: to x_i from the top, to x_k from the bottom; the other one is free.
@@ -216,13 +216,4 @@ pub(super) fn score_subdivided<B: WalkBands>(
     let mut history = walk.history;
     history.scatter();
     walk.score_with(&bands, history.class(), guide.light, value);
-}
-
-impl<B: WalkBands> CameraWalk<'_, Connections<'_>, B> {
-    /// Whether something is between an exit and the light.
-    fn is_shadowed(&mut self, exit: &WalkExit, w_l: DVec3) -> bool {
-        self.scores.count(Cost::ShadowRays);
-        let shadow = Ray { origin: exit.hit.point, dir: w_l };
-        self.scene.shape.occluded(&shadow, Some(exit.hit.face))
-    }
 }

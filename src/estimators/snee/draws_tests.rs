@@ -8,12 +8,13 @@
 
 use super::end::{End, Middle};
 use super::last_vertex;
-use super::state::{Slot, WalkVertex};
+use super::state::Slot;
 use super::subdivision;
 use super::testing::*;
 use super::*;
 use crate::estimators::Layout;
 use crate::estimators::walk::WalkExit;
+use crate::estimators::walk::WalkVertex;
 use crate::math::{DVec3, Frame};
 use crate::sampling::distance::transmittance;
 use crate::sampling::stream::{Stream, StreamKey};

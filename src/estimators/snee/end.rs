@@ -5,10 +5,9 @@ use serde::Deserialize;
 
 use super::guess::Guess;
 use super::guide::Guide;
-use crate::estimators::Cost;
 use crate::estimators::bands::WalkBands;
 use crate::estimators::walk::{CameraWalk, Rivals, WalkExit};
-use crate::geometry::{Hit, Ray, Side};
+use crate::geometry::Hit;
 use crate::math::{DVec3, exp, ln};
 use crate::optics::boundary::Boundary;
 
@@ -151,22 +150,5 @@ impl Middle {
         let to_k = Leg { dir: jk / d_jk, length: d_jk };
         let cos_k = to_k.dir.dot(hit.normal);
         (d_ij > 0.0 && d_jk > 0.0 && cos_k > 0.0).then_some(Middle { to_j, to_k, cos_k })
-    }
-}
-
-/// Part of a leg's length within which two ways of meeting the same point of the boundary may differ.
-const LEG: f64 = 1e-7;
-
-impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
-    /// Whether nothing lies between two points of the body; the second may be on the boundary.
-    pub(super) fn sees_point(&mut self, from: DVec3, to: DVec3) -> bool {
-        if self.scene.shape.is_convex() {
-            return true;
-        }
-        let leg = to - from;
-        let length = leg.length();
-        self.scores.count(Cost::ShadowRays);
-        let ray = Ray { origin: from, dir: leg / length };
-        self.scene.shape.intersect(&ray, Side::Inside, None, length * (1.0 - LEG)).is_none()
     }
 }

@@ -20,16 +20,6 @@ pub(super) struct Guide {
     bright: Option<Bright>,
 }
 
-/// Concentration of a light: 4 pi int L^2 / (int L)^2. 1 for a constant sky, 4 pi over its solid angle
-/// for a disc, infinite for parallel light.
-fn concentration(emission: &Emission) -> f64 {
-    match emission {
-        Emission::Directional { .. } => f64::INFINITY,
-        Emission::Cap { height, .. } => 2.0 / height,
-        Emission::Map(_) => 1.0,
-    }
-}
-
 /// How many times brighter than its mean a map's texel is that counts as concentrated light.
 const BRIGHT: f64 = 10.0;
 
@@ -53,7 +43,7 @@ impl Guide {
     fn of(index: usize, light: &Light, band: usize, least: f64) -> Option<Guide> {
         let strength = light.strength(band);
         let whole = |axis, half_angle| {
-            let is_guide = strength > 0.0 && concentration(&light.emission) >= least;
+            let is_guide = strength > 0.0 && light.concentration() >= least;
             is_guide.then_some(Guide { light: index, choice: strength, axis, half_angle, bright: None })
         };
         match &light.emission {

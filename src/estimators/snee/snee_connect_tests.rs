@@ -4,7 +4,7 @@ use super::testing::{Lamp, light, medium, sphere};
 use super::*;
 use crate::estimators::connection::{ConnectionMethod, SpecularConnection};
 use crate::estimators::light_trace::LightTracer;
-use crate::estimators::{Anomaly, Layout, Roulette, TransportClass};
+use crate::estimators::{Anomaly, Layout, Roulette, TransportClass, testing};
 use crate::geometry::{BoundingSphere, Ray, Shape};
 use crate::math::{DVec3, Frame};
 use crate::optics::medium::Medium;
@@ -26,25 +26,10 @@ fn flux(shape: Arc<Shape>, medium: Medium, lamp: Lamp) -> Arc<Scene> {
 
 /// Mean and standard error of the total and of each class; no anomaly that voids them.
 fn measure(scene: &Arc<Scene>, estimator: &dyn Estimator, passes: u64, test: &str) -> Vec<(f64, f64)> {
-    let mut scores = Scores::new(Layout::new(scene));
-    let key = StreamKey::named(test);
-    let mut moments = vec![(0.0, 0.0); 1 + TransportClass::ALL.len()];
-    let mut anomalies = [0; 2];
-    for pass in 0..passes {
-        scores.clear();
-        estimator.pass(&[0], &key.pass(pass), &mut scores);
-        for ((mean, m2), x) in moments.iter_mut().zip(&scores.observables) {
-            let before = x - *mean;
-            *mean += before / (pass + 1) as f64;
-            *m2 += before * (x - *mean);
-        }
-        for (count, anomaly) in anomalies.iter_mut().zip([Anomaly::NonFinite, Anomaly::LostRay]) {
-            *count += scores.anomalies[anomaly as usize];
-        }
-    }
+    let (means, scores) = testing::measure(estimator, &Layout::new(scene), passes, test);
+    let anomalies = [Anomaly::NonFinite, Anomaly::LostRay].map(|kind| scores.anomalies[kind as usize]);
     assert_eq!(anomalies, [0; 2], "{test}");
-    let n = passes as f64;
-    moments.into_iter().map(|(mean, m2)| (mean, (m2 / (n * (n - 1.0))).sqrt())).collect()
+    means
 }
 
 /// Four standard errors, which may be at most 3 % of the mean; 10 % of the small classes with an internal reflection.

@@ -5,20 +5,10 @@ use super::guess::Guess;
 use super::guide::Guide;
 use crate::estimators::bands::WalkBands;
 use crate::estimators::connection::Root;
-use crate::estimators::walk::{CameraWalk, WalkExit};
+use crate::estimators::walk::{CameraWalk, WalkExit, WalkVertex};
 use crate::math::DVec3;
 use crate::sampling::discrete::choose_share;
 use crate::sampling::stream::Stream;
-
-/// A medium vertex that connections start from.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct WalkVertex {
-    pub point: DVec3,
-    /// Direction of travel on arrival.
-    pub arrival: DVec3,
-    /// Density of the walk up to here under any hero, over that under its own.
-    pub walks: f64,
-}
 
 /// Which of the vertices that are held.
 #[derive(Clone, Copy, Debug)]

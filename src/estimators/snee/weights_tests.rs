@@ -11,11 +11,12 @@
 use super::connections::{score_guided, score_subdivided};
 use super::end::{End, Leg, Middle};
 use super::last_vertex::{self, GuidedEnd};
-use super::state::{Slot, WalkVertex};
+use super::state::Slot;
 use super::subdivision;
 use super::testing::*;
 use super::*;
 use crate::estimators::walk::Rivals;
+use crate::estimators::walk::WalkVertex;
 use crate::estimators::{Layout, TransportClass};
 use crate::geometry::{Ray, Shape, Side};
 use crate::math::DVec3;
