@@ -1,6 +1,6 @@
 //! The command line: messages and exit codes for bad input, and the effect of each command.
 
-use super::work::{IMAGE, SENSOR, Work, edit, replaced};
+use super::work::{IMAGE, SENSOR, Work, edit, probe, replaced};
 
 /// `run` and `plan` refuse the experiment with exit code 2 and these words.
 #[track_caller]
@@ -327,4 +327,20 @@ fn a_file_may_have_a_scene_and_samplers() {
     assert!(work.path("results/x/record/samplers/000.coarse.npy").exists());
     let nothing = Work::with("name = \"x\"\n");
     nothing.run("check x.toml").exits(2).complains("nothing is measured").complains("samplers take");
+}
+
+/// A reader that has gone, as of `| head`, ends nothing; a full disk is an error.
+#[test]
+fn standard_output_that_cannot_be_written() {
+    let work = Work::with(&format!("{}\n[[claim]]\nreproduces = {{ passes = 16 }}\n", probe()));
+    for arguments in ["list", "check x.toml", "plan x.toml --dry", "run x.toml", "verify x.toml"] {
+        let full = work.shell(&format!("\"$0\" {arguments} > /dev/full"));
+        full.exits(3).complains_of(&["standard output", "No space left on device"]);
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let mut command = work.command(arguments);
+        let errors = writer.try_clone().expect("the same pipe");
+        let status = command.stdout(writer).stderr(errors).status().expect("the program starts");
+        assert_eq!(status.code(), Some(0), "{arguments}, and nobody reads");
+    }
 }

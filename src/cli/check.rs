@@ -1,8 +1,9 @@
 //! `scatterproof check`: validates experiment files.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use super::output::unwritable;
 use super::{Reading, counted};
 use crate::error::{Error, Result};
 use crate::experiment::{Experiment, LoadOptions, Registry, load};
@@ -42,8 +43,7 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
         });
         match checked {
             Ok(experiment) => {
-                writeln!(out, "{}: ok, {}", path.display(), summary(&experiment))
-                    .map_err(Error::io(Path::new("stdout"), "print"))?;
+                writeln!(out, "{}: ok, {}", path.display(), summary(&experiment)).map_err(unwritable)?;
             }
             Err(Error::Input(more)) => findings.extend(more),
             Err(other) => return Err(other),

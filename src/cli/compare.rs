@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use super::output::unwritable;
 use crate::error::{Error, Result};
 use crate::report::number::significant;
 use crate::report::table::Table;
@@ -74,7 +75,7 @@ pub(super) fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
             false => writeln!(out, "the records are not byte-identical"),
         })
         .and_then(|()| tell_timing(&timing_ratios(&before, &after), out))
-        .map_err(Error::io(&PathBuf::from("standard output"), "write"))?;
+        .map_err(unwritable)?;
     Ok(compared.exit_code())
 }
 

@@ -1,11 +1,11 @@
 //! `scatterproof completions`: prints a completion script for a shell. Door for `clap_complete`.
 
 use std::io::Write;
-use std::path::Path;
 
 use clap_complete::Shell;
 
-use crate::error::{Error, Result};
+use super::output::unwritable;
+use crate::error::Result;
 
 /// Print a shell completion script, for example `scatterproof completions bash >
 /// ~/.bash_completion.d/scatterproof`.
@@ -27,7 +27,7 @@ pub(super) fn run(
 ) -> Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, name, &mut script);
-    out.write_all(&script).map_err(Error::io(Path::new("stdout"), "print"))
+    out.write_all(&script).map_err(unwritable)
 }
 
 #[cfg(test)]

@@ -2,8 +2,9 @@
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use super::output::unwritable;
 use crate::error::{Error, Result};
 
 /// A commented experiment with a known result: without absorption all light leaves the body.
@@ -79,8 +80,7 @@ pub(super) fn run(args: &Args, out: &mut dyn Write) -> Result<()> {
         opened => opened.map_err(Error::io(path, "create the example"))?,
     };
     file.write_all(EXAMPLE.as_bytes()).map_err(Error::io(path, "write the example"))?;
-    writeln!(out, "wrote {0}; next: scatterproof run {0}", path.display())
-        .map_err(Error::io(Path::new("stdout"), "print"))
+    writeln!(out, "wrote {0}; next: scatterproof run {0}", path.display()).map_err(unwritable)
 }
 
 #[cfg(test)]

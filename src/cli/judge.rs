@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use super::output::unwritable;
 use crate::error::{Error, Result};
 use crate::report::number::{per_cent, significant};
 use crate::report::tables::verdict_table;
@@ -114,8 +115,7 @@ pub(super) fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
     if let Some(path) = &args.junit {
         atomic::write(path, junit::to_junit(&answer.verdicts).as_bytes(), "write the JUnit file")?;
     }
-    tell(args, &answer, &planes, cost.as_deref(), out)
-        .map_err(Error::io(Path::new("standard output"), "write"))?;
+    tell(args, &answer, &planes, cost.as_deref(), out).map_err(unwritable)?;
     Ok(verdict::exit_code(&answer.verdicts))
 }
 

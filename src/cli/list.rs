@@ -1,11 +1,11 @@
 //! `scatterproof list`: names what an experiment file may use.
 
 use std::io::Write;
-use std::path::Path;
 
 use clap::ValueEnum;
 
-use crate::error::{Error, Result};
+use super::output::unwritable;
+use crate::error::Result;
 use crate::experiment::Registry;
 use crate::experiment::registry::option_docs;
 use crate::experiment::schema_json::json_schema;
@@ -63,7 +63,7 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
             sections.collect::<Vec<_>>().join("\n")
         }
     };
-    out.write_all(text.as_bytes()).map_err(Error::io(Path::new("stdout"), "print"))
+    out.write_all(text.as_bytes()).map_err(unwritable)
 }
 
 fn lines(topic: Topic, registry: &Registry) -> String {

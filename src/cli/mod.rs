@@ -6,6 +6,7 @@ mod completions;
 mod init;
 mod judge;
 mod list;
+mod output;
 mod plan;
 mod report;
 mod run;
@@ -25,6 +26,8 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use crate::error::Error;
 use crate::experiment::LoadOptions;
 use crate::experiment::registry::Registry;
+
+use output::{StandardOutput, say};
 
 /// A research testbed for subsurface scattering: estimators with statistical proof.
 ///
@@ -120,14 +123,14 @@ pub fn main_with(registry: &Registry, arguments: impl IntoIterator<Item = OsStri
     let program = arguments.first().and_then(|path| Path::new(path).file_stem()?.to_str());
     let program = program.unwrap_or("scatterproof").to_string();
     let command = Command::parse_from(arguments); // usage errors exit with 2
-    let out = &mut std::io::stdout();
+    let out = &mut StandardOutput::new();
     let outcome = match &command.action {
-        Action::Run(args) => run::run(args, registry),
-        Action::Verify(args) => verify::run(args, registry),
-        Action::Report(args) => report::run(args),
+        Action::Run(args) => run::run(args, registry, out),
+        Action::Verify(args) => verify::run(args, registry, out),
+        Action::Report(args) => report::run(args, out),
         Action::Compare(args) => compare::run(args, out),
         Action::Judge(args) => judge::run(args, out),
-        Action::Plan(args) => plan::run(args, registry),
+        Action::Plan(args) => plan::run(args, registry, out),
         Action::Check(args) => check::run(args, registry, out).map(|()| 0),
         Action::Init(args) => init::run(args, out).map(|()| 0),
         Action::List(args) => list::run(args, registry, out).map(|()| 0),
@@ -139,7 +142,7 @@ pub fn main_with(registry: &Registry, arguments: impl IntoIterator<Item = OsStri
     match outcome {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            eprintln!("{error}");
+            say(&error);
             ExitCode::from(error.exit_code())
         }
     }

@@ -1,7 +1,9 @@
 //! `scatterproof plan`.
 
+use std::io::{self, Write};
 use std::path::PathBuf;
 
+use super::output::unwritable;
 use super::{Reading, counted};
 use crate::error::Result;
 use crate::experiment::registry::Registry;
@@ -10,7 +12,7 @@ use crate::experiment::{Experiment, load};
 use crate::report::table::Table;
 use crate::run::chi_square::Draws;
 use crate::run::job::{Job, Passes};
-use crate::run::memory::{available, readable};
+use crate::run::memory::{MemoryEstimate, available, readable};
 use crate::run::{self, Plan, estimate_seconds};
 
 /// Show what would run: cells, estimated time and memory, and where each value comes from.
@@ -32,48 +34,64 @@ pub(super) struct Args {
 /// Prints the plan.
 ///
 /// # Errors
-/// Bad input.
-pub(super) fn run(args: &Args, registry: &Registry) -> Result<u8> {
+/// Bad input; memory that does not suffice.
+pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Result<u8> {
     let experiment = load(&args.file, &args.reading.options(), registry)?;
     let plan = run::plan(&experiment, registry)?;
     let threads = args.threads.unwrap_or_else(|| run::Options::new("").threads);
-    print_origins(&experiment.origins);
+    let memory = plan.memory(threads, true);
+    tell(args, &experiment, &plan, threads, &memory, out).map_err(unwritable)?;
+    memory.check(available())?;
+    Ok(0)
+}
+
+fn tell(
+    args: &Args,
+    experiment: &Experiment,
+    plan: &Plan,
+    threads: usize,
+    memory: &MemoryEstimate,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    tell_origins(&experiment.origins, out)?;
     let mut total = 0.0;
     if !experiment.cells.is_empty() {
-        total += print_passes(&experiment, &plan, args.dry);
+        total += tell_passes(experiment, plan, args.dry, out)?;
     }
     if !experiment.file.sampler.is_empty() {
-        total += print_draws(&experiment, &plan, args.dry);
+        total += tell_draws(experiment, plan, args.dry, out)?;
     }
     if !args.dry {
-        println!("about {:.0} s on {threads} threads", total / threads as f64);
+        writeln!(out, "about {:.0} s on {threads} threads", total / threads as f64)?;
     }
-
-    let memory = plan.memory(threads, true);
     let free = available().map_or("unknown".into(), readable);
-    println!(
+    writeln!(
+        out,
         "memory: {} (shapes {}, making them {}, results {}, working {}); available: {free}",
         readable(memory.total()),
         readable(memory.shapes),
         readable(memory.building),
         readable(memory.results),
         readable(memory.working)
-    );
-    memory.check(available())?;
-    Ok(0)
+    )
 }
 
-fn print_origins(origins: &[(String, String, String)]) {
-    println!("values and where they come from");
+fn tell_origins(origins: &[(String, String, String)], out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "values and where they come from")?;
     let mut values = Table::new(&["key", "value", "from"]);
     for (key, value, origin) in origins {
         values.push(vec![key.clone(), value.clone(), origin.clone()]);
     }
-    println!("{}", values.to_text());
+    writeln!(out, "{}", values.to_text())
 }
 
 /// The plan of estimators; returns its CPU seconds, 0 where `dry`.
-fn print_passes(experiment: &Experiment, plan: &Plan, dry: bool) -> f64 {
+fn tell_passes(
+    experiment: &Experiment,
+    plan: &Plan,
+    dry: bool,
+    out: &mut impl Write,
+) -> io::Result<f64> {
     let budget = experiment.file.budget.as_ref();
     let words = match budget {
         Some(Budget::Passes(n)) => format!("{n} passes"),
@@ -83,7 +101,12 @@ fn print_passes(experiment: &Experiment, plan: &Plan, dry: bool) -> f64 {
     };
     let jobs: Vec<&Passes> = plan.jobs.iter().filter_map(Job::passes).collect();
     let (cells, measurements) = (experiment.cells.len(), jobs.len());
-    println!("{}, {}, budget: {words}", counted(cells, "cell"), counted(measurements, "measurement"));
+    writeln!(
+        out,
+        "{}, {}, budget: {words}",
+        counted(cells, "cell"),
+        counted(measurements, "measurement")
+    )?;
     let mut table = Table::new(&["cell", "estimator", "observables", "passes", "CPU time"]);
     let mut total = 0.0;
     for job in jobs {
@@ -97,15 +120,15 @@ fn print_passes(experiment: &Experiment, plan: &Plan, dry: bool) -> f64 {
             estimate.map_or("-".into(), |(_, seconds)| format!("{seconds:.1} s")),
         ]);
     }
-    print!("{}", table.to_text());
-    total
+    write!(out, "{}", table.to_text())?;
+    Ok(total)
 }
 
 /// The plan of samplers; returns the CPU seconds of the draws, 0 where `dry`.
-fn print_draws(experiment: &Experiment, plan: &Plan, dry: bool) -> f64 {
+fn tell_draws(experiment: &Experiment, plan: &Plan, dry: bool, out: &mut impl Write) -> io::Result<f64> {
     let jobs: Vec<&Draws> = plan.jobs.iter().filter_map(Job::draws).collect();
     let samples = experiment.file.samples.unwrap_or_default();
-    println!("{}, {samples} draws each", counted(jobs.len(), "sampler"));
+    writeln!(out, "{}, {samples} draws each", counted(jobs.len(), "sampler"))?;
     let mut table = Table::new(&["sampler", "kind", "CPU time"]);
     let mut total = 0.0;
     for job in jobs {
@@ -114,9 +137,9 @@ fn print_draws(experiment: &Experiment, plan: &Plan, dry: bool) -> f64 {
         let time = seconds.map_or("-".into(), |seconds| format!("{seconds:.2} s"));
         table.push(vec![job.name.clone(), job.kind.clone(), time]);
     }
-    print!("{}", table.to_text());
+    write!(out, "{}", table.to_text())?;
     if !dry {
-        println!("beside the draws, some tenths of a second a sampler for masses");
+        writeln!(out, "beside the draws, some tenths of a second a sampler for masses")?;
     }
-    total
+    Ok(total)
 }

@@ -1,7 +1,9 @@
 //! `scatterproof report`.
 
+use std::io::Write;
 use std::path::PathBuf;
 
+use super::output::unwritable;
 use crate::error::Result;
 use crate::report;
 use crate::results::store::RecordFolder;
@@ -18,11 +20,12 @@ pub(super) struct Args {
 ///
 /// # Errors
 /// No record, a damaged one, I/O.
-pub(super) fn run(args: &Args) -> Result<u8> {
+pub(super) fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
     for folder in &args.folders {
         report::write(&RecordFolder::new(folder))?;
-        println!("{}", folder.join("report.html").display());
-        println!("{}", folder.join("report.md").display());
+        for view in ["report.html", "report.md"] {
+            writeln!(out, "{}", folder.join(view).display()).map_err(unwritable)?;
+        }
     }
     Ok(0)
 }

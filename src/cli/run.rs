@@ -1,13 +1,17 @@
 //! `scatterproof run`.
 
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::output::{say, unwritable};
 use super::{Reading, Working, listen};
 use crate::error::Result;
 use crate::experiment::load;
 use crate::experiment::registry::Registry;
+use crate::report::ReportData;
 use crate::report::{self, terminal};
+use crate::results::store::RecordFolder;
 use crate::run::live::Live;
 use crate::run::tev::Address;
 
@@ -37,7 +41,7 @@ pub(super) struct Args {
 ///
 /// # Errors
 /// Bad input in any file (found before the first runs), I/O, interruption.
-pub(super) fn run(args: &Args, registry: &Registry) -> Result<u8> {
+pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Result<u8> {
     let interrupt = listen()?;
     let mut options = args.working.options();
     options.passes_of = args.passes_of.clone();
@@ -46,21 +50,25 @@ pub(super) fn run(args: &Args, registry: &Registry) -> Result<u8> {
     if let Some(address) = &args.tev {
         match Live::connect(address) {
             Ok(live) => options.live = Some(Arc::new(live)),
-            Err(what) => eprintln!("{what}"),
+            Err(what) => say(what),
         }
     }
     for experiment in &experiments {
         let (folder, _) = crate::run::run(experiment, registry, &options, &interrupt)?;
         let material = report::write(&folder)?;
-        print!("{}", terminal::run_table(&material).to_text());
-        print!("{}", terminal::sampler_table(&material).to_text());
-        if let Some(block) = terminal::efficiency_table(&material) {
-            println!("\n{}\n\n{}", terminal::wrapped(&block.caption, 110), block.table.to_text());
-        }
-        for note in terminal::notes(&material) {
-            println!("note: {note}");
-        }
-        println!("\nreport: {}", folder.root().join("report.html").display());
+        tell(&material, &folder, out).map_err(unwritable)?;
     }
     Ok(0)
+}
+
+fn tell(material: &ReportData, folder: &RecordFolder, out: &mut impl Write) -> io::Result<()> {
+    write!(out, "{}", terminal::run_table(material).to_text())?;
+    write!(out, "{}", terminal::sampler_table(material).to_text())?;
+    if let Some(block) = terminal::efficiency_table(material) {
+        writeln!(out, "\n{}\n\n{}", terminal::wrapped(&block.caption, 110), block.table.to_text())?;
+    }
+    for note in terminal::notes(material) {
+        writeln!(out, "note: {note}")?;
+    }
+    writeln!(out, "\nreport: {}", folder.root().join("report.html").display())
 }

@@ -1,9 +1,9 @@
 //! `scatterproof schema`: prints the JSON Schema of experiment files.
 
 use std::io::Write;
-use std::path::Path;
 
-use crate::error::{Error, Result};
+use super::output::unwritable;
+use crate::error::Result;
 use crate::experiment::Registry;
 use crate::experiment::schema_json::editor_schema;
 
@@ -16,7 +16,7 @@ pub(super) struct Args {}
 /// # Errors
 /// The output cannot be written.
 pub(super) fn run(_: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
-    writeln!(out, "{:#}", editor_schema(registry)).map_err(Error::io(Path::new("stdout"), "print"))
+    writeln!(out, "{:#}", editor_schema(registry)).map_err(unwritable)
 }
 
 #[cfg(test)]

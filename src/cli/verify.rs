@@ -1,7 +1,9 @@
 //! `scatterproof verify`.
 
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use super::output::{say, unwritable};
 use super::{Reading, Working, listen};
 use crate::error::{Error, Result};
 use crate::experiment::registry::Registry;
@@ -92,7 +94,7 @@ struct Court<'a> {
 ///
 /// # Errors
 /// Bad input, I/O, interruption. A claim that does not hold is no error: it is the exit code.
-pub(super) fn run(args: &Args, registry: &Registry) -> Result<u8> {
+pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Result<u8> {
     let mut court = Court {
         registry,
         reading: args.reading.options(),
@@ -111,11 +113,11 @@ pub(super) fn run(args: &Args, registry: &Registry) -> Result<u8> {
             "add a [[claim]] to the experiment, or name one that has some",
         ));
     }
-    tell(&judgement.verdicts, args.verbose, &subjects, &args.reading);
     write_files(args, &judgement.verdicts)?;
+    tell(&judgement.verdicts, args.verbose, &subjects, &args.reading, out).map_err(unwritable)?;
     let alarmed = match &token {
         Some(token) => {
-            court.add_night(args.evidence.as_deref(), token, &judgement.verdicts, &subjects)?
+            court.add_night(args.evidence.as_deref(), token, &judgement.verdicts, &subjects, out)?
         }
         None => false,
     };
@@ -139,7 +141,7 @@ impl Court<'_> {
     /// All streams by another name, and all results elsewhere.
     fn refresh(&mut self, token: &str) -> String {
         let token = if token.is_empty() { provenance::today_and_commit() } else { token.to_string() };
-        eprintln!("fresh streams; the same again: --fresh-seed \"{token}\"");
+        say(format_args!("fresh streams; the same again: --fresh-seed \"{token}\""));
         self.reading.sets.push(format!("fresh={}", toml_text(&token)));
         self.working.out.push("fresh");
         token
@@ -152,6 +154,7 @@ impl Court<'_> {
         token: &str,
         verdicts: &[Verdict],
         subjects: &[Judged],
+        out: &mut impl Write,
     ) -> Result<bool> {
         let path = file.map_or_else(|| self.working.out.join("evidence.json"), Path::to_path_buf);
         let mut nights = read_nights(&path)?;
@@ -162,15 +165,10 @@ impl Court<'_> {
         if nights.add(token, verdicts, code) {
             atomic::write(&path, nights.to_json().as_bytes(), "write the evidence of the nights")?;
         } else {
-            println!("these streams are counted already; the evidence stays as it is");
+            writeln!(out, "these streams are counted already; the evidence stays as it is")
+                .map_err(unwritable)?;
         }
-        let alarms = nights.alarms();
-        let (count, limit) = (nights.tokens.len(), nights.threshold());
-        println!("evidence over {count} nights: {} alarms (log e >= {limit:.1})", alarms.len());
-        for (name, evidence) in &alarms {
-            println!("alarm: {name}: log e = {:.1} after {} nights", evidence.log_e, evidence.nights);
-        }
-        Ok(!alarms.is_empty())
+        tell_alarms(&nights, out).map_err(unwritable)
     }
 
     /// Records that the paths name, run where there is none yet. Everything is read, and everything that
@@ -210,7 +208,7 @@ impl Court<'_> {
     fn measured(&self, experiment: Experiment) -> Result<Judged> {
         let folder = RecordFolder::new(self.working.folder(&experiment.file.name));
         if !crate::run::has_record(&experiment, &self.working.out) {
-            eprintln!("running {}", experiment.file.name);
+            say(format_args!("running {}", experiment.file.name));
             crate::run::run(&experiment, self.registry, &self.working, &self.interrupt)?;
         }
         Self::judged(folder, Some(experiment))
@@ -232,7 +230,7 @@ impl Court<'_> {
             let own = judgement.wanted.iter().filter(|w| w.case == index);
             let mut wanted: Vec<Measured> = own.map(|w| w.subject.clone()).collect();
             let (false, Some(experiment)) = (wanted.is_empty(), &subject.experiment) else { continue };
-            eprintln!("second look at {}", experiment.file.name);
+            say(format_args!("second look at {}", experiment.file.name));
             // The record of an earlier second look keeps its quantities.
             wanted.extend(subject.retest.iter().flat_map(held));
             let main = &subject.main.record;
@@ -285,6 +283,17 @@ fn read_nights(path: &Path) -> Result<Nights> {
     })
 }
 
+/// Prints what all nights together say; whether any of them raises an alarm.
+fn tell_alarms(nights: &Nights, out: &mut impl Write) -> io::Result<bool> {
+    let alarms = nights.alarms();
+    let (count, limit) = (nights.tokens.len(), nights.threshold());
+    writeln!(out, "evidence over {count} nights: {} alarms (log e >= {limit:.1})", alarms.len())?;
+    for (name, evidence) in &alarms {
+        writeln!(out, "alarm: {name}: log e = {:.1} after {} nights", evidence.log_e, evidence.nights)?;
+    }
+    Ok(!alarms.is_empty())
+}
+
 /// A text as a TOML string.
 fn toml_text(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
@@ -305,7 +314,13 @@ fn write_files(args: &Args, verdicts: &[Verdict]) -> Result<()> {
     Ok(())
 }
 
-fn tell(verdicts: &[Verdict], verbose: bool, subjects: &[Judged], reading: &Reading) {
+fn tell(
+    verdicts: &[Verdict],
+    verbose: bool,
+    subjects: &[Judged],
+    reading: &Reading,
+    out: &mut impl Write,
+) -> io::Result<()> {
     let groups = undecided(verdicts);
     let is_told = |v: &Verdict| {
         groups.iter().any(|g| g.is_many() && g.verdicts.iter().any(|own| std::ptr::eq(*own, v)))
@@ -320,17 +335,18 @@ fn tell(verdicts: &[Verdict], verbose: bool, subjects: &[Judged], reading: &Read
         .cloned()
         .collect();
     if !shown.is_empty() {
-        print!("{}", verdict_table(&shown).to_text());
+        write!(out, "{}", verdict_table(&shown).to_text())?;
     }
     for group in &groups {
-        println!("{}; {}", group.sentence(), next_step(group, subjects, reading));
+        writeln!(out, "{}; {}", group.sentence(), next_step(group, subjects, reading))?;
     }
-    println!(
+    writeln!(
+        out,
         "{green} of {} verdicts are green; any of them fails by chance with probability at most \
          {FAMILY_LEVEL:e} (Holm over all; below {FIRST_LOOK:e} a second look on fresh streams decides)",
         verdicts.len()
-    );
-    tell_power(verdicts);
+    )?;
+    tell_power(verdicts, out)
 }
 
 /// What would decide a group of verdicts: how many passes or draws, in which time, by which command.
@@ -367,7 +383,7 @@ fn next_step(group: &Undecided, subjects: &[Judged], reading: &Reading) -> Strin
 }
 
 /// The largest defects that could have gone unseen, by what they are relative to.
-fn tell_power(verdicts: &[Verdict]) {
+fn tell_power(verdicts: &[Verdict], out: &mut impl Write) -> io::Result<()> {
     let largest = |chosen: &dyn Fn(&&Verdict) -> bool| {
         let of = verdicts.iter().filter(chosen).filter_map(|v| v.detectable);
         of.filter(|d| d.is_finite()).max_by(f64::total_cmp)
@@ -382,8 +398,10 @@ fn tell_power(verdicts: &[Verdict]) {
         (largest(&is_bins), "of a sampler's density, everywhere"),
     ];
     for (worst, of) in what.into_iter().filter_map(|(worst, of)| worst.map(|worst| (worst, of))) {
-        println!("largest defect that could have gone unseen (99 % power): {:.2} % {of}", 100.0 * worst);
+        let percent = 100.0 * worst;
+        writeln!(out, "largest defect that could have gone unseen (99 % power): {percent:.2} % {of}")?;
     }
+    Ok(())
 }
 
 /// A file itself, or the experiment files of a folder in the order of their names.

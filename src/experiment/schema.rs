@@ -568,6 +568,9 @@ pub struct SweepCsv {
     pub path: String,
     /// Column -> dotted key that it sets; numbers become numbers, other texts strings.
     pub columns: BTreeMap<String, String>,
+    /// Rows to leave out: those that have, in each of these columns, one of its numbers or texts.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub except: BTreeMap<String, Vec<Scalar>>,
 }
 
 /// Cells that differ only in these keys use the same random streams.

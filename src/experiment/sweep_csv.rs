@@ -47,10 +47,56 @@ pub(super) fn points(entry: &Node, path: &Path, findings: &Findings) -> Option<V
             }
         }
     }
-    if is_whole && points.is_empty() {
+    if !is_whole || !leave_out(entry, &header, &mut points, findings) {
+        return None;
+    }
+    if points.is_empty() {
         findings.at(path_node.place(), format!("empty sweep: {} has no rows", path.display()), None);
     }
-    (is_whole && !points.is_empty()).then_some(points)
+    (!points.is_empty()).then_some(points)
+}
+
+/// Leaves out the rows that `except` names; false where the file has no such rows.
+fn leave_out(entry: &Node, header: &[String], points: &mut Vec<AxisPoint>, findings: &Findings) -> bool {
+    let Some(Value::Table(except)) = entry.get("except").map(|node| &node.value) else { return true };
+    let is_named = |point: &AxisPoint, (column, values): (&String, &Node)| {
+        let field = point.columns.get(column).map(|field| number_or_text(&field.text));
+        field.is_some_and(|field| values.items().iter().any(|value| is_equal(&value.value, &field)))
+    };
+    let mut is_sound = true;
+    for (column, values) in except {
+        if !header.contains(column) {
+            let known: Vec<&str> = header.iter().map(String::as_str).collect();
+            let help = Some(suggest::help(column, &known, "columns"));
+            let place = values.key.as_ref().unwrap_or(values.place());
+            findings.at(place, format!("the CSV file has no column `{column}`"), help);
+            is_sound = false;
+            continue;
+        }
+        for value in values.items() {
+            let one = Node { value: Value::Array(vec![value.clone()]), ..values.clone() };
+            if !points.iter().any(|point| is_named(point, (column, &one))) {
+                let what = format!("no row of the CSV file has {column} = {}", value.label());
+                findings.at(value.place(), what, None);
+                is_sound = false;
+            }
+        }
+    }
+    points.retain(|point| except.is_empty() || !except.iter().all(|named| is_named(point, named)));
+    is_sound
+}
+
+/// Whether two values are the same text, or the same number in whatever form.
+fn is_equal(a: &Value, b: &Value) -> bool {
+    let number = |value: &Value| match value {
+        Value::Integer(n) => Some(*n as f64),
+        Value::Float(x) => Some(*x),
+        _ => None,
+    };
+    match (a, b) {
+        (Value::String(a), Value::String(b)) => a == b,
+        _ => number(a).is_some() && number(a) == number(b),
+    }
 }
 
 fn wrong_length(error: &csv::Error) -> String {

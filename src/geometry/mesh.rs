@@ -291,7 +291,7 @@ mod tests {
     use super::*;
 
     /// Rays against every triangle, over all bodies.
-    const BRUTE_FORCE_RAYS: usize = 100_000;
+    const BRUTE_FORCE_RAYS: usize = 50_000;
 
     impl Mesh {
         /// [`Mesh::search`] without the tree.

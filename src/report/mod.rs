@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use self::data::ReportData;
+pub(crate) use self::data::ReportData;
 use crate::error::Result;
 use crate::results::json::canonical;
 use crate::results::measurements::{self, measurements};

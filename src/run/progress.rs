@@ -1,6 +1,6 @@
 //! Progress with an estimate of the time left, on terminals only. Door for `indicatif`.
 
-use std::io::IsTerminal;
+use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -35,7 +35,8 @@ impl Progress {
 
     /// Tells something on standard error, bar or not.
     pub(crate) fn say(&self, what: &str) {
-        self.bar.suspend(|| eprintln!("{what}"));
+        // Nobody is left to tell where it cannot be written.
+        self.bar.suspend(|| drop(writeln!(io::stderr(), "{what}")));
     }
 
     /// Removes the progress bar.

@@ -170,7 +170,9 @@ fn tests(words: &[String]) -> ExitCode {
     if rows.is_empty() || has("--ignored") {
         return ExitCode::SUCCESS;
     }
-    let runs: Vec<_> = rows.iter().map(|row| (*row, 0)).collect();
+    let mut runs: Vec<_> = rows.iter().map(|row| (*row, 0)).collect();
+    // The longest first, so that no core waits for the last one.
+    runs.sort_by_key(|(row, _)| row.family != Family::Cloud);
     let mut survived = 0;
     runs::all(&runs, Extent::UntilCaught, |row, _, outcome| {
         let found = matrix::judge(row, outcome);
@@ -179,7 +181,7 @@ fn tests(words: &[String]) -> ExitCode {
             Ok(text) => ("ok", text),
             Err(text) => ("FAILED", text),
         };
-        println!("{:24} {verdict:6} exit {} {text}", row.name, outcome.exit);
+        println!("{:24} {verdict:6} {:5.1} s, exit {} {text}", row.name, outcome.seconds, outcome.exit);
     });
     let missing = unit_tests_missing();
     missing.iter().for_each(|test| println!("no unit test `{test}`"));

@@ -184,11 +184,11 @@ fn camera_segment(scene: &Scene, ray: &Ray) -> (CameraSegment, f64) {
 }
 
 fn check_single(estimator: &SpecularConnection, expected: f64, test: &str) {
-    let (means, scores) = measure(estimator, 60, test);
+    let (means, scores) = measure(estimator, 30, test);
     let (mean, error) = means[class(TransportClass::Single)];
     println!("{test}: {mean:.6} +- {error:.6}, expected {expected:.6}");
     assert!(
-        (mean - expected).abs() < 4.0 * error && error < 0.02 * expected,
+        (mean - expected).abs() < 4.0 * error && error < 0.01 * expected,
         "{test}: {mean} {error} {expected}"
     );
     assert_eq!(scores.anomalies[Anomaly::NonFinite as usize], 0);

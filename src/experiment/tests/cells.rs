@@ -191,6 +191,28 @@ fn rows_come_from_csv_files() {
 }
 
 #[test]
+fn rows_of_csv_files_can_be_left_out() {
+    let csv = "r,a,expected\n1,0.5,1\n1,0.9,2\n2,0.5,3\n2.0,0.9,4\n3,0.9,5\n";
+    let except = |rows: &str| {
+        let albedo = "\"object.medium.coefficients.albedo\" }";
+        CSV_SWEEP.replace(albedo, &format!("{albedo}, except = {rows}"))
+    };
+    let labels = |rows: &str| {
+        let experiment = with_csv(csv, &except(rows)).1.unwrap_or_else(|e| panic!("{e}"));
+        experiment.axes[0].labels.join(" | ")
+    };
+    assert_eq!(labels("{ r = [2, 3], a = [0.9] }"), "0.5, 1 | 0.9, 1 | 0.5, 2");
+    assert_eq!(labels("{ a = [0.5] }"), "0.9, 1 | 0.9, 2.0 | 0.9, 3");
+    assert_eq!(labels("{}").split(" | ").count(), 5);
+    let message = csv_error(csv, &except("{ r = [2, 4] }"));
+    assert!(message.contains("no row of the CSV file has r = 4"), "{message}");
+    let message = csv_error(csv, &except("{ radius = [2] }"));
+    assert!(message.contains("the CSV file has no column `radius`"), "{message}");
+    let message = csv_error(csv, &except("{ r = [1, 2, 3] }"));
+    assert!(message.contains("empty sweep"), "{message}");
+}
+
+#[test]
 fn bad_csv_files_are_refused_at_their_line() {
     let message = csv_error("r,expected\n1,2\n", CSV_SWEEP);
     assert!(
