@@ -57,6 +57,9 @@ pub(super) struct Args {
     /// Write the verdicts as a Markdown table.
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
+    /// Judge by the first looks alone: what only a second look could decide fails.
+    #[arg(long, hide = true)]
+    first_look: bool,
     /// Write no reports into the results folders; `scatterproof report DIR` makes one later.
     #[arg(long)]
     no_report: bool,
@@ -104,7 +107,7 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
     let token = args.fresh_seed.as_ref().map(|token| court.refresh(token));
     let mut subjects = court.subjects(&args.paths)?;
     let mut judgement = judge_all(&subjects);
-    if court.look_again(&mut subjects, &judgement)? {
+    if !args.first_look && court.look_again(&mut subjects, &judgement)? {
         judgement = judge_all(&subjects);
     }
     if judgement.verdicts.is_empty() {

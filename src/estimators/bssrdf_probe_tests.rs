@@ -177,6 +177,7 @@ fn half_space_under_a_sky() {
 /// bands, of which two share paths and probes. Expected as on the half-space. 384 passes of 2048 paths;
 /// 5 standard errors are below 1 %.
 #[test]
+#[ignore = "10 s: claims of experiments/verify look at it with every change, this one at night"]
 fn sphere_under_a_sky() {
     let eta = [1.3, 1.3, 1.5];
     let media = [medium(8.0, 0.95, 0.3), medium(3.0, 0.8, 0.0), medium(5.0, 0.99, 0.5)];

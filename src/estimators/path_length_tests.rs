@@ -100,6 +100,7 @@ fn lossless_means_of_a_sphere() {
 /// Both estimators have these means: convex and not, matched and smooth, thin and thick, in the whole
 /// body and in a ball.
 #[test]
+#[ignore = "10 s: claims of experiments/verify look at it with every change, this one at night"]
 fn mean_path_lengths() {
     let torus = || Shape::Mesh(procedural::torus(0.6, 0.3, [16, 8], false).expect("closed"));
     let hollow = || Shape::Mesh(procedural::cavity_sphere(0.6, 0.3, 2, false).expect("closed"));

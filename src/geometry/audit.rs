@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn no_walk_escapes() {
-        walk(1_000_000);
+        walk(500_000);
     }
 
     #[test]

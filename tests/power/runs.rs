@@ -97,8 +97,11 @@ pub enum Extent {
     UntilCaught,
 }
 
-/// The first look at all experiments of a family has fewer tests than this many times those of one.
-const FAMILY_SIZE: f64 = 1000.0;
+/// The first look at all experiments of a family has fewer tests than this many times those of one: the experiments on
+/// clouds have 18 and 9.
+fn family_size(family: Family) -> f64 {
+    if family == Family::Cloud { 10.0 } else { 1000.0 }
+}
 
 /// The family-wise level below which a first look decides by itself (`verify`).
 const AT_ONCE: f64 = 5e-7;
@@ -138,7 +141,7 @@ pub fn all(runs: &[(Planted, u64)], extent: Extent, mut tell: impl FnMut(&Plante
 /// One run: in child processes `verify` on the experiments of the defect's family, and its identities.
 ///
 /// Holm's adjusted p-value of a test is at most its p-value times the number of tests: where one
-/// experiment alone gives less than `AT_ONCE / FAMILY_SIZE`, the whole family would give less than `AT_ONCE`,
+/// experiment alone gives less than `AT_ONCE / family_size`, the whole family would give less than `AT_ONCE`,
 /// and the other experiments cannot change the verdict.
 fn run(row: &Planted, number: u64, extent: Extent, folder: &Path, index: usize) -> Outcome {
     let out = folder.join(format!("run-{index}"));
@@ -151,11 +154,14 @@ fn run(row: &Planted, number: u64, extent: Extent, folder: &Path, index: usize) 
         extent == Extent::UntilCaught && row.expected.iter().any(|test| test.starts_with(experiment))
     };
     let parts = files.iter().copied().filter(|file| expected_in(file));
-    let caught = parts.map(|file| verify(row, number, folder, &out, &[file])).find(|(_, table)| {
+    let first = |file| verify(row, number, folder, &out, &[file], &["--first-look"]);
+    let caught = parts.map(first).find(|(_, table)| {
         let rows = csv_rows(table);
-        rows.iter().any(|found| row.expected.contains(&&*test_of(found)) && fails_beyond_doubt(found))
+        rows.iter().any(|found| {
+            row.expected.contains(&&*test_of(found)) && fails_beyond_doubt(found, row.family)
+        })
     });
-    let (output, table) = caught.unwrap_or_else(|| verify(row, number, folder, &out, &files));
+    let (output, table) = caught.unwrap_or_else(|| verify(row, number, folder, &out, &files, &[]));
     let seconds = begun.elapsed().as_secs_f64();
     let mut tests = seen_in(&table);
     let seen = |broken| if broken { Seen::Defect } else { Seen::Green };
@@ -166,12 +172,23 @@ fn run(row: &Planted, number: u64, extent: Extent, folder: &Path, index: usize) 
 }
 
 /// What a child process printed that had the defect and verified these files, and its table of verdicts.
-fn verify(row: &Planted, number: u64, folder: &Path, out: &Path, files: &[&str]) -> (Output, String) {
+fn verify(
+    row: &Planted,
+    number: u64,
+    folder: &Path,
+    out: &Path,
+    files: &[&str],
+    flags: &[&str],
+) -> (Output, String) {
     let verdicts = out.with_extension("csv");
     let mut command = Command::new(std::env::current_exe().expect("this program"));
     command.args(["defect", row.name]);
     if !files.is_empty() {
-        command.args(["verify", "--quiet", "--no-report", "--threads", "1", "--out"]).arg(out);
+        command
+            .args(["verify", "--quiet", "--no-report", "--threads", "1"])
+            .args(flags)
+            .arg("--out")
+            .arg(out);
         command.arg("--csv").arg(&verdicts).arg("--fresh-seed").arg(format!("{}/{number}", row.name));
         command.args(files.iter().map(|file| folder.join(file)));
     }
@@ -180,10 +197,10 @@ fn verify(row: &Planted, number: u64, folder: &Path, out: &Path, files: &[&str])
 }
 
 /// Whether a verdict would be the same as one of the whole family.
-fn fails_beyond_doubt(row: &Row) -> bool {
+fn fails_beyond_doubt(row: &Row, family: Family) -> bool {
     let is_certain = match row["adjusted_p"].as_str() {
         "" => row["p_value"].is_empty(), // an identity, which takes part in no adjustment
-        p => p.parse::<f64>().is_ok_and(|p| FAMILY_SIZE * p < AT_ONCE),
+        p => p.parse::<f64>().is_ok_and(|p| family_size(family) * p < AT_ONCE),
     };
     row["outcome"] == "fail" && is_certain
 }

@@ -8,7 +8,8 @@
 //! the sign being that of s - c, c = w_L . C, since w_L . N > 0. |P| = eta s turns into
 //!   +-q (R^2 + C^2 - eta^2 s^2) = 2 (C^2 - s c),
 //! squared a polynomial of degree 6 in s, on the interval R - |C| <= eta s <= R + |C| of distances to
-//! the sphere. For eta = 1 there is nothing to solve: the light comes straight.
+//! the sphere. Of its roots those count at which s - c and (R^2 + C^2 - eta^2 s^2) (C^2 - s c) have one sign: squaring has
+//! added the others. For eta = 1 there is nothing to solve: the light comes straight.
 
 use super::cones::ConeTree;
 use super::facet::{self, SolverWork, TOLERANCE, plane_root};
@@ -133,26 +134,28 @@ fn sphere(radius: f64, query: &Query, work: &mut SolverWork, found: &mut impl Fn
     let mut f: BernsteinForm = [0.0; polynomial::DEGREE + 1];
     polynomial::add_product(&mut f, 1.0, &q2, &square);
     polynomial::add_product(&mut f, -4.0, &line, &line);
-    let mut seen: Vec<DVec3> = Vec::new();
-    let mut candidates = Vec::new();
+    let conditions = [polynomial::line([low - c, high - c]), polynomial::cubic(line, k)];
+    // Twice found are those at which an interval was cut.
+    let mut seen = [DVec3::ZERO; polynomial::DEGREE];
+    let mut count = 0;
+    let mut candidate = |t: f64| {
+        let s = low + width * t;
+        let normal = ((w_l * s - center) * (s - c)).normalize_or_zero();
+        if normal == DVec3::ZERO {
+            return;
+        }
+        let patch = polish(query, SurfacePatch::sphere(radius, normal));
+        if !seen[..count].iter().any(|n| n.distance(patch.normal) < 1e-12) && count < seen.len() {
+            seen[count] = patch.normal;
+            count += 1;
+            judged(query, &patch, work, found);
+        }
+    };
     // Where it vanishes, on the axis, are the rings of light that come from all around it: no point is
     // on it.
     let noise = 1e-14 * f.iter().fold(0.0f64, |most, c| most.max(c.abs()));
-    if polynomial::roots::<0>(&f, noise, &[], &mut |t| candidates.push(t)).is_err() {
-        candidates.extend([0.0, 0.5, 1.0]);
-    }
-    for t in candidates {
-        let s = low + width * t;
-        let across = w_l * s - center;
-        let normal = (across * (s - c)).normalize_or_zero();
-        if normal == DVec3::ZERO {
-            continue;
-        }
-        let patch = polish(query, SurfacePatch::sphere(radius, normal));
-        if !seen.iter().any(|n| n.distance(patch.normal) < 1e-12) {
-            seen.push(patch.normal);
-            judged(query, &patch, work, found);
-        }
+    if polynomial::roots(&f, noise, &conditions, &mut candidate).is_err() {
+        [0.0, 0.5, 1.0].into_iter().for_each(candidate);
     }
 }
 

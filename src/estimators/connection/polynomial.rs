@@ -21,7 +21,8 @@ const HALVINGS: u32 = 40;
 const WIDE: f64 = 1.0 / (1 << 24) as f64;
 
 /// The polynomial's value.
-pub(super) fn value(coefficients: &BernsteinForm, t: f64) -> f64 {
+#[cfg(test)]
+fn value(coefficients: &BernsteinForm, t: f64) -> f64 {
     let mut c = *coefficients;
     for end in (1..=DEGREE).rev() {
         for i in 0..end {
@@ -138,35 +139,57 @@ fn isolate<const N: usize>(
     Ok(())
 }
 
-/// The root where the coefficients change their sign once: bisection, sped up by the secant (the
-/// Illinois variant of regula falsi), to rounding.
-fn single_root(c: &BernsteinForm) -> f64 {
-    let first = c.iter().copied().find(|c| *c != 0.0).unwrap_or(0.0);
-    let last = c.iter().rev().copied().find(|c| *c != 0.0).unwrap_or(0.0);
-    // At an end that is zero the sign is that of its neighbourhood.
-    let (mut lo, mut hi) = (0.0, 1.0);
-    let (mut f_lo, mut f_hi) = (c[0], c[DEGREE]);
-    if f_lo == 0.0 || f_hi == 0.0 {
-        (f_lo, f_hi) = (first.signum() * f64::MIN_POSITIVE, last.signum() * f64::MIN_POSITIVE);
+/// Value and derivative.
+fn value_and_slope(coefficients: &BernsteinForm, t: f64) -> (f64, f64) {
+    let mut c = *coefficients;
+    for end in (2..=DEGREE).rev() {
+        for i in 0..end {
+            c[i] += (c[i + 1] - c[i]) * t;
+        }
     }
-    let is_rising = last > 0.0;
+    let change = c[1] - c[0];
+    (c[0] + change * t, DEGREE as f64 * change)
+}
+
+/// The root where the coefficients change their sign once, to rounding: Newton's method inside a bracket that is halved
+/// where three of its steps have not done so.
+fn single_root(c: &BernsteinForm) -> f64 {
+    const ROUNDING: f64 = 4.0 * f64::EPSILON;
+    let is_rising = c.iter().rev().find(|c| **c != 0.0).is_some_and(|last| *last > 0.0);
+    let (mut lo, mut hi) = (0.0, 1.0);
+    let mut width = hi - lo;
+    let secant = c[0] / (c[0] - c[DEGREE]);
+    let mut t = if secant > lo && secant < hi { secant } else { 0.5 };
     for step in 0..100 {
-        let secant = lo + (hi - lo) * (f_lo / (f_lo - f_hi));
-        let is_inside = secant > lo && secant < hi;
-        let t = if step % 3 == 2 || !is_inside { 0.5 * (lo + hi) } else { secant };
-        let f = value(c, t);
-        if f == 0.0 || hi - lo <= 4.0 * f64::EPSILON {
+        let (f, slope) = value_and_slope(c, t);
+        if f == 0.0 {
             return t;
         }
         if (f > 0.0) == is_rising {
-            (hi, f_hi) = (t, f);
-            f_lo *= 0.5;
+            hi = t;
         } else {
-            (lo, f_lo) = (t, f);
-            f_hi *= 0.5;
+            lo = t;
         }
+        let newton = t - f / slope;
+        let is_slow = step % 3 == 2 && hi - lo > 0.5 * std::mem::replace(&mut width, hi - lo);
+        let next = if is_slow || !(newton > lo && newton < hi) { 0.5 * (lo + hi) } else { newton };
+        if (next - t).abs() <= ROUNDING || hi - lo <= ROUNDING {
+            return next;
+        }
+        t = next;
     }
-    0.5 * (lo + hi)
+    t
+}
+
+/// A line in Bernstein form of degree 3, from its ends.
+pub(super) fn line([a, b]: [f64; 2]) -> [f64; 4] {
+    let change = (b - a) / 3.0;
+    [a, a + change, b - change, b]
+}
+
+/// The product of a line and a parabola.
+pub(super) fn cubic([a, b]: [f64; 2], [p, q, r]: [f64; 3]) -> [f64; 4] {
+    [a * p, (2.0 * a * q + b * p) / 3.0, (a * r + 2.0 * b * q) / 3.0, b * r]
 }
 
 /// Binomials of the degrees in use, `BINOMIALS[n][i]`.
@@ -182,17 +205,21 @@ const BINOMIALS: [[f64; 7]; 7] = [
 
 /// Adds `factor` times the product of two polynomials, in Bernstein form, to one of degree [`DEGREE`];
 /// the product is raised to it (by a factor 1 of the degree that is missing).
+#[inline]
 pub(super) fn add_product(sum: &mut BernsteinForm, factor: f64, p: &[f64], q: &[f64]) {
     let (m, n) = (p.len() - 1, q.len() - 1);
     let missing = DEGREE - m - n;
+    let mut product = [0.0; DEGREE + 1];
     for (i, p) in p.iter().enumerate() {
         for (j, q) in q.iter().enumerate() {
-            let part = factor * BINOMIALS[m][i] * BINOMIALS[n][j] * p * q;
+            let part = BINOMIALS[m][i] * BINOMIALS[n][j] * p * q;
             for (k, raise) in BINOMIALS[missing][..=missing].iter().enumerate() {
-                let at = i + j + k;
-                sum[at] += part * raise / BINOMIALS[DEGREE][at];
+                product[i + j + k] += part * raise;
             }
         }
+    }
+    for (at, product) in product.iter().enumerate() {
+        sum[at] += factor * product / BINOMIALS[DEGREE][at];
     }
 }
 
@@ -286,6 +313,16 @@ mod tests {
             let expected =
                 2.0 * (s * s * p[0] + 2.0 * s * t * p[1] + t * t * p[2]) * (s * q[0] + t * q[1]);
             assert!((value(&product, t) - expected).abs() < 1e-15);
+            let (f, slope) = value_and_slope(&product, t);
+            assert!((f - expected).abs() < 1e-15, "{f} {expected}");
+            let by_differences = (value(&product, t + 1e-6) - value(&product, t - 1e-6)) / 2e-6;
+            assert!((slope - by_differences).abs() < 1e-8, "{slope} {by_differences}");
+            let [a, b] = [line([1.0, 0.5]), cubic([1.0, 0.5], [0.3, -1.0, 2.0])].map(|c| {
+                (0..4)
+                    .map(|k| BINOMIALS[3][k] * s.powi(3 - k as i32) * t.powi(k as i32) * c[k])
+                    .sum::<f64>()
+            });
+            assert!((a - (s + 0.5 * t)).abs() < 1e-15 && (2.0 * b - expected).abs() < 1e-15);
             let [left, right] = halves(&product);
             assert!((value(&left, t) - value(&product, 0.5 * t)).abs() < 1e-15);
             assert!((value(&right, t) - value(&product, 0.5 + 0.5 * t)).abs() < 1e-15);

@@ -58,6 +58,7 @@ const SCATTERED: [TransportClass; 4] = [
 /// The sphere under parallel light: all classes as the connection alone has them, and the two that are complete as light
 /// tracing has them.
 #[test]
+#[ignore = "10 s: claims of experiments/verify look at it with every change, this one at night"]
 fn the_sphere_agrees_with_the_connection_and_with_light_tracing() {
     let name = "the_sphere_agrees";
     let scene = flux(sphere(), medium(1.0, 0.9, 0.0), Lamp::Sun);
