@@ -69,19 +69,14 @@ pub(super) trait Rivals: Sized {
     /// The walk has met the boundary.
     fn meet_surface(&mut self);
 
-    /// The walk has met a smooth boundary from outside: scores lights that it reflects by their
-    /// expectation.
-    fn reflect<B: WalkBands>(
-        _: &mut CameraWalk<'_, Self, B>,
-        _: &Hit,
-        _reflected: DVec3,
-        _reflectance: f64,
-    ) {
-    }
+    /// The walk has met a smooth boundary from outside, from the direction `wo` in the frame of the shading normal:
+    /// scores lights that are seen without scattering by their expectation.
+    fn look<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _: &Hit, _: &Frame, _wo: DVec3) {}
 
-    /// Whether [`Self::reflect`] scores a light from this direction.
-    fn has_scored_reflection<B: WalkBands>(
+    /// Whether [`Self::look`] scores a light that is seen in this way.
+    fn is_expected<B: WalkBands>(
         _: &CameraWalk<'_, Self, B>,
+        _: Unscattered,
         _light: usize,
         _wi: DVec3,
     ) -> bool {
@@ -134,6 +129,19 @@ pub(super) struct WalkVertex {
     pub arrival: DVec3,
     /// Density of the walk up to here under any hero, over that under its own.
     pub walks: f64,
+}
+
+/// How a walk has gone on since it last met a smooth boundary from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Unscattered {
+    /// The boundary has reflected it.
+    Reflected,
+    /// It has been refracted into the body, and nothing has happened since.
+    Inside,
+    /// It has gone straight through the body and out.
+    Through,
+    /// Otherwise.
+    No,
 }
 
 /// Where a walk meets the boundary from inside.
@@ -190,8 +198,7 @@ pub(super) struct CameraWalk<'a, R, B> {
     measure: PathMeasure,
     drawn: DirectionDraw,
     exit: Option<WalkExit>,
-    /// The latest event was a reflection by a smooth boundary, met from outside.
-    is_mirrored: bool,
+    unscattered: Unscattered,
     /// The medium emits in a band that the walk scores.
     emits: bool,
     stream: Stream,
@@ -265,7 +272,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             measure: scene.sensor.measure(),
             drawn: DirectionDraw::Alone,
             exit: None,
-            is_mirrored: false,
+            unscattered: Unscattered::No,
             emits: bands.emits(&scene.medium, band),
             stream: key.stream(index as u64, Purpose::Walk),
             light_stream: key.stream(index as u64, Purpose::Light),
@@ -362,6 +369,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         self.measure.fly(&self.ray, t);
         self.ray.origin = self.ray.at(t);
         self.from = None;
+        self.unscattered = Unscattered::No;
         if let Some(bounds) = self.bounds
             && (self.ray.origin - bounds.center).length_squared()
                 > bounds.radius * bounds.radius * (1.0 + ROUNDING)
@@ -441,9 +449,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         if !self.boundary.is_delta() {
             self.connect_from_surface(hit, &frame, local);
         } else if side == Side::Outside {
-            let reflected = frame.to_world(DVec3::new(-local.x, -local.y, local.z));
-            let reflectance = 1.0 - self.boundary.transmittance_smooth(local);
-            R::reflect(self, hit, reflected, reflectance);
+            R::look(self, hit, &frame, local);
         }
         let sample = self.boundary.sample(local, self.stream.draw3())?;
         let dir = frame.to_world(sample.wi);
@@ -452,8 +458,13 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             self.scores.note(Anomaly::WrongSide);
             return None;
         }
-        let mirrors = sample.event == Event::Reflect && sample.density == Density::Delta;
-        self.is_mirrored = mirrors && side == Side::Outside;
+        self.unscattered = match (side, sample.event, self.unscattered) {
+            _ if sample.density != Density::Delta => Unscattered::No,
+            (Side::Outside, Event::Reflect, _) => Unscattered::Reflected,
+            (Side::Outside, Event::Refract, _) => Unscattered::Inside,
+            (Side::Inside, Event::Refract, Unscattered::Inside) => Unscattered::Through,
+            _ => Unscattered::No,
+        };
         if sample.event == Event::Reflect && side == Side::Inside {
             self.history.reflect_internally();
         }
@@ -475,8 +486,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let class = self.history.class();
         for (index, light) in self.scene.lights.iter().enumerate() {
             let (radiance, pdf) = light.eval(self.band, self.ray.dir);
-            let is_scored = self.is_mirrored && R::has_scored_reflection(self, index, self.ray.dir);
-            if radiance > 0.0 && !is_scored {
+            if radiance > 0.0 && !R::is_expected(self, self.unscattered, index, self.ray.dir) {
                 let rivals = self.rival_densities(index, self.ray.dir);
                 let walks = self.bands.density();
                 let [bsdf, by_light] = self.taking_part();

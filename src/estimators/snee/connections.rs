@@ -22,15 +22,15 @@
 //! whichever technique it comes from.
 
 use super::end::{End, Leg, Middle};
+use super::expected;
 use super::last_vertex::{self, GuidedEnd};
 use super::specular;
 use super::state::{Connections, Slot};
 use super::subdivision::{self, Subdivided};
-use crate::estimators::Cost;
 use crate::estimators::bands::WalkBands;
-use crate::estimators::walk::{CameraWalk, Rivals, WalkExit, WalkVertex};
+use crate::estimators::walk::{CameraWalk, Rivals, Unscattered, WalkExit, WalkVertex};
 use crate::geometry::{Hit, Ray};
-use crate::math::DVec3;
+use crate::math::{DVec3, Frame};
 
 impl Rivals for Connections<'_> {
     fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>) {
@@ -77,41 +77,17 @@ impl Rivals for Connections<'_> {
         self.count = 0;
     }
 
-    fn reflect<B: WalkBands>(
-        walk: &mut CameraWalk<'_, Self, B>,
-        hit: &Hit,
-        reflected: DVec3,
-        reflectance: f64,
-    ) {
-        let setup = walk.rivals.setup;
-        for guide in &setup.guides {
-            if !Self::has_scored_reflection(walk, guide.light, reflected)
-                || reflected.dot(hit.normal) <= 0.0
-            {
-                continue;
-            }
-            walk.scores.count(Cost::ShadowRays);
-            let shadow = Ray { origin: hit.point, dir: reflected };
-            if !walk.scene.shape.occluded(&shadow, Some(hit.face)) {
-                let (radiance, _) = walk.scene.lights[guide.light].eval(walk.band, reflected);
-                let value = walk.throughput * reflectance * radiance / walk.bands.density();
-                let bands = walk.bands.clone();
-                walk.score_with(&bands, walk.history.class(), guide.light, value);
-            }
-        }
+    fn look<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>, hit: &Hit, frame: &Frame, wo: DVec3) {
+        expected::score(walk, hit, frame, wo);
     }
 
-    fn has_scored_reflection<B: WalkBands>(
+    fn is_expected<B: WalkBands>(
         walk: &CameraWalk<'_, Self, B>,
+        way: Unscattered,
         light: usize,
         wi: DVec3,
     ) -> bool {
-        let setup = walk.rivals.setup;
-        let guide = setup.guides.iter().find(|guide| guide.light == light);
-        let light = &walk.scene.lights[light];
-        setup.options.expected_reflection
-            && !light.is_directional()
-            && guide.is_some_and(|guide| guide.density(light, walk.band, wi) > 0.0)
+        expected::is_expected(walk, way, light, wi)
     }
 
     fn unidirectional(&self) -> [f64; 2] {

@@ -15,6 +15,7 @@
 mod bidirectional;
 mod connections;
 mod end;
+mod expected;
 mod guess;
 mod guide;
 mod last_vertex;

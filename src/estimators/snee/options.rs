@@ -35,6 +35,8 @@ pub struct SneeOptions {
     /// expectation, wherever a walk meets the boundary from outside, instead of by the walks that take
     /// it.
     pub expected_reflection: bool,
+    /// The same of a light that is seen straight through the body.
+    pub expected_passage: bool,
     /// Least concentration 4 pi int L^2 / (int L)^2 of a light that is connected to; with 1 none is
     /// skipped.
     pub least_concentration: f64,
@@ -104,6 +106,11 @@ pub struct SneeChoices {
     pub connection: Option<ConnectionCall>,
     /// Whether a smooth boundary's reflection of a concentrated light is scored by its expectation.
     pub expected_reflection: Option<bool>,
+    /// Whether a concentrated light that is seen straight through a smooth boundary and the body is scored by its
+    /// expectation.
+    ///
+    /// By default `snee` leaves it to the walk, and `snee_connect` does not.
+    pub expected_passage: Option<bool>,
     /// Lights of a smaller concentration are skipped: sampled by path tracing only.
     ///
     /// The concentration is 4 pi int L^2 / (int L)^2; 1 skips none.
@@ -194,6 +201,7 @@ impl SneePreset {
                 last_vertex: None,
                 connection: None,
                 expected_reflection: false,
+                expected_passage: false,
                 least_concentration: 1.0,
                 share_bands: false,
             },
@@ -208,6 +216,7 @@ impl SneePreset {
                 last_vertex: Some(LastVertex { most: 1.0, decay: 0.75, wide_share: 0.25, wide: 0.2 }),
                 connection: None,
                 expected_reflection: true,
+                expected_passage: false,
                 least_concentration: 10.0,
                 share_bands: false,
             },
@@ -231,6 +240,7 @@ impl SneeChoices {
             last_vertex: self.last_vertex.or(preset.last_vertex).filter(|last| last.most > 0.0),
             connection: self.connection.filter(|call| call.most > 0.0),
             expected_reflection: self.expected_reflection.unwrap_or(preset.expected_reflection),
+            expected_passage: self.expected_passage.unwrap_or(preset.expected_passage),
             least_concentration: self.least_concentration.unwrap_or(preset.least_concentration),
             share_bands: self.bands == BandWalks::Shared,
             ..preset
@@ -285,7 +295,8 @@ impl SneeChoices {
         let connection = Some(self.connection.unwrap_or_default());
         let options = SneeChoices { connection, ..self.clone() }.options()?;
         let last_vertex = options.last_vertex.filter(|_| self.last_vertex.is_some());
-        Ok(SneeOptions { last_vertex, ..options })
+        let expected_passage = self.expected_passage.unwrap_or(true);
+        Ok(SneeOptions { last_vertex, expected_passage, ..options })
     }
 }
 

@@ -30,6 +30,7 @@ fn guided() -> SneeOptions {
         last_vertex: Some(LastVertex { most: 1.0, decay: 0.5, wide_share: 0.25, wide: 0.2 }),
         connection: None,
         expected_reflection: true,
+        expected_passage: false,
         least_concentration: 10.0,
         share_bands: false,
     }

@@ -434,7 +434,9 @@ fn shadowed_reflections_score_nothing() {
         let mut scores = Scores::new(Layout::new(&scene));
         let course = Course { vertices: 2, reflected: None };
         let mut walk = start(&snee, 0, &pass, &mut scores, &path, course, OneBand);
-        Connections::reflect(&mut walk, &path.exit.hit, path.w_l, 0.04);
+        let frame = path.exit.frame;
+        let DVec3 { x, y, z } = frame.to_local(path.w_l);
+        Connections::look(&mut walk, &path.exit.hit, &frame, DVec3::new(-x, -y, z));
         let score = walk.scores.observables[0];
         assert_eq!(score > 0.0, is_lit, "{score} is mirrored from {:?}", path.exit.hit.point);
     }

@@ -1,0 +1,117 @@
+//! Lights that a walk sees through a smooth boundary without scattering, by their expectation.
+//!
+//! A ray that meets the boundary from outside, with Fresnel reflectance F, sees by reflection the radiance F L(w_r), and
+//! straight through the body, along a chord of length d,
+//!   (1 - F) e^{-sigma_t d} (1 - F') L(w_t),
+//! F' being the reflectance at the far end; the factors eta^2 of entry and exit cancel. A walk takes these ways with
+//! the probabilities F and (1 - F) e^{-sigma_t d} (1 - F'), and then meets the whole radiance of the light, which for a small
+//! light is large. So the two are scored where the ray meets the boundary, and the walks that take them score nothing.
+//! What is reflected inside at the far end stays the walk's.
+
+use super::state::Connections;
+use crate::estimators::bands::WalkBands;
+use crate::estimators::walk::{CameraWalk, Rivals, Unscattered};
+use crate::estimators::{Anomaly, Cost};
+use crate::geometry::{FaceId, Hit, Ray, Side};
+use crate::math::{DVec3, Frame};
+use crate::sampling::distance::transmittance;
+
+/// Where a light is looked for, and what of its radiance arrives.
+struct View {
+    way: Unscattered,
+    from: DVec3,
+    face: FaceId,
+    towards: DVec3,
+    factor: f64,
+}
+
+/// Whether lights that a walk sees in this way are scored by expectation.
+pub(super) fn is_expected<B: WalkBands>(
+    walk: &CameraWalk<'_, Connections<'_>, B>,
+    way: Unscattered,
+    light: usize,
+    wi: DVec3,
+) -> bool {
+    let setup = walk.rivals.setup;
+    let is_on = match way {
+        Unscattered::Reflected => setup.options.expected_reflection,
+        Unscattered::Through => setup.options.expected_passage,
+        Unscattered::Inside | Unscattered::No => false,
+    };
+    let guide = setup.guides.iter().find(|guide| guide.light == light);
+    let light = &walk.scene.lights[light];
+    is_on
+        && !light.is_directional()
+        && guide.is_some_and(|guide| guide.density(light, walk.band, wi) > 0.0)
+}
+
+/// Scores what a ray sees that meets the boundary from outside, from the direction `wo` in the frame of the shading normal.
+pub(super) fn score<B: WalkBands>(
+    walk: &mut CameraWalk<'_, Connections<'_>, B>,
+    hit: &Hit,
+    frame: &Frame,
+    wo: DVec3,
+) {
+    let through = walk.boundary.transmittance_smooth(wo);
+    let towards = frame.to_world(DVec3::new(-wo.x, -wo.y, wo.z));
+    if towards.dot(hit.normal) > 0.0 {
+        let way = Unscattered::Reflected;
+        let view = View { way, from: hit.point, face: hit.face, towards, factor: 1.0 - through };
+        let bands = walk.bands.clone();
+        see(walk, &view, &bands);
+    }
+    let setup = walk.rivals.setup;
+    let is_wide = |light: usize| !walk.scene.lights[light].is_directional();
+    if setup.options.expected_passage && setup.guides.iter().any(|guide| is_wide(guide.light)) {
+        pass(walk, hit, frame.to_world(walk.boundary.refract(wo).unwrap_or(-wo)), through);
+    }
+}
+
+/// Scores what is seen straight through the body along `dir`. Where a normal disagrees about the side nothing is seen; the
+/// walk counts what it loses there.
+fn pass<B: WalkBands>(
+    walk: &mut CameraWalk<'_, Connections<'_>, B>,
+    hit: &Hit,
+    dir: DVec3,
+    through: f64,
+) {
+    if dir.dot(hit.normal) >= 0.0 {
+        return;
+    }
+    walk.scores.count(Cost::Rays);
+    let chord = Ray { origin: hit.point, dir };
+    let Some(far) = walk.scene.shape.intersect(&chord, Side::Inside, Some(hit.face), f64::INFINITY)
+    else {
+        if walk.scene.shape.bounds().is_some() {
+            walk.scores.note(Anomaly::LostRay);
+        }
+        return;
+    };
+    let frame = Frame::about(far.shading_normal);
+    let wo = frame.to_local(-dir);
+    let Some(out) = walk.boundary.refract(wo).filter(|_| wo.z < 0.0) else { return };
+    let towards = frame.to_world(out);
+    if towards.dot(far.normal) <= 0.0 {
+        return;
+    }
+    let factor =
+        through * transmittance(walk.medium.sigma_t, far.t) * walk.boundary.transmittance_smooth(wo);
+    let view = View { way: Unscattered::Through, from: far.point, face: far.face, towards, factor };
+    let mut bands = walk.bands.clone();
+    bands.flight(&walk.scene.medium, far.t, false);
+    see(walk, &view, &bands);
+}
+
+fn see<B: WalkBands>(walk: &mut CameraWalk<'_, Connections<'_>, B>, view: &View, bands: &B) {
+    let &View { way, from, face, towards, factor } = view;
+    for guide in &walk.rivals.setup.guides {
+        if !Connections::is_expected(walk, way, guide.light, towards)
+            || walk.is_shadowed(from, face, towards)
+        {
+            continue;
+        }
+        let (radiance, _) = walk.scene.lights[guide.light].eval(walk.band, towards);
+        let value = walk.throughput * factor * radiance / bands.density();
+        walk.score_with(bands, walk.history.class(), guide.light, value);
+    }
+}
