@@ -317,7 +317,6 @@ mod tests {
             }
             let error = (m2 / (n as f64 * (n as f64 - 1.0))).sqrt();
             assert!(scores.anomalies.iter().all(|&count| count == 0));
-            println!("sky {radius:?}: {mean} +- {error} of {expected}");
             let z = (mean - expected) / error;
             assert!(z.abs() < 5.0, "{radius:?}: {mean} +- {error} of {expected}, z = {z}");
             assert!(5.0 * error < 0.01 * expected, "{radius:?}: {error} of {expected}");

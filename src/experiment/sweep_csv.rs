@@ -59,9 +59,9 @@ pub(super) fn points(entry: &Node, path: &Path, findings: &Findings) -> Option<V
 /// Leaves out the rows that `except` names; false where the file has no such rows.
 fn leave_out(entry: &Node, header: &[String], points: &mut Vec<AxisPoint>, findings: &Findings) -> bool {
     let Some(Value::Table(except)) = entry.get("except").map(|node| &node.value) else { return true };
-    let is_named = |point: &AxisPoint, (column, values): (&String, &Node)| {
+    let has = |point: &AxisPoint, column: &String, value: &Node| {
         let field = point.columns.get(column).map(|field| number_or_text(&field.text));
-        field.is_some_and(|field| values.items().iter().any(|value| is_equal(&value.value, &field)))
+        field.is_some_and(|field| is_equal(&value.value, &field))
     };
     let mut is_sound = true;
     for (column, values) in except {
@@ -74,15 +74,19 @@ fn leave_out(entry: &Node, header: &[String], points: &mut Vec<AxisPoint>, findi
             continue;
         }
         for value in values.items() {
-            let one = Node { value: Value::Array(vec![value.clone()]), ..values.clone() };
-            if !points.iter().any(|point| is_named(point, (column, &one))) {
+            if !points.iter().any(|point| has(point, column, value)) {
                 let what = format!("no row of the CSV file has {column} = {}", value.label());
                 findings.at(value.place(), what, None);
                 is_sound = false;
             }
         }
     }
-    points.retain(|point| except.is_empty() || !except.iter().all(|named| is_named(point, named)));
+    let is_left_out = |point: &AxisPoint| {
+        let is_one_of =
+            |(column, values): (&String, &Node)| values.items().iter().any(|v| has(point, column, v));
+        !except.is_empty() && except.iter().all(is_one_of)
+    };
+    points.retain(|point| !is_left_out(point));
     is_sound
 }
 

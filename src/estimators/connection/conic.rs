@@ -136,7 +136,7 @@ fn sphere(radius: f64, query: &Query, work: &mut SolverWork, found: &mut impl Fn
     polynomial::add_product(&mut f, -4.0, &line, &line);
     let conditions = [polynomial::line([low - c, high - c]), polynomial::cubic(line, k)];
     // Twice found are those at which an interval was cut.
-    let mut seen = [DVec3::ZERO; polynomial::DEGREE];
+    let mut seen = [DVec3::ZERO; 2 * polynomial::DEGREE];
     let mut count = 0;
     let mut candidate = |t: f64| {
         let s = low + width * t;
@@ -145,11 +145,14 @@ fn sphere(radius: f64, query: &Query, work: &mut SolverWork, found: &mut impl Fn
             return;
         }
         let patch = polish(query, SurfacePatch::sphere(radius, normal));
-        if !seen[..count].iter().any(|n| n.distance(patch.normal) < 1e-12) && count < seen.len() {
-            seen[count] = patch.normal;
-            count += 1;
-            judged(query, &patch, work, found);
+        if seen[..count].iter().any(|n| n.distance(patch.normal) < 1e-12) {
+            return;
         }
+        if let Some(place) = seen.get_mut(count) {
+            *place = patch.normal;
+            count += 1;
+        }
+        judged(query, &patch, work, found);
     };
     // Where it vanishes, on the axis, are the rings of light that come from all around it: no point is
     // on it.

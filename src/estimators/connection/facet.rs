@@ -20,7 +20,7 @@
 
 use super::bounds::Bounds;
 use super::patch::{Facet, SurfacePatch};
-use super::polynomial::{self, BernsteinForm};
+use super::polynomial::{self, BernsteinForm, parabola};
 use super::throughput::{Judgement, Query, Root};
 use crate::geometry::FaceId;
 use crate::math::DVec3;
@@ -201,9 +201,7 @@ impl<F: FnMut(Root)> FacetRoots<'_, F> {
             (2.0 * area[1].dot(c[1]) + area[2].dot(c[0])) / 3.0,
             area[2].dot(c[1]),
         ];
-        // Raised to degree 3.
-        let raised = |c: [f64; 3]| [c[0], (c[0] + 2.0 * c[1]) / 3.0, (2.0 * c[1] + c[2]) / 3.0, c[2]];
-        let conditions = [raised(u), raised(v), raised(w), s];
+        let conditions = [parabola(u), parabola(v), parabola(w), s];
         if polynomial::excludes(&conditions) {
             return;
         }

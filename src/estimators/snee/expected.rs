@@ -62,13 +62,16 @@ pub(super) fn score<B: WalkBands>(
     }
     let setup = walk.rivals.setup;
     let is_wide = |light: usize| !walk.scene.lights[light].is_directional();
-    if setup.options.expected_passage && setup.guides.iter().any(|guide| is_wide(guide.light)) {
-        pass(walk, hit, frame.to_world(walk.boundary.refract(wo).unwrap_or(-wo)), through);
+    if setup.options.expected_passage
+        && setup.guides.iter().any(|guide| is_wide(guide.light))
+        && let Some(refracted) = walk.boundary.refract(wo)
+    {
+        pass(walk, hit, frame.to_world(refracted), through);
     }
 }
 
-/// Scores what is seen straight through the body along `dir`. Where a normal disagrees about the side nothing is seen; the
-/// walk counts what it loses there.
+/// Scores what is seen straight through the body along `dir`. Where the normals disagree about the side of entry nothing is
+/// seen, as by the walk, which counts it.
 fn pass<B: WalkBands>(
     walk: &mut CameraWalk<'_, Connections<'_>, B>,
     hit: &Hit,
@@ -87,15 +90,14 @@ fn pass<B: WalkBands>(
         }
         return;
     };
-    let frame = Frame::about(far.shading_normal);
-    let wo = frame.to_local(-dir);
-    let Some(out) = walk.boundary.refract(wo).filter(|_| wo.z < 0.0) else { return };
-    let towards = frame.to_world(out);
-    if towards.dot(far.normal) <= 0.0 {
+    let Some(exit) = walk.exit_at(far, dir) else { return };
+    let Some(out) = walk.boundary.refract(exit.wo) else { return };
+    let towards = exit.frame.to_world(out);
+    if !walk.leads_outside(&exit, towards) {
         return;
     }
-    let factor =
-        through * transmittance(walk.medium.sigma_t, far.t) * walk.boundary.transmittance_smooth(wo);
+    let through = through * walk.boundary.transmittance_smooth(exit.wo);
+    let factor = through * transmittance(walk.medium.sigma_t, far.t);
     let view = View { way: Unscattered::Through, from: far.point, face: far.face, towards, factor };
     let mut bands = walk.bands.clone();
     bands.flight(&walk.scene.medium, far.t, false);
