@@ -69,6 +69,11 @@ pub(super) trait Rivals: Sized {
     /// The walk has met the boundary.
     fn meet_surface(&mut self);
 
+    /// From how many rays of the sensor a walk looks for lights before it goes on with one of them: [`Self::look`].
+    fn views(&self) -> u32 {
+        1
+    }
+
     /// The walk has met a smooth boundary from outside, from the direction `wo` in the frame of the shading normal:
     /// scores lights that are seen without scattering by their expectation.
     fn look<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _: &Hit, _: &Frame, _wo: DVec3) {}
@@ -191,6 +196,8 @@ pub(super) struct CameraWalk<'a, R, B> {
     pub ray: Ray,
     from: Option<FaceId>,
     pub throughput: f64,
+    /// Share of the next look in what is seen from here.
+    pub look_share: f64,
     /// The throughput without radiance's eta^2, which roulette compares with its threshold.
     survival: f64,
     pub history: History,
@@ -211,7 +218,8 @@ pub(super) struct CameraWalk<'a, R, B> {
 impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Traces a path; returns how many numbers its walk drew.
     pub(super) fn trace(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
-        let walk = CameraWalk::start(path, scores, rivals, bands);
+        let mut walk = CameraWalk::start(path, scores, rivals, bands);
+        walk.look_around(path);
         walk.scores.count(Cost::Rays);
         match walk.scene.shape.intersect(&walk.ray, Side::Outside, None, f64::INFINITY) {
             Some(hit) => walk.run(hit),
@@ -267,6 +275,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             ray: start.ray,
             from: None,
             throughput: start.weight,
+            look_share: 1.0,
             survival: 1.0,
             history: History::default(),
             measure: scene.sensor.measure(),
@@ -280,6 +289,38 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             rivals,
             bands,
         }
+    }
+
+    /// Looks for lights from further rays of the sensor. What is seen without scattering takes a ray or two, a walk
+    /// many; what one ray sees of a small light is the light or nothing. Each look, the walk's own included, has its
+    /// share of the mean.
+    fn look_around(&mut self, path: Path<'_>) {
+        let views = self.rivals.views();
+        if views == 1 || self.matched() || !self.boundary.is_delta() {
+            return;
+        }
+        let own = (self.slot, self.ray, self.throughput);
+        let mut stream = path.key.stream(path.index as u64, Purpose::View);
+        self.look_share = 1.0 / f64::from(views);
+        for _ in 1..views {
+            let [a, b] = stream.draw2();
+            let [c, d] = stream.draw2();
+            let start = self.scene.sensor.ray(path.index, [a, b, c, d]);
+            (self.slot, self.ray, self.throughput) = (start.slot, start.ray, start.weight);
+            self.scores.count(Cost::Rays);
+            let Some(hit) = self.scene.shape.intersect(&self.ray, Side::Outside, None, f64::INFINITY)
+            else {
+                continue;
+            };
+            let frame = Frame::about(hit.shading_normal);
+            let wo = frame.to_local(-self.ray.dir);
+            if wo.z > 0.0 {
+                R::look(self, &hit, &frame, wo);
+            } else {
+                self.scores.note(Anomaly::WrongSide);
+            }
+        }
+        (self.slot, self.ray, self.throughput) = own;
     }
 
     /// Runs from a first hit until the path ends.
@@ -450,6 +491,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             self.connect_from_surface(hit, &frame, local);
         } else if side == Side::Outside {
             R::look(self, hit, &frame, local);
+            self.look_share = 1.0;
         }
         let sample = self.boundary.sample(local, self.stream.draw3())?;
         let dir = frame.to_world(sample.wi);

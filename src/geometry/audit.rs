@@ -211,13 +211,13 @@ mod tests {
 
     #[test]
     #[ignore = "minutes: 1e7 rays at edges and as many at vertices of each mesh"]
-    fn no_ray_from_inside_is_lost_long() {
+    fn no_ray_from_inside_is_lost_of_millions() {
         aim(30_000_000);
     }
 
     #[test]
     #[ignore = "many minutes: 1e8 segments on each body"]
-    fn no_walk_escapes_long() {
+    fn no_walk_escapes_in_millions() {
         walk(100_000_000);
     }
 }

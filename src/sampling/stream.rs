@@ -23,6 +23,8 @@ pub enum Purpose {
     Hero = 5,
     /// Points of a surface with the light that enters there.
     Cloud = 6,
+    /// Positions on the sensor from which lights are looked for.
+    View = 7,
 }
 
 /// The key of one (experiment, cell, bands, estimator, stage).

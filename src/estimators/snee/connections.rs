@@ -77,6 +77,10 @@ impl Rivals for Connections<'_> {
         self.count = 0;
     }
 
+    fn views(&self) -> u32 {
+        self.setup.views
+    }
+
     fn look<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>, hit: &Hit, frame: &Frame, wo: DVec3) {
         expected::score(walk, hit, frame, wo);
     }

@@ -7,6 +7,10 @@
 //! the probabilities F and (1 - F) e^{-sigma_t d} (1 - F'), and then meets the whole radiance of the light, which for a small
 //! light is large. So the two are scored where the ray meets the boundary, and the walks that take them score nothing.
 //! What is reflected inside at the far end stays the walk's.
+//!
+//! What is left is the variance over the sensor: of a pixel on the light's mirror image one ray sees the light and the
+//! next does not. A look takes two or three rays, a walk many, so that each walk has `views` looks from sensor rays of
+//! its own pixel, each with its share of the mean.
 
 use super::state::Connections;
 use crate::estimators::bands::WalkBands;
@@ -113,7 +117,7 @@ fn see<B: WalkBands>(walk: &mut CameraWalk<'_, Connections<'_>, B>, view: &View,
             continue;
         }
         let (radiance, _) = walk.scene.lights[guide.light].eval(walk.band, towards);
-        let value = walk.throughput * factor * radiance / bands.density();
+        let value = walk.throughput * walk.look_share * factor * radiance / bands.density();
         walk.score_with(bands, walk.history.class(), guide.light, value);
     }
 }

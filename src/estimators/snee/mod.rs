@@ -61,6 +61,8 @@ struct BandSetup {
     sigma: f64,
     joint: JointDirections,
     specular: Option<Specular>,
+    /// Rays of the sensor per walk from which lights are looked for; 1 where none is scored by expectation.
+    views: u32,
 }
 
 /// The estimator, for one scene.
@@ -127,7 +129,10 @@ impl Snee {
                 }
                 _ => None,
             };
-            BandSetup { options: options.clone(), guides, sigma, joint, specular }
+            let is_looked_for = (options.expected_reflection || options.expected_passage)
+                && guides.iter().any(|guide| !scene.lights[guide.light].is_directional());
+            let views = if is_looked_for { options.views } else { 1 };
+            BandSetup { options: options.clone(), guides, sigma, joint, specular, views }
         };
         let count = if options.share_bands { 1 } else { scene.bands() };
         let setups = (0..count).map(setup).collect();

@@ -37,6 +37,8 @@ pub struct SneeOptions {
     pub expected_reflection: bool,
     /// The same of a light that is seen straight through the body.
     pub expected_passage: bool,
+    /// Rays of the sensor per walk from which such lights are looked for.
+    pub views: u32,
     /// Least concentration 4 pi int L^2 / (int L)^2 of a light that is connected to; with 1 none is
     /// skipped.
     pub least_concentration: f64,
@@ -111,6 +113,11 @@ pub struct SneeChoices {
     ///
     /// By default `snee` leaves it to the walk, and `snee_connect` does not.
     pub expected_passage: Option<bool>,
+    /// Rays of the sensor per walk from which such lights are looked for, the walk's own included.
+    ///
+    /// By default 1 for `snee`, and 8 for `snee_connect`. Without expectations there is nothing to look for, and 1 is used.
+    #[schemars(range(min = 1, max = 1024))]
+    pub views: Option<u32>,
     /// Lights of a smaller concentration are skipped: sampled by path tracing only.
     ///
     /// The concentration is 4 pi int L^2 / (int L)^2; 1 skips none.
@@ -157,6 +164,9 @@ pub enum DistanceEnd {
     Unbounded,
 }
 
+/// Views of `snee_connect`: in the pixels that a small light is seen in, it is most of what varies.
+const CONNECTED_VIEWS: u32 = 8;
+
 /// The least share of uniform directions among probes.
 const LEAST_UNIFORM: f64 = 1e-3;
 
@@ -202,6 +212,7 @@ impl SneePreset {
                 connection: None,
                 expected_reflection: false,
                 expected_passage: false,
+                views: 1,
                 least_concentration: 1.0,
                 share_bands: false,
             },
@@ -217,6 +228,7 @@ impl SneePreset {
                 connection: None,
                 expected_reflection: true,
                 expected_passage: false,
+                views: 1,
                 least_concentration: 10.0,
                 share_bands: false,
             },
@@ -241,6 +253,7 @@ impl SneeChoices {
             connection: self.connection.filter(|call| call.most > 0.0),
             expected_reflection: self.expected_reflection.unwrap_or(preset.expected_reflection),
             expected_passage: self.expected_passage.unwrap_or(preset.expected_passage),
+            views: self.views.unwrap_or(preset.views),
             least_concentration: self.least_concentration.unwrap_or(preset.least_concentration),
             share_bands: self.bands == BandWalks::Shared,
             ..preset
@@ -296,7 +309,8 @@ impl SneeChoices {
         let options = SneeChoices { connection, ..self.clone() }.options()?;
         let last_vertex = options.last_vertex.filter(|_| self.last_vertex.is_some());
         let expected_passage = self.expected_passage.unwrap_or(true);
-        Ok(SneeOptions { last_vertex, expected_passage, ..options })
+        let views = self.views.unwrap_or(CONNECTED_VIEWS);
+        Ok(SneeOptions { last_vertex, expected_passage, views, ..options })
     }
 }
 

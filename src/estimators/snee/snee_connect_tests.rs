@@ -161,7 +161,7 @@ fn together_the_parts_have_less_than_half_the_variance() {
 /// only this class counts. Scored twice, or not at all, what is seen through the body would be off by more than a third.
 #[test]
 fn lights_seen_through_the_body_are_expected() {
-    const PASSES: u64 = 350;
+    const PASSES: u64 = 600;
     let smooth = Arc::new(Shape::Mesh(procedural::icosphere(1.0, 2, true).expect("closed")));
     for (name, shape) in [("interpolated sphere", smooth), ("ring", ring())] {
         let media = [medium(0.5, 0.1, 0.3), medium(1.0, 0.05, 0.3)];

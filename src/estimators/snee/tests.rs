@@ -31,6 +31,7 @@ fn guided() -> SneeOptions {
         connection: None,
         expected_reflection: true,
         expected_passage: false,
+        views: 1,
         least_concentration: 10.0,
         share_bands: false,
     }
