@@ -15,6 +15,7 @@ pub mod connection;
 mod crossing;
 mod emergence;
 mod estimator;
+mod field;
 mod history;
 mod illumination;
 mod kind;

@@ -23,8 +23,9 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::bands::OneBand;
+use super::field::{Field, Path};
 use super::illumination::unscattered_notes;
-use super::walk::{CameraWalk, Field, Path, Unrivalled};
+use super::walk::{CameraWalk, Unrivalled};
 use super::{Estimator, EstimatorKind, Scores, Serves, read_options};
 use crate::error::Result;
 use crate::optics::boundary::Boundary;

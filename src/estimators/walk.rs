@@ -16,11 +16,10 @@
 //! (emission / sigma_t) and by track length (emission times length), and exact for a ray that is not
 //! scattered. It is radiance inside; the throughput holds the 1 / eta^2 of its way out.
 
-use std::sync::Arc;
-
 use super::bands::{ScorePlace, WalkBands};
-use super::choice::{choose_light, light_shares};
+use super::choice::choose_light;
 use super::crossing::{other, radiance_scale};
+use super::field::Path;
 use super::roulette::{Roulette, roulette};
 use super::{Anomaly, Cost, History, Scores, TransportClass};
 use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Side};
@@ -28,37 +27,9 @@ use crate::math::{DVec3, Frame};
 use crate::optics::boundary::{Boundary, Density, Event};
 use crate::optics::medium::Medium;
 use crate::sampling::distance::{sample_exponential, transmittance};
-use crate::sampling::stream::{PassKey, Purpose, Stream};
+use crate::sampling::stream::{Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::sensor::PathMeasure;
-
-/// Data that all walks of an estimator share.
-#[derive(Debug)]
-pub(super) struct Field {
-    /// Scene that paths are traced in.
-    pub scene: Arc<Scene>,
-    /// Per band: probability of choosing each light.
-    pub choice: Vec<Vec<f64>>,
-    roulette: Roulette,
-    bounds: Option<BoundingSphere>,
-}
-
-impl Field {
-    /// Prepares a scene for tracing with this roulette.
-    pub(super) fn new(scene: Arc<Scene>, roulette: Roulette) -> Field {
-        let choice = light_shares(&scene);
-        Field { bounds: scene.shape.bounds(), roulette, choice, scene }
-    }
-}
-
-/// Path `index` of a pass, in one band.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Path<'a> {
-    pub field: &'a Field,
-    pub band: usize,
-    pub index: usize,
-    pub key: &'a PassKey,
-}
 
 /// Techniques beside unidirectional sampling.
 pub(super) trait Rivals: Sized {

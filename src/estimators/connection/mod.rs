@@ -52,7 +52,8 @@ use serde::Deserialize;
 
 use super::bands::OneBand;
 use super::choice::shares;
-use super::walk::{CameraWalk, Field, Path, Unrivalled};
+use super::field::{Field, Path};
+use super::walk::{CameraWalk, Unrivalled};
 use super::{Bias, BoundaryKind, Estimator, EstimatorKind, Roulette, Scores, Serves, read_options};
 use crate::error::Result;
 use crate::geometry::Shape;

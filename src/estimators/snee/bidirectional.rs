@@ -17,8 +17,9 @@ use super::end::{End, Middle};
 use super::guide::Guide;
 use crate::error::{Error, Result};
 use crate::estimators::bands::{OneBand, WalkBands};
+use crate::estimators::field::{Field, Path};
 use crate::estimators::path::PathOptions;
-use crate::estimators::walk::{CameraWalk, Field, Path, Rivals, Unrivalled, WalkExit};
+use crate::estimators::walk::{CameraWalk, Rivals, Unrivalled, WalkExit};
 use crate::estimators::{
     Bodies, Cost, Estimator, EstimatorKind, Roulette, Scores, Serves, read_options,
 };

@@ -31,8 +31,9 @@ use std::sync::Arc;
 
 use super::bands::{MAX_SHARED, OneBand, SharedBands};
 use super::connection::{self, Conic};
+use super::field::{Field, Path};
 use super::illumination::unscattered_notes;
-use super::walk::{CameraWalk, Field, Path, Unrivalled};
+use super::walk::{CameraWalk, Unrivalled};
 use super::{BandUse, Estimator, EstimatorKind, Scores, Serves, read_options};
 use crate::error::{Error, Result};
 use crate::optics::boundary::Boundary;
