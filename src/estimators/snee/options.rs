@@ -104,7 +104,8 @@ pub struct SneeChoices {
     pub last_vertex: Option<LastVertex>,
     /// Connections of the last vertex through a smooth boundary; `most = 0` switches them off.
     ///
-    /// Without it `snee` has none, and `snee_connect` has one with `most = 1, decay = 1` and no `last_vertex`.
+    /// Without it `snee` has none, and `snee_connect` has one with `most = 1, decay = 1, later = 0.5` and no
+    /// `last_vertex`.
     pub connection: Option<ConnectionCall>,
     /// Whether a smooth boundary's reflection of a concentrated light is scored by its expectation.
     pub expected_reflection: Option<bool>,
@@ -342,7 +343,7 @@ mod tests {
         let default = connected("");
         assert_eq!((default.connection, default.last_vertex), (Some(ConnectionCall::default()), None));
         let both = connected("connection = { most = 0.5 }\nlast_vertex = { most = 0.25 }");
-        assert_eq!(both.connection, Some(ConnectionCall { most: 0.5, decay: 0.0 }));
+        assert_eq!(both.connection, Some(ConnectionCall { most: 0.5, decay: 0.0, later: 1.0 }));
         assert_eq!(both.last_vertex.map(|last| last.most), Some(0.25));
         assert_eq!(connected("connection = { most = 0 }").connection, None, "which the kind refuses");
         let alone = words("strategies = []\nconnection = { most = 1 }\nleast_concentration = 1");

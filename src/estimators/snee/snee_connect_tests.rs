@@ -100,7 +100,7 @@ fn together_the_parts_have_less_than_half_the_variance() {
         strategies: Strategies { bsdf: false, light: false, top_to_bottom, bottom_to_top: false },
         call: Call { most: 1.0, decay: 0.0 },
         call_alone: Call { most: 1.0, decay: 0.0 },
-        connection: connection.then_some(ConnectionCall { most: 1.0, decay: 0.0 }),
+        connection: connection.then_some(ConnectionCall { most: 1.0, decay: 0.0, later: 1.0 }),
         last_vertex: None,
         ..guided.clone()
     };
@@ -173,7 +173,7 @@ fn lights_seen_through_the_body_are_expected() {
                 expected_passage: Some(expected_passage),
                 bands,
                 strategies: Some(vec![EdgeTechnique::Bsdf, EdgeTechnique::Light]),
-                connection: Some(ConnectionCall { most: 0.01, decay: 0.0 }),
+                connection: Some(ConnectionCall { most: 0.01, decay: 0.0, later: 1.0 }),
                 ..Default::default()
             };
             Snee::connected(scene.clone(), choices.connected().expect("options"))

@@ -62,17 +62,28 @@ pub struct ConnectionCall {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub decay: f64,
+    /// Factor of the probability at all medium vertices but the first one inside the boundary, whose paths subdivision
+    /// finds, too.
+    #[serde(default = "whole")]
+    #[schemars(range(min = 0.01, max = 1.0))]
+    pub later: f64,
+}
+
+fn whole() -> f64 {
+    1.0
 }
 
 impl Default for ConnectionCall {
     fn default() -> ConnectionCall {
-        ConnectionCall { most: 1.0, decay: 1.0 }
+        ConnectionCall { most: 1.0, decay: 1.0, later: 0.5 }
     }
 }
 
 impl ConnectionCall {
-    fn call(&self) -> Call {
-        Call { most: self.most, decay: self.decay }
+    /// At the walk's vertex of this slot, the walk having come to `count` of them since it met the boundary.
+    fn call(&self, slot: Slot, count: u32) -> Call {
+        let is_first = matches!(slot, Slot::Latest) && count == 1;
+        Call { most: self.most * if is_first { 1.0 } else { self.later }, decay: self.decay }
     }
 }
 
@@ -102,8 +113,9 @@ pub(super) fn density<B: WalkBands>(
     if end.by_guide == 0.0 {
         return 0.0;
     }
+    let call = technique.call.call(x_j, walk.rivals.count);
     let x_j = walk.rivals.vertex(x_j);
-    let q = technique.call.call().within(setup.sigma, clearance(walk, x_j.point));
+    let q = call.within(setup.sigma, clearance(walk, x_j.point));
     let Hit { face, point, normal, .. } = exit.hit;
     let patch = SurfacePatch::at(&walk.scene.shape, face, point, normal);
     let ratio = solid_angle_ratio(&patch, to_k.dir, to_k.length, end.w_l, walk.boundary.eta());
@@ -130,7 +142,8 @@ pub(super) fn draw<'a, B: WalkBands>(
     technique: &Specular,
 ) -> Option<LitVertex<'a>> {
     let sigma = walk.rivals.setup.sigma;
-    let reach = technique.call.call().reach(sigma, walk.rivals.stream.draw())?;
+    let call = technique.call.call(Slot::Latest, walk.rivals.count);
+    let reach = call.reach(sigma, walk.rivals.stream.draw())?;
     let x_j = walk.rivals.vertex(Slot::Latest).point;
     if clearance(walk, x_j) >= reach {
         return None;

@@ -43,7 +43,7 @@ fn options() -> [(&'static str, SneeOptions); 4] {
     let everything = SneeOptions {
         strategies: all,
         call: Call { most: 0.8, decay: 0.3 },
-        connection: Some(ConnectionCall { most: 0.7, decay: 0.2 }),
+        connection: Some(ConnectionCall { most: 0.7, decay: 0.2, later: 0.4 }),
         last_vertex: SneePreset::Guided.options().last_vertex,
         joint: JointKind::Mixture,
         ..preset(SneePreset::Guided)
@@ -383,7 +383,7 @@ fn subdivision_bounds_the_weights_at_a_caustic() {
         let full = |top_to_bottom: bool, connection: bool| {
             let strategies = Strategies { bsdf: true, light: true, top_to_bottom, bottom_to_top: false };
             let call = Call { most: 1.0, decay: 0.0 };
-            let connection = connection.then_some(ConnectionCall { most: 1.0, decay: 0.0 });
+            let connection = connection.then_some(ConnectionCall { most: 1.0, decay: 0.0, later: 1.0 });
             let guided = SneePreset::Guided.options();
             let options = SneeOptions {
                 strategies,
