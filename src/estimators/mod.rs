@@ -26,6 +26,7 @@ mod roulette;
 mod scores;
 mod serves;
 pub mod snee;
+mod vertices;
 mod visibility;
 mod walk;
 

@@ -21,6 +21,7 @@ use super::choice::choose_light;
 use super::crossing::{other, radiance_scale};
 use super::field::Path;
 use super::roulette::{Roulette, roulette};
+use super::vertices::{Unscattered, WalkExit};
 use super::{Anomaly, Cost, History, Scores, TransportClass};
 use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
@@ -37,8 +38,8 @@ pub(super) trait Rivals: Sized {
     /// the vertex and the direction of arrival. Draws samples and scores them.
     fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>);
 
-    /// The walk has met the boundary.
-    fn meet_surface(&mut self);
+    /// A boundary that bends light is behind the walk, which goes on inside: its ray is the next flight.
+    fn depart<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>);
 
     /// From how many rays of the sensor a walk looks for lights before it goes on with one of them: [`Self::look`].
     fn views(&self) -> u32 {
@@ -84,7 +85,7 @@ impl Rivals for Unrivalled {
     fn call<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>) {}
 
     #[inline]
-    fn meet_surface(&mut self) {}
+    fn depart<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>) {}
 
     #[inline]
     fn densities<B: WalkBands>(
@@ -95,39 +96,6 @@ impl Rivals for Unrivalled {
     ) -> f64 {
         0.0
     }
-}
-
-/// A medium vertex of a walk, from which techniques start.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct WalkVertex {
-    pub point: DVec3,
-    /// Direction of travel on arrival.
-    pub arrival: DVec3,
-    /// Density of the walk up to here under any hero, over that under its own.
-    pub walks: f64,
-}
-
-/// How a walk has gone on since it last met a smooth boundary from outside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Unscattered {
-    /// The boundary has reflected it.
-    Reflected,
-    /// It has been refracted into the body, and nothing has happened since.
-    Inside,
-    /// It has gone straight through the body and out.
-    Through,
-    /// Otherwise.
-    No,
-}
-
-/// Where a walk meets the boundary from inside.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct WalkExit {
-    pub hit: Hit,
-    /// About the shading normal.
-    pub frame: Frame,
-    /// Back along the walk, in that frame.
-    pub wo: DVec3,
 }
 
 /// Part of a body's size by which rounding may put a medium vertex outside its bounding sphere.
@@ -314,6 +282,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
 
     /// Flies and scatters in the medium until the path meets the boundary or ends.
     fn walk_inside(&mut self) -> Option<Hit> {
+        if !self.matched() {
+            R::depart(self);
+        }
         loop {
             let t = self.flight();
             match self.end_of_flight(t) {
@@ -481,9 +452,6 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         if sample.event == Event::Reflect && side == Side::Inside {
             self.history.reflect_internally();
         }
-        if next_side == Side::Inside {
-            self.rivals.meet_surface();
-        }
         self.throughput *= sample.weight;
         self.survival *= sample.weight * radiance_scale(side, next_side, &self.boundary);
         self.ray.dir = dir;
@@ -572,6 +540,18 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             return None;
         }
         Some(WalkExit { hit, frame, wo })
+    }
+
+    /// How far the walk may fly from the boundary point where it is; `None` and counted where it meets
+    /// nothing.
+    pub(super) fn reach(&mut self) -> Option<f64> {
+        self.scores.count(Cost::Rays);
+        let hit = self.scene.shape.intersect(&self.ray, Side::Inside, self.from, f64::INFINITY);
+        if hit.is_none() && self.bounds.is_some() {
+            self.scores.note(Anomaly::LostRay);
+            return None;
+        }
+        Some(hit.map_or(f64::INFINITY, |hit| hit.t))
     }
 
     /// Whether a direction leads outside at an exit; counted where the normals disagree.

@@ -25,6 +25,41 @@ pub fn increasing_root(f: impl Fn(f64) -> (f64, f64), lo: f64, hi: f64, start: f
     x
 }
 
+/// The root of `f`, which gives value and slope, in a bracket of size 1 or so in which its sign changes once, to rounding:
+/// Newton's method from `start`, safeguarded by bisection where a step leaves the bracket or is not shorter than half the
+/// one before. `f` need not be monotone; `is_rising` is the sense of the change.
+#[inline]
+pub fn bracketed_root(
+    f: impl Fn(f64) -> (f64, f64),
+    [mut lo, mut hi]: [f64; 2],
+    is_rising: bool,
+    start: f64,
+) -> f64 {
+    const ROUNDING: f64 = 4.0 * f64::EPSILON;
+    let mut x = start;
+    let mut last = hi - lo;
+    for _ in 0..100 {
+        let (value, slope) = f(x);
+        if value == 0.0 {
+            return x;
+        }
+        if (value > 0.0) == is_rising {
+            hi = x;
+        } else {
+            lo = x;
+        }
+        let newton = x - value / slope;
+        let is_good = newton >= lo && newton <= hi && (newton - x).abs() < 0.5 * last;
+        let next = if is_good { newton } else { 0.5 * (lo + hi) };
+        last = (next - x).abs();
+        x = next;
+        if last <= ROUNDING {
+            break;
+        }
+    }
+    x
+}
+
 /// The root x >= 0 of a x + ln(1 + x) = e, for a >= 0 and e >= 0: x = W(a exp(a + e)) / a - 1 with the
 /// principal branch W of Lambert's function, here without overflow for large a, without a difference for
 /// small x, and with its limit e^x - 1 at a = 0.

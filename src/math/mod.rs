@@ -45,6 +45,6 @@ mod quadrature;
 mod turns;
 
 pub use frame::Frame;
-pub use inverse::{erf_inv, increasing_root, lambert_excess};
+pub use inverse::{bracketed_root, erf_inv, increasing_root, lambert_excess};
 pub use quadrature::{Integral, gauss_kronrod, integrate};
 pub use turns::sin_cos_turns;

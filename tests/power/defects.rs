@@ -44,6 +44,9 @@ pub enum Defect {
     NotANumber,
     ClassesSwapped,
     ScoresScaled,
+    EmissionAfterAlbedo,
+    EmissionPerAbsorption,
+    EmissionOfFirstBand,
     // Subdivision next-event estimation.
     ReverseIndex,
     JacobianMissing,
@@ -336,6 +339,24 @@ pub const TRACER: &[Planted] = &[
         Defect::ClassesSwapped,
         "single and multiple scattering change names",
         &["rough.single", "rough.multiple", "matched.single"],
+    ),
+    row(
+        "emission-after-albedo",
+        Defect::EmissionAfterAlbedo,
+        "emission is scored with the albedo of its collision",
+        &["emission.a", "emission.b"],
+    ),
+    row(
+        "emission-per-absorption",
+        Defect::EmissionPerAbsorption,
+        "emission at collisions is divided by sigma_a for sigma_t",
+        &["emission.a", "emission.b"],
+    ),
+    row(
+        "emission-of-first-band",
+        Defect::EmissionOfFirstBand,
+        "every band has the emission of the first",
+        &["emission.b"],
     ),
 ];
 

@@ -89,6 +89,30 @@ pub fn main(words: &[String]) -> ExitCode {
     if bad.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) }
 }
 
+/// What is wrong with the published matrix: rows that it lacks or has too many, and defects that a seed missed.
+pub fn published_wrongly() -> Vec<String> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/results/published/blindness.csv");
+    let text = fs::read_to_string(path).expect("the published matrix");
+    let mut wrong = Vec::new();
+    let mut published = BTreeSet::new();
+    for line in text.lines().skip(1) {
+        let mut fields = line.split(',');
+        let mut next = || fields.next().expect("name, seeds, caught");
+        let (name, seeds, caught) = (next(), next(), next());
+        published.insert(name);
+        match defects::named(name) {
+            None => wrong.push(format!("`{name}` is published, and no defect any more")),
+            Some(row) if caught != if is_sham(row.defect) { "0" } else { seeds } => {
+                wrong.push(format!("`{name}` is published as seen with {caught} of {seeds} seeds"));
+            }
+            Some(_) => {}
+        }
+    }
+    let missing = defects::names().into_iter().filter(|name| !published.contains(name));
+    wrong.extend(missing.map(|name| format!("`{name}` is not published")));
+    wrong
+}
+
 /// Every test that looked at any defect.
 fn columns(tallies: &BTreeMap<&str, Tally>) -> BTreeSet<String> {
     tallies.values().flat_map(|tally| tally.seen.keys().cloned()).collect()

@@ -59,7 +59,8 @@ impl Outcome {
 }
 
 /// The experiments of this folder, and the family of defects that each is to find.
-const EXPERIMENTS: [(Family, &str, &str); 15] = [
+const EXPERIMENTS: [(Family, &str, &str); 16] = [
+    (Family::Tracer, "emission.toml", include_str!("emission.toml")),
     (Family::Tracer, "furnace.toml", include_str!("furnace.toml")),
     (Family::Tracer, "map.toml", include_str!("map.toml")),
     (Family::Tracer, "matched.toml", include_str!("matched.toml")),

@@ -1,7 +1,7 @@
 //! A second unidirectional path tracer, written plainly and apart from `estimators::path`: lights are
-//! chosen evenly, two light samples are drawn a vertex, the interface is `surface`, and after three
-//! scattering events a path continues with probability albedo. Without a defect it must agree with
-//! `path`.
+//! chosen evenly, two light samples are drawn a vertex, the interface is `surface`, after three
+//! scattering events a path continues with probability albedo, and emission is scored at collisions.
+//! Without a defect it must agree with `path`.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -13,7 +13,7 @@ use scatterproof::optics::boundary::Boundary;
 use scatterproof::optics::medium::Medium;
 use scatterproof::sampling::distance::{sample_exponential, transmittance};
 use scatterproof::sampling::stream::{PassKey, Purpose, Stream};
-use scatterproof::scene::{Emission, Scene};
+use scatterproof::scene::{Emission, Light, Scene};
 
 use super::defects::Defect;
 use super::surface::Surface;
@@ -205,6 +205,7 @@ impl<'a> Path<'a> {
         if self.defect == Defect::DepthCutOff && self.events > 32 {
             return None;
         }
+        self.emit();
         if self.events > SAFE_EVENTS {
             if self.walk.draw() >= self.medium.albedo {
                 return None;
@@ -229,6 +230,23 @@ impl<'a> Path<'a> {
         self.competing = matched.then(|| self.phase(self.ray.dir.dot(next)));
         self.ray.dir = next;
         Some(())
+    }
+
+    /// What the medium emits, scored at collisions: their density is sigma_t a length.
+    fn emit(&mut self) {
+        let Medium { sigma_t, albedo, .. } = self.medium;
+        let emission = match self.defect {
+            Defect::EmissionOfFirstBand => self.scene.medium[0].emission,
+            _ => self.medium.emission,
+        };
+        let scale = match self.defect {
+            Defect::EmissionAfterAlbedo => albedo,
+            Defect::EmissionPerAbsorption => 1.0 / (1.0 - albedo),
+            _ => 1.0,
+        };
+        if emission > 0.0 {
+            self.score(self.scene.lights.len(), self.throughput * scale * emission / sigma_t);
+        }
     }
 
     fn phase(&self, mu: f64) -> f64 {
@@ -419,8 +437,8 @@ impl<'a> Path<'a> {
         let value = match self.defect {
             Defect::ContributionClamped => {
                 let paths = self.scene.sensor.rays_per_pass() as f64;
-                let cap = self.scene.lights[light].strength(self.band) / 3.0;
-                value.min(cap / paths)
+                let cap = |light: &Light| light.strength(self.band) / 3.0;
+                self.scene.lights.get(light).map_or(value, |light| value.min(cap(light) / paths))
             }
             Defect::SinglePrecision => {
                 let sum = self.sums.entry((self.slot, self.band, class, light)).or_default();

@@ -10,7 +10,7 @@
 //!   2 eta sin(theta / 2) at most.
 
 use super::throughput::Query;
-use crate::math::DVec3;
+use crate::math::{DVec2, DVec3};
 
 /// Bounds of points and normals.
 #[derive(Clone, Copy, Debug)]
@@ -49,21 +49,35 @@ impl Bounds {
         Bounds { center, radius, axis, cos }
     }
 
+    /// The cone of microfacet normals that are tilted by these slopes.
+    fn tilted(&self, slopes: DVec2) -> f64 {
+        let cos = cos_sum(self.cos, 1.0 / (1.0 + slopes.length_squared()).sqrt());
+        if self.cos > 0.0 && cos > 0.0 { cos - SLACK } else { -1.0 }
+    }
+
     /// Whether a root may be there.
     pub(super) fn may_hold(&self, query: &Query) -> bool {
-        let Query { x, w_l, eta } = *query;
+        self.may_hold_near(query, 0.0)
+    }
+
+    /// Whether a root may be there for the query's point or any other within `reach` of it: seen from the
+    /// one, the part is as much wider.
+    pub(super) fn may_hold_near(&self, query: &Query, reach: f64) -> bool {
+        let Query { x, w_l, eta, slopes } = *query;
         let to = self.center - x;
         let distance = to.length();
-        let is_narrow = self.cos > -1.0;
-        let sin = (1.0 - self.cos * self.cos).max(0.0).sqrt();
+        let radius = self.radius + reach;
+        let cos = if slopes == DVec2::ZERO { self.cos } else { self.tilted(slopes) };
+        let is_narrow = cos > -1.0;
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
         if is_narrow && self.axis.dot(w_l) < -sin - SLACK {
             return false;
         }
-        if distance <= self.radius * (1.0 + SLACK) {
+        if distance <= radius * (1.0 + SLACK) {
             return true;
         }
         let w = to / distance;
-        let sin_theta = self.radius / distance;
+        let sin_theta = radius / distance;
         let cos_theta = (1.0 - sin_theta * sin_theta).max(0.0).sqrt();
         let turn = eta.min(1.0 / eta);
         if w.dot(w_l) < cos_sum(turn, cos_theta) - SLACK {
@@ -73,7 +87,7 @@ impl Bounds {
             return true;
         }
         // The angle between the axis and w has to be below pi / 2 + alpha + theta.
-        let both = cos_sum(self.cos, cos_theta);
+        let both = cos_sum(cos, cos_theta);
         if both > 0.0 && self.axis.dot(w) < -(1.0 - both * both).max(0.0).sqrt() - SLACK {
             return false;
         }
@@ -85,6 +99,6 @@ impl Bounds {
             return true;
         }
         let cos_change = (1.0 - (change / length) * (change / length)).sqrt();
-        h.dot(self.axis) >= length * (cos_sum(self.cos, cos_change) - SLACK)
+        h.dot(self.axis) >= length * (cos_sum(cos, cos_change) - SLACK)
     }
 }

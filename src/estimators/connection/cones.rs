@@ -5,6 +5,7 @@ use super::bounds::Bounds;
 use super::patch::Facet;
 use super::throughput::Query;
 use crate::geometry::Mesh;
+use crate::math::DVec3;
 
 /// A node: its bounds, and its facets or its second child (the first follows it).
 #[derive(Clone, Debug)]
@@ -98,6 +99,59 @@ impl ConeTree {
             for (bounds, facet) in &self.facets[node.first as usize..][..node.count as usize] {
                 if bounds.may_hold(query) {
                     visit(facet);
+                }
+            }
+        }
+        looked
+    }
+
+    /// The same for all points of a line, `query.x` + t `dir` with t in `range`: calls `visit` for facets and
+    /// parts of the range that may hold roots. A facet's parts do not overlap, are no longer than the facet
+    /// is wide, or the whole range, and hold every root that it has. Returns how many nodes it looked at.
+    pub(super) fn visit_line(
+        &self,
+        query: &Query,
+        dir: DVec3,
+        range: [f64; 2],
+        mut visit: impl FnMut(&Facet, [f64; 2]),
+    ) -> u64 {
+        let holds = |bounds: &Bounds, [from, to]: [f64; 2]| {
+            let middle = Query { x: query.x + dir * (0.5 * (from + to)), ..*query };
+            bounds.may_hold_near(&middle, 0.5 * (to - from))
+        };
+        let halves = |[from, to]: [f64; 2]| {
+            let middle = 0.5 * (from + to);
+            [[from, middle], [middle, to]]
+        };
+        let is_long = |bounds: &Bounds, [from, to]: [f64; 2]| to - from > 2.0 * bounds.radius;
+        let mut looked = 0;
+        let mut open = vec![(0u32, range)];
+        let mut parts = Vec::new();
+        while let Some((at, range)) = open.pop() {
+            let node = &self.nodes[at as usize];
+            looked += 1;
+            if !holds(&node.bounds, range) {
+                continue;
+            }
+            if is_long(&node.bounds, range) {
+                open.extend(halves(range).map(|half| (at, half)));
+                continue;
+            }
+            if node.count == 0 {
+                open.extend([(node.first, range), (at + 1, range)]);
+                continue;
+            }
+            for (bounds, facet) in &self.facets[node.first as usize..][..node.count as usize] {
+                parts.push(range);
+                while let Some(part) = parts.pop() {
+                    if !holds(bounds, part) {
+                        continue;
+                    }
+                    if is_long(bounds, part) {
+                        parts.extend(halves(part));
+                    } else {
+                        visit(facet, part);
+                    }
                 }
             }
         }

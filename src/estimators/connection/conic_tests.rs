@@ -26,7 +26,7 @@ fn no_root_differs_from_exhaustive_subdivision() {
             while done < CONNECTIONS {
                 let Some(x) = point_inside(&shape, &mut stream) else { continue };
                 done += 1;
-                let query = Query { x, w_l: direction(&mut stream), eta };
+                let query = Query::new(x, direction(&mut stream), eta);
                 let roots = all(&conic, &shape, &query, &mut work);
                 count += roots.len();
                 most = most.max(roots.len());
@@ -100,7 +100,7 @@ fn find_entering_light((name, shape): (&str, Shape), entries: usize) {
             let Some((hit, dir, length)) = entering(&shape, w_l, eta, stream.draw2()) else { continue };
             tried += 1;
             let distance = length * stream.draw();
-            let query = Query { x: hit.point - dir * distance, w_l, eta };
+            let query = Query::new(hit.point - dir * distance, w_l, eta);
             let roots = all(&conic, &shape, &query, &mut SolverWork::default());
             let miss = roots.iter().map(|r| r.point.distance(hit.point)).fold(f64::INFINITY, f64::min);
             let count = roots.len();
@@ -130,7 +130,7 @@ fn the_sphere_has_the_roots_of_its_scalar_equation() {
             let rho = (x - w_l * z).length();
             let mut expected: Vec<(f64, f64)> =
                 oracle.rays([rho, z]).iter().map(|ray| (ray.distance, ray.magnification)).collect();
-            let query = Query { x, w_l, eta };
+            let query = Query::new(x, w_l, eta);
             let roots = all(&conic, &shape, &query, &mut SolverWork::default());
             let mut got: Vec<(f64, f64)> =
                 roots.iter().map(|r| (r.distance, eta * eta / r.ratio)).collect();
@@ -141,8 +141,10 @@ fn the_sphere_has_the_roots_of_its_scalar_equation() {
             for ((d, m), (d0, m0)) in got.iter().zip(&expected) {
                 // A root moves by a rounding times the focusing, and the focusing by its square.
                 let bound = 1e-12 * (1.0 + m0 * m0);
+                // That of grazing light is as small as the cosine, which is known to a rounding.
+                let relative = 10.0 * bound + 4.0 * f64::EPSILON / m0;
                 assert!(
-                    (d - d0).abs() < bound && (m / m0 - 1.0).abs() < 10.0 * bound,
+                    (d - d0).abs() < bound && (m / m0 - 1.0).abs() < relative,
                     "{eta} {query:?} {got:?} {expected:?}"
                 );
             }
@@ -158,7 +160,7 @@ fn planes_have_their_closed_form() {
     let beam = PlaneBeam::new(w_l, 1.4).expect("from above");
     let (entry, distance) = beam.entry(x);
     for shape in [Shape::HalfSpace, Shape::Slab { thickness: 1.0 }] {
-        let query = Query { x, w_l, eta: 1.4 };
+        let query = Query::new(x, w_l, 1.4);
         let roots = all(&Conic::new(&shape), &shape, &query, &mut SolverWork::default());
         let [root] = &roots[..] else { panic!("{roots:?}") };
         assert!(root.point.distance(entry) < 1e-15 && (root.distance - distance).abs() < 1e-15);
@@ -166,7 +168,7 @@ fn planes_have_their_closed_form() {
         assert!((root.transmittance - beam.transmittance).abs() < 1e-15);
     }
     // From below the half-space is dark, the slab is not.
-    let query = Query { x, w_l: -w_l, eta: 1.4 };
+    let query = Query::new(x, -w_l, 1.4);
     assert!(
         all(&Conic::new(&Shape::HalfSpace), &Shape::HalfSpace, &query, &mut SolverWork::default())
             .is_empty()
@@ -176,7 +178,7 @@ fn planes_have_their_closed_form() {
     // At grazing light, below the critical angle, every face that is lit and whose refracted direction
     // leads through it.
     let cube = Shape::Box { half: DVec3::ONE };
-    let query = Query { x: DVec3::new(0.2, 0.1, -0.1), w_l: DVec3::new(0.6, 0.64, 0.48), eta: 1.4 };
+    let query = Query::new(DVec3::new(0.2, 0.1, -0.1), DVec3::new(0.6, 0.64, 0.48), 1.4);
     assert_eq!(all(&Conic::new(&cube), &cube, &query, &mut SolverWork::default()).len(), 3);
 }
 
@@ -188,7 +190,7 @@ fn without_refraction_the_light_comes_straight() {
         let conic = Conic::new(&shape);
         for _ in 0..500 {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
-            let query = Query { x, w_l: direction(&mut stream), eta: 1.0 };
+            let query = Query::new(x, direction(&mut stream), 1.0);
             let roots = all(&conic, &shape, &query, &mut SolverWork::default());
             let Some(straight) = straight_line::root(&shape, &query, &mut SolverWork::default()) else {
                 assert!(roots.is_empty()); // the shading normal faces away
@@ -212,7 +214,7 @@ fn the_limit_without_refraction_is_continuous() {
         while done < 1000 {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
             done += 1;
-            let query = Query { x, w_l: direction(&mut stream), eta };
+            let query = Query::new(x, direction(&mut stream), eta);
             let roots = all(&conic, &shape, &query, &mut SolverWork::default());
             let straight =
                 straight_line::root(&shape, &query, &mut SolverWork::default()).expect("a ray leaves");
@@ -239,7 +241,7 @@ fn the_energy_budget_is_kept() {
         let (mut sum, mut squares) = (0.0, 0.0);
         for _ in 0..count {
             let (hit, dir, length) = entering(&shape, w_l, eta, stream.draw2()).expect("a sphere");
-            let query = Query { x: hit.point - dir * (length * stream.draw()), w_l, eta };
+            let query = Query::new(hit.point - dir * (length * stream.draw()), w_l, eta);
             let (mut energy, mut density) = (0.0, 0.0);
             conic.roots(&shape, &query, &mut SolverWork::default(), &mut |root| {
                 let m = eta * eta / root.ratio;
@@ -265,7 +267,7 @@ fn special_points_of_the_sphere() {
     let conic = Conic::new(&shape);
     let w_l = DVec3::Z;
     let find =
-        |x: DVec3, eta: f64| all(&conic, &shape, &Query { x, w_l, eta }, &mut SolverWork::default());
+        |x: DVec3, eta: f64| all(&conic, &shape, &Query::new(x, w_l, eta), &mut SolverWork::default());
     let middle = find(DVec3::ZERO, 1.5);
     assert_eq!(middle.len(), 1);
     assert!(middle[0].point.distance(DVec3::Z * 2.0) < 1e-12);
@@ -306,7 +308,7 @@ fn hard_meshes() {
                 let Some((hit, dir, length)) = entering(&shape, w_l, eta, stream.draw2()) else {
                     continue;
                 };
-                let query = Query { x: hit.point - dir * (length * stream.draw()), w_l, eta };
+                let query = Query::new(hit.point - dir * (length * stream.draw()), w_l, eta);
                 let roots = all(&conic, &shape, &query, &mut SolverWork::default());
                 tried += 1;
                 let nearest = roots

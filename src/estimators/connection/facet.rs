@@ -59,18 +59,18 @@ pub(in crate::estimators) struct SolverWork {
     pub wrong_side: u64,
 }
 
-/// The point of a plane through `point` with this outward normal that refracts the light to x, and w:
-/// closed.
+/// The point of a plane through `point` with this outward normal that refracts the light to x: closed.
 pub(super) fn plane_root(query: &Query, point: DVec3, normal: DVec3) -> Option<DVec3> {
+    let facet = query.facet_normal(normal);
     let height = (point - query.x).dot(normal);
-    let cl = query.w_l.dot(normal);
+    let cl = query.w_l.dot(facet);
     let eta_ct2 = (query.eta * query.eta - 1.0) + cl * cl;
     if height <= 0.0 || cl <= 0.0 || eta_ct2 <= 0.0 {
         return None;
     }
-    let eta_ct = eta_ct2.sqrt();
-    // (eta w) height / (eta ct)
-    Some(query.x + (query.w_l + normal * (eta_ct - cl)) * (height / eta_ct))
+    let eta_w = query.w_l + facet * (eta_ct2.sqrt() - cl);
+    let along = eta_w.dot(normal);
+    (along > 0.0).then(|| query.x + eta_w * (height / along))
 }
 
 /// Offers every root on the facet to `found`.

@@ -36,7 +36,7 @@ fn newton_and_mnee_find_roots_only() {
         while done < 3000 {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
             done += 1;
-            let query = Query { x, w_l: direction(&mut stream), eta: 1.5 };
+            let query = Query::new(x, direction(&mut stream), 1.5);
             let mut roots = Vec::new();
             conic.roots(&shape, &query, &mut SolverWork::default(), &mut |root| roots.push(root));
             let seen = visible(&conic, &shape, &query);
@@ -79,7 +79,7 @@ fn weighted_trials_sum_over_all_roots() {
         let mut worst = 0.0f64;
         while done < 6 {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
-            let query = Query { x, w_l: direction(&mut stream), eta: 1.5 };
+            let query = Query::new(x, direction(&mut stream), 1.5);
             let roots = visible(&conic, &shape, &query);
             if roots.len() < 2 {
                 continue;
@@ -121,7 +121,7 @@ fn without_refraction_all_methods_are_the_straight_line() {
         let mut compared = 0;
         for _ in 0..300 {
             let Some(x) = point_inside(&shape, &mut stream) else { continue };
-            let query = Query { x, w_l: direction(&mut stream), eta: 1.0 };
+            let query = Query::new(x, direction(&mut stream), 1.0);
             let Some(straight) = straight_line::root(&shape, &query, &mut SolverWork::default()) else {
                 continue;
             };

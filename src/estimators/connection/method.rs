@@ -7,7 +7,7 @@ use super::conic::Conic;
 use super::facet::SolverWork;
 use super::throughput::{Query, Root};
 use super::{manifold, newton, straight_line};
-use crate::geometry::Shape;
+use crate::geometry::{FaceId, Shape};
 use crate::math::DVec3;
 use crate::sampling::stream::Stream;
 
@@ -23,8 +23,20 @@ pub enum ConnectionMethod {
     Mnee {},
     /// Specular manifold sampling: random walks, weighted by further trials.
     Sms {},
+    /// All roots; single scattering by one point on each triangle's part of the camera ray.
+    Segments {},
     /// The straight line through the boundary, not refracted: biased.
     StraightLine {},
+}
+
+impl ConnectionMethod {
+    /// Whether it can refract at a microfacet, whose normal is not linear in the place on a triangle.
+    pub(super) fn takes_slopes(self) -> bool {
+        matches!(
+            self,
+            ConnectionMethod::Newton {} | ConnectionMethod::Mnee {} | ConnectionMethod::Sms {}
+        )
+    }
 }
 
 /// A root, and the factor of what it contributes.
@@ -46,6 +58,15 @@ impl Solver {
         Solver { method, conic: Conic::new(shape) }
     }
 
+    pub(super) fn method(&self) -> ConnectionMethod {
+        self.method
+    }
+
+    /// The complete solver, which every method has for the shapes that it does not search itself.
+    pub(super) fn conic(&self) -> &Conic {
+        &self.conic
+    }
+
     /// Puts the roots that the method finds into `found`. Hidden ones may be among them.
     pub(super) fn roots(
         &self,
@@ -57,7 +78,9 @@ impl Solver {
     ) {
         let mut all = |root: Root| found.push(WeightedRoot { root, weight: 1.0 });
         match self.method {
-            ConnectionMethod::Conic {} => self.conic.roots(shape, query, work, &mut all),
+            ConnectionMethod::Conic {} | ConnectionMethod::Segments {} => {
+                self.conic.roots(shape, query, work, &mut all);
+            }
             ConnectionMethod::Newton {} => newton::roots(&self.conic, shape, query, work, &mut all),
             ConnectionMethod::Mnee {} => manifold::mnee(shape, query, work).into_iter().for_each(all),
             ConnectionMethod::Sms {} => {
@@ -70,26 +93,24 @@ impl Solver {
         }
     }
 
-    /// Whether the method finds the root of a query that is at this point, so that its density there is
-    /// known; `None` where the density is not: what such a method connects to is left to it alone.
+    /// Whether the method finds the root of a query that is at this point of a face, so that its density
+    /// there is known; `None` where the density is not: what such a method connects to is left to it alone.
     pub(super) fn finds(
         &self,
         shape: &Shape,
         query: &Query,
-        point: DVec3,
+        at: (FaceId, DVec3),
         work: &mut SolverWork,
     ) -> Option<bool> {
-        let mut is_found = false;
-        let mut compare = |root: Root| is_found |= manifold::is_same(&root, point);
         match self.method {
-            ConnectionMethod::Conic {} => return Some(true),
-            ConnectionMethod::Sms {} | ConnectionMethod::StraightLine {} => return None,
-            ConnectionMethod::Newton {} => newton::roots(&self.conic, shape, query, work, &mut compare),
+            ConnectionMethod::Conic {} | ConnectionMethod::Segments {} => Some(true),
+            ConnectionMethod::Sms {} | ConnectionMethod::StraightLine {} => None,
+            ConnectionMethod::Newton {} => Some(newton::finds(shape, query, at, work)),
             ConnectionMethod::Mnee {} => {
-                manifold::mnee(shape, query, work).into_iter().for_each(compare);
+                let root = manifold::mnee(shape, query, work);
+                Some(root.is_some_and(|root| manifold::is_same(&root, at.1)))
             }
         }
-        Some(is_found)
     }
 
     /// Memory behind it, bytes.

@@ -1,4 +1,4 @@
-//! Connections through a smooth boundary: at every medium vertex x of a camera walk, the boundary points
+//! Connections through the boundary: at every medium vertex x of a camera walk, the boundary points
 //! p at which light from a chosen light is refracted to x.
 //!
 //! A root p obeys Snell's law for w = unit(p - x) and the direction w_L to the light; what it
@@ -12,9 +12,14 @@
 //! | `newton` | one a triangle at most | biased on interpolated normals | unbiased, MIS with the walk |
 //! | `mnee` | one at most | biased: light is missing | unbiased, MIS with the walk |
 //! | `sms` | one, weighted | unbiased | unbiased, alone |
+//! | `segments` | all | unbiased | unbiased, MIS with the walk but for single scattering |
 //! | `straight_line` | one that is none | biased | biased, alone |
 //!
 //! Lights that are not concentrated (environments) are left to the walk.
+//!
+//! At a rough boundary a facet is drawn, too, which refracts in the place of the surface (`newton`, `mnee`,
+//! `sms`); there the walk finds all that a method loses, parallel light included, so that none is biased. `sms`
+//! has its lights alone.
 //!
 //! What the connection finds are paths whose light is refracted once, at the last boundary point before
 //! it meets the last medium vertex: whatever the camera's part of the path does. In the record's
@@ -35,12 +40,15 @@
 mod bounds;
 mod cones;
 mod conic;
+mod connected;
 mod facet;
 mod manifold;
 mod method;
 mod newton;
 mod patch;
 mod polynomial;
+mod segments;
+mod sphere;
 mod straight_line;
 mod throughput;
 mod vertex;
@@ -55,8 +63,9 @@ use super::choice::shares;
 use super::field::{Field, Path};
 use super::walk::{CameraWalk, Unrivalled};
 use super::{Bias, BoundaryKind, Estimator, EstimatorKind, Roulette, Scores, Serves, read_options};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::Shape;
+use crate::optics::boundary::Boundary;
 use crate::sampling::stream::{PassKey, Purpose};
 use crate::scene::{Light, Scene};
 
@@ -113,9 +122,9 @@ impl SpecularConnection {
     /// `connection` in experiment files.
     pub const KIND: EstimatorKind = EstimatorKind {
         kind: "connection",
-        doc: "path tracing with connections to lights through a smooth boundary, by five methods; conic and sms are unbiased",
+        doc: "path tracing with connections to lights through the boundary, by six methods; conic, segments and sms are unbiased",
         serves: Serves {
-            boundaries: &[BoundaryKind::Smooth],
+            boundaries: &[BoundaryKind::Smooth, BoundaryKind::Rough],
             emission: true,
             ..Serves::WITHOUT_ENTRIES
         },
@@ -136,9 +145,21 @@ impl SpecularConnection {
         roulette: Roulette,
     ) -> Result<SpecularConnection> {
         SpecularConnection::KIND.check(&scene)?;
+        let is_rough = scene.boundary.iter().any(|boundary| matches!(boundary, Boundary::Rough { .. }));
+        if is_rough && !method.takes_slopes() {
+            return Err(Error::input_help(
+                "connection: this method needs a smooth boundary",
+                "at a rough one choose method newton, mnee or sms",
+            ));
+        }
         let is_connected = |light: &Light| light.concentration() >= LEAST_CONCENTRATION;
         let of_band = |band: usize| {
-            let strength = |light: &Light| if is_connected(light) { light.strength(band) } else { 0.0 };
+            // Without refraction a facet turns nothing: its slopes are those of no density.
+            let boundary = &scene.boundary[band];
+            let is_served = boundary.is_delta() || boundary.eta() != 1.0;
+            let strength = |light: &Light| {
+                if is_served && is_connected(light) { light.strength(band) } else { 0.0 }
+            };
             shares(&scene.lights.iter().map(strength).collect::<Vec<f64>>())
         };
         let shares = (0..scene.bands()).map(of_band).collect();
@@ -149,8 +170,10 @@ impl SpecularConnection {
         Ok(SpecularConnection { field: Field::new(scene, roulette), method, setup })
     }
 
-    fn has_parallel_light(&self) -> bool {
-        self.field.scene.lights.iter().any(Light::is_directional)
+    /// Whether there is light that the walk cannot find.
+    fn is_alone(&self) -> bool {
+        let is_smooth = self.field.scene.boundary.iter().any(Boundary::is_delta);
+        is_smooth && self.field.scene.lights.iter().any(Light::is_directional)
     }
 }
 
@@ -172,18 +195,18 @@ impl Estimator for SpecularConnection {
 
     fn bias(&self) -> Bias {
         let scene = &self.field.scene;
-        let is_parallel = self.has_parallel_light();
+        let is_alone = self.is_alone();
         let interpolated = matches!(&*scene.shape, Shape::Mesh(mesh) if mesh.normals().is_some());
         match self.method {
             ConnectionMethod::StraightLine {} => {
                 Bias::Biased("light goes straight through the boundary, which refracts it".into())
             }
-            ConnectionMethod::Mnee {} if is_parallel => Bias::Biased(
+            ConnectionMethod::Mnee {} if is_alone => Bias::Biased(
                 "manifold next-event estimation finds one boundary point at most for a vertex; parallel light by all \
                  others is missing"
                     .into(),
             ),
-            ConnectionMethod::Newton {} if is_parallel && interpolated => Bias::Biased(
+            ConnectionMethod::Newton {} if is_alone && interpolated => Bias::Biased(
                 "one Newton iteration a triangle may lose boundary points where normals are interpolated; \
                  parallel light that comes through them is missing"
                     .into(),
@@ -203,7 +226,8 @@ impl Estimator for SpecularConnection {
 
 /// What no connection through one boundary point finds of parallel light.
 pub(super) fn missing_notes(scene: &Scene) -> Vec<String> {
-    let lights = scene.lights.iter().filter(|light| light.is_directional());
+    let is_smooth = scene.boundary.iter().any(Boundary::is_delta);
+    let lights = scene.lights.iter().filter(|light| is_smooth && light.is_directional());
     lights
         .map(|light| {
             format!(
@@ -220,3 +244,5 @@ pub(super) fn missing_notes(scene: &Scene) -> Vec<String> {
 mod testing;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod work_tests;

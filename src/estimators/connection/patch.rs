@@ -60,6 +60,16 @@ impl SurfacePatch {
         }
     }
 
+    /// The same in all directions, 1/mm, where the shading normal is the geometric one; `None` on triangles
+    /// with interpolated normals.
+    pub(super) fn curvature(&self) -> Option<f64> {
+        match self.turning {
+            Turning::None => Some(0.0),
+            Turning::Sphere(curvature) => Some(curvature),
+            Turning::Interpolated { .. } => None,
+        }
+    }
+
     /// Change of the shading normal, to first order, along a step in the tangent plane.
     #[inline]
     pub(super) fn turn(&self, step: DVec3) -> DVec3 {

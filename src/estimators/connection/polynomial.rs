@@ -6,6 +6,8 @@
 //! exactly one. Everything else is cut in halves by de Casteljau's algorithm, whose steps are means:
 //! rounding stays at the size of the c_i.
 
+use crate::math::bracketed_root;
+
 /// Degree of the polynomials that are solved here.
 pub(super) const DEGREE: usize = 6;
 
@@ -151,51 +153,17 @@ fn value_and_slope(coefficients: &BernsteinForm, t: f64) -> (f64, f64) {
     (c[0] + change * t, DEGREE as f64 * change)
 }
 
-/// The root where the coefficients change their sign once, to rounding: Newton's method, safeguarded by bisection where a
-/// step leaves the bracket or is not shorter than half the one before.
+/// The root where the coefficients change their sign once, to rounding.
 fn single_root(c: &BernsteinForm) -> f64 {
-    const ROUNDING: f64 = 4.0 * f64::EPSILON;
     let is_rising = c.iter().rev().find(|c| **c != 0.0).is_some_and(|last| *last > 0.0);
-    let [mut lo, mut hi] = [0.0, 1.0];
     let secant = c[0] / (c[0] - c[DEGREE]);
-    let mut t = if secant > lo && secant < hi { secant } else { 0.5 };
-    let mut last = hi - lo;
-    for _ in 0..100 {
-        let (f, slope) = value_and_slope(c, t);
-        if f == 0.0 {
-            return t;
-        }
-        if (f > 0.0) == is_rising {
-            hi = t;
-        } else {
-            lo = t;
-        }
-        let newton = t - f / slope;
-        let is_good = newton >= lo && newton <= hi && (newton - t).abs() < 0.5 * last;
-        let next = if is_good { newton } else { 0.5 * (lo + hi) };
-        last = (next - t).abs();
-        t = next;
-        if last <= ROUNDING {
-            break;
-        }
-    }
-    t
-}
-
-/// A line in Bernstein form of degree 3, from its ends.
-pub(super) fn line([a, b]: [f64; 2]) -> [f64; 4] {
-    let change = (b - a) / 3.0;
-    [a, a + change, b - change, b]
+    let start = if secant > 0.0 && secant < 1.0 { secant } else { 0.5 };
+    bracketed_root(|t| value_and_slope(c, t), [0.0, 1.0], is_rising, start)
 }
 
 /// A parabola in Bernstein form of degree 3.
 pub(super) fn parabola([p, q, r]: [f64; 3]) -> [f64; 4] {
     [p, (p + 2.0 * q) / 3.0, (2.0 * q + r) / 3.0, r]
-}
-
-/// The product of a line and a parabola.
-pub(super) fn cubic([a, b]: [f64; 2], [p, q, r]: [f64; 3]) -> [f64; 4] {
-    [a * p, (2.0 * a * q + b * p) / 3.0, (a * r + 2.0 * b * q) / 3.0, b * r]
 }
 
 /// Binomials of the degrees in use, `BINOMIALS[n][i]`.
@@ -323,14 +291,10 @@ mod tests {
             assert!((f - expected).abs() < 1e-15, "{f} {expected}");
             let by_differences = (value(&product, t + 1e-6) - value(&product, t - 1e-6)) / 2e-6;
             assert!((slope - by_differences).abs() < 1e-8, "{slope} {by_differences}");
-            let forms = [line([1.0, 0.5]), cubic([1.0, 0.5], p), parabola(p)];
-            let [a, b, square] = forms.map(|c| {
-                (0..4)
-                    .map(|k| BINOMIALS[3][k] * s.powi(3 - k as i32) * t.powi(k as i32) * c[k])
-                    .sum::<f64>()
-            });
-            assert!((a - (s + 0.5 * t)).abs() < 1e-15 && (2.0 * b - expected).abs() < 1e-15);
-            assert!((2.0 * square * a - expected).abs() < 1e-15);
+            let square: f64 = (0..4)
+                .map(|k| BINOMIALS[3][k] * s.powi(3 - k as i32) * t.powi(k as i32) * parabola(p)[k])
+                .sum();
+            assert!((2.0 * square * (s + 0.5 * t) - expected).abs() < 1e-15);
             let [left, right] = halves(&product);
             assert!((value(&left, t) - value(&product, 0.5 * t)).abs() < 1e-15);
             assert!((value(&right, t) - value(&product, 0.5 + 0.5 * t)).abs() < 1e-15);

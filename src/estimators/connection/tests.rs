@@ -3,16 +3,17 @@
 use super::method::WeightedRoot;
 use super::testing::entering;
 use super::throughput::{Judgement, Query};
-use super::vertex::{self, Drawn};
+use super::vertex::{self, Departure, Drawn};
 use super::*;
 use crate::estimators::testing::measure as measure_passes;
-use crate::estimators::walk::{WalkExit, WalkVertex};
+use crate::estimators::vertices::{WalkExit, WalkVertex};
 use crate::estimators::{Anomaly, Layout, TransportClass};
-use crate::geometry::{Ray, Side, procedural};
-use crate::math::{DVec3, Frame, cos, exp, integrate};
+use crate::geometry::{Hit, Ray, Side, procedural};
+use crate::math::{DVec2, DVec3, Frame, cos, exp, integrate};
 use crate::optics::boundary::Boundary;
 use crate::optics::fresnel::fresnel;
 use crate::optics::medium::Medium;
+use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::reference::refracting_plane::PlaneBeam;
 use crate::reference::refracting_polyhedron::{self, CameraSegment};
@@ -55,13 +56,23 @@ fn class(class: TransportClass) -> usize {
     1 + class as usize
 }
 
-const METHODS: [ConnectionMethod; 5] = [
+const METHODS: [ConnectionMethod; 6] = [
     ConnectionMethod::Conic {},
     ConnectionMethod::Newton {},
     ConnectionMethod::Mnee {},
     ConnectionMethod::Sms {},
+    ConnectionMethod::Segments {},
     ConnectionMethod::StraightLine {},
 ];
+
+fn unlike_lights() -> Vec<Light> {
+    vec![
+        disc(DVec3::new(-0.5, 0.4, 0.6), 1e-2, 30.0),
+        sun(DVec3::new(0.6, -0.3, 0.7), 2.0),
+        disc(DVec3::new(0.2, 0.8, -0.5), 0.1, 20.0),
+        disc(DVec3::Z, 2.0, 0.3),
+    ]
+}
 
 /// Of a path x -> p -> light the walk's own sampling and the connection have the densities T and P p_L J
 /// / (phase e^(-sigma d)), relative to U. A technique scores f / D_t for it, D_t being what its code
@@ -70,14 +81,7 @@ const METHODS: [ConnectionMethod; 5] = [
 fn weights_sum_to_one() {
     let key = StreamKey::named("weights_sum_to_one (connection)");
     let mut stream = key.pass(0).stream(0, Purpose::Sensor);
-    let lights = || {
-        vec![
-            disc(DVec3::new(-0.5, 0.4, 0.6), 1e-2, 30.0),
-            sun(DVec3::new(0.6, -0.3, 0.7), 2.0),
-            disc(DVec3::new(0.2, 0.8, -0.5), 0.1, 20.0),
-            disc(DVec3::Z, 2.0, 0.3),
-        ]
-    };
+    let lights = unlike_lights;
     let mesh = |mesh: Result<crate::geometry::Mesh>| Shape::Mesh(mesh.expect("closed"));
     let bodies = [
         Shape::Sphere { radius: 1.0 },
@@ -86,7 +90,7 @@ fn weights_sum_to_one() {
         mesh(procedural::torus(0.7, 0.3, [24, 12], false)),
     ];
     let ray = Ray { origin: DVec3::new(0.3, -0.4, 3.0), dir: -DVec3::Z };
-    let mut done = [0u32; 5];
+    let mut done = [0u32; 6];
     for body in bodies {
         let scene = scene(body, medium(4.0, 0.9, 0.3), lights(), ray, 1);
         for (index, method) in METHODS.into_iter().enumerate() {
@@ -105,7 +109,7 @@ fn weights_sum_to_one() {
                 let x = hit.point - dir * distance;
                 let frame = Frame::about(hit.shading_normal);
                 let exit = WalkExit { hit, frame, wo: frame.to_local(-dir) };
-                let query = Query { x, w_l: sample.wi, eta: ETA };
+                let query = Query::new(x, sample.wi, ETA);
                 let patch = patch::SurfacePatch::at(&scene.shape, hit.face, hit.point, hit.normal);
                 let Judgement::Root(root) = query.judge(&patch, 1e-9) else { panic!("no root") };
                 let is_found = match method {
@@ -113,7 +117,7 @@ fn weights_sum_to_one() {
                     _ => estimator.setup.solver.finds(
                         &scene.shape,
                         &query,
-                        hit.point,
+                        (hit.face, hit.point),
                         &mut facet::SolverWork::default(),
                     ),
                 };
@@ -130,8 +134,11 @@ fn weights_sum_to_one() {
                     OneBand,
                     x + DVec3::new(0.01, 0.02, -0.01),
                 );
-                walk.lead_to(x, false);
-                let departure = WalkVertex { point: x, arrival: walk.ray.dir, walks: 1.0 };
+                // The first vertex is another technique's where the method is that of segments.
+                walk.lead_to(x + DVec3::new(0.01, -0.01, 0.02), false);
+                walk.lead_to(x, true);
+                let vertex = WalkVertex { point: x, arrival: walk.ray.dir, walks: 1.0 };
+                let departure = Departure { vertex, bands: OneBand, history: walk.history };
                 let throughput = walk.throughput;
                 let observed = 1 + TransportClass::ALL.len() + light;
                 // What the connection scores for the root, if it draws this direction.
@@ -154,7 +161,7 @@ fn weights_sum_to_one() {
                 } else {
                     0.0
                 };
-                let phase = HenyeyGreenstein { g: 0.3 }.pdf(departure.arrival.dot(dir));
+                let phase = HenyeyGreenstein { g: 0.3 }.pdf(vertex.arrival.dot(dir));
                 let walked = phase * transmittance(4.0, distance);
                 let f = throughput * root.transmittance * ETA * ETA * sample.radiance;
                 let of_connection = share * pdf.unwrap_or(1.0) * root.ratio / walked;
@@ -167,7 +174,113 @@ fn weights_sum_to_one() {
             }
         }
     }
-    assert!(done[..4].iter().all(|&count| count > 80), "{done:?}");
+    assert!(done[..5].iter().all(|&count| count > 80), "{done:?}");
+}
+
+/// The same at a rough boundary, where the walk's light sampling is a third technique, and parallel light is
+/// shared, too.
+#[test]
+fn weights_with_facets_sum_to_one() {
+    let key = StreamKey::named("weights_with_facets_sum_to_one");
+    let mut stream = key.pass(0).stream(0, Purpose::Sensor);
+    let lights = unlike_lights;
+    let mesh = |mesh: Result<crate::geometry::Mesh>| Shape::Mesh(mesh.expect("closed"));
+    let bodies = [
+        Shape::Sphere { radius: 1.0 },
+        Shape::Box { half: DVec3::new(0.8, 0.6, 1.0) },
+        mesh(procedural::bumpy_sphere(1.0, 3, 0.03, 6.0, true)),
+        mesh(procedural::torus(0.7, 0.3, [24, 12], false)),
+    ];
+    let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.15 };
+    let ray = Ray { origin: DVec3::new(0.3, -0.4, 3.0), dir: -DVec3::Z };
+    let methods = [ConnectionMethod::Newton {}, ConnectionMethod::Mnee {}, ConnectionMethod::Sms {}];
+    let mut done = [0u32; 3];
+    for body in bodies {
+        let sensor = Sensor::Probe(Probe { ray, paths: 1 });
+        let boundary = vec![Boundary::Rough { eta: ETA, facets }];
+        let medium = vec![medium(4.0, 0.9, 0.3)];
+        let scene =
+            Arc::new(Scene { shape: Arc::new(body), boundary, medium, lights: lights(), sensor });
+        for (index, method) in methods.into_iter().enumerate() {
+            let estimator = SpecularConnection::new(scene.clone(), method, Roulette::Below(1e-12))
+                .expect("a scene for it");
+            let mut tries = 0;
+            while tries < 80 {
+                let light = tries % 4;
+                let sample = scene.lights[light].sample(0, stream.draw2());
+                let Some(x) = testing::point_inside(&scene.shape, &mut stream) else { continue };
+                let m = facets.sample_normal(stream.draw2());
+                let query =
+                    Query { slopes: DVec2::new(m.x, m.y) / m.z, ..Query::new(x, sample.wi, ETA) };
+                let mut work = facet::SolverWork::default();
+                let mut roots = Vec::new();
+                estimator.setup.solver.roots(&scene.shape, &query, &mut stream, &mut work, &mut roots);
+                let Some(WeightedRoot { root, .. }) = roots.first().copied() else { continue };
+                let Root { point, face, normal, shading, dir, distance, .. } = root;
+                let seen = scene.shape.intersect(&Ray { origin: x, dir }, Side::Inside, None, 1e9);
+                let outside = Ray { origin: point, dir: sample.wi };
+                if !seen.is_some_and(|hit| hit.point.distance(point) < 1e-9)
+                    || scene.shape.occluded(&outside, Some(face))
+                {
+                    continue;
+                }
+                tries += 1;
+                let frame = Frame::about(shading);
+                let hit = Hit { t: distance, point, normal, shading_normal: shading, face };
+                let exit = WalkExit { hit, frame, wo: frame.to_local(-dir) };
+                let share = estimator.setup.shares[0][light];
+                let of_slopes = facets.d(m) * m.z * m.z * m.z * m.z;
+                let mut scores = Scores::new(Layout::new(&scene));
+                let pass = key.pass(1);
+                let path = Path { field: &estimator.field, band: 0, index: 0, key: &pass };
+                let state = Connected::new(&estimator.setup, pass.stream(0, Purpose::Connection));
+                let start = x + DVec3::new(0.01, 0.02, -0.01);
+                let mut walk = CameraWalk::led(path, &mut scores, state, OneBand, start);
+                walk.lead_to(x, false);
+                let vertex = WalkVertex { point: x, arrival: walk.ray.dir, walks: 1.0 };
+                let departure = Departure { vertex, bands: OneBand, history: walk.history };
+                let throughput = walk.throughput;
+                let observed = 1 + TransportClass::ALL.len() + light;
+                let by_connection = if share > 0.0 {
+                    walk.scores.clear();
+                    let is_shared = estimator.setup.is_density_known;
+                    let density = share * sample.pdf.unwrap_or(1.0) * of_slopes;
+                    let drawn = Drawn { light, radiance: sample.radiance, density, is_shared };
+                    let found = WeightedRoot { root, weight: 1.0 };
+                    vertex::score(&mut walk, &departure, &drawn, &found, sample.wi);
+                    walk.scores.observables[observed]
+                } else {
+                    0.0
+                };
+                let choice = walk.choice(light);
+                walk.lead_out(&exit);
+                walk.scores.clear();
+                walk.score_light_sample(light, sample.wi);
+                let by_light = walk.scores.observables[observed];
+                let (f_cos, interface) = scene.boundary[0].eval(exit.wo, frame.to_local(sample.wi));
+                let mut by_interface = 0.0;
+                if sample.pdf.is_some() {
+                    walk.scores.clear();
+                    walk.score_own_sample(sample.wi);
+                    by_interface = walk.scores.observables[observed];
+                }
+                let phase = HenyeyGreenstein { g: 0.3 }.pdf(vertex.arrival.dot(dir));
+                let walked = phase * transmittance(4.0, distance);
+                let pdf = sample.pdf.unwrap_or(1.0);
+                let f = throughput * f_cos * sample.radiance;
+                let of_connection = share * pdf * of_slopes * root.ratio / walked;
+                let sum =
+                    (of_connection * by_connection + choice * pdf * by_light + interface * by_interface)
+                        / f;
+                assert!(
+                    (sum - 1.0).abs() < 1e-9,
+                    "{method:?}, light {light}: {sum}, {by_connection} {by_light} {by_interface} of {f}"
+                );
+                done[index] += u32::from(by_connection > 0.0);
+            }
+        }
+    }
+    assert!(done.iter().all(|&count| count > 150), "{done:?}");
 }
 
 /// The camera ray's part inside: where it enters a convex body, its direction there, its length, and
@@ -195,8 +308,12 @@ fn check_single(estimator: &SpecularConnection, expected: f64, test: &str) {
     assert_eq!(scores.anomalies[Anomaly::LostRay as usize], 0);
 }
 
-const UNBIASED: [ConnectionMethod; 3] =
-    [ConnectionMethod::Conic {}, ConnectionMethod::Newton {}, ConnectionMethod::Sms {}];
+const UNBIASED: [ConnectionMethod; 4] = [
+    ConnectionMethod::Conic {},
+    ConnectionMethod::Newton {},
+    ConnectionMethod::Sms {},
+    ConnectionMethod::Segments {},
+];
 
 /// Half-space and slab against the closed form, four standard errors.
 #[test]
@@ -211,7 +328,12 @@ fn single_scattering_below_a_plane() {
         let phase = HenyeyGreenstein { g }.pdf(beam.toward.dot(segment.dir));
         let sigma = [sigma_t * albedo, sigma_t];
         let expected = out * beam.single_scattering(segment.dir, segment.length, phase, sigma);
-        for method in [ConnectionMethod::Conic {}, ConnectionMethod::Mnee {}, ConnectionMethod::Sms {}] {
+        for method in [
+            ConnectionMethod::Conic {},
+            ConnectionMethod::Mnee {},
+            ConnectionMethod::Sms {},
+            ConnectionMethod::Segments {},
+        ] {
             let estimator =
                 SpecularConnection::new(scene.clone(), method, Roulette::default()).expect("a scene");
             check_single(&estimator, expected, &format!("{name} {method:?}"));
@@ -329,7 +451,7 @@ fn a_small_disc_is_parallel_light() {
         measure(&estimator, 60, &name).0[class(TransportClass::Single)]
     };
     let (expected, of_expected) = single(&parallel, ConnectionMethod::Conic {});
-    for method in &METHODS[..4] {
+    for method in &METHODS[..5] {
         let (mean, error) = single(&wide, *method);
         println!("{method:?}: {mean:.6} +- {error:.6}, parallel {expected:.6} +- {of_expected:.6}");
         // The disc's half angle is 0.014: the mean changes by its square.
@@ -348,9 +470,9 @@ fn what_is_biased_says_so() {
     };
     let mesh = || Shape::Mesh(procedural::icosphere(1.0, 1, true).expect("closed"));
     let parallel = METHODS.map(|method| bias(sun(DVec3::Z, 1.0), mesh(), method));
-    assert_eq!(parallel, [(false, 1), (true, 1), (true, 1), (false, 1), (true, 1)]);
+    assert_eq!(parallel, [(false, 1), (true, 1), (true, 1), (false, 1), (false, 1), (true, 1)]);
     let wide = METHODS.map(|method| bias(disc(DVec3::Z, 0.01, 1.0), mesh(), method));
-    assert_eq!(wide, [(false, 0), (false, 0), (false, 0), (false, 0), (true, 0)]);
+    assert_eq!(wide, [(false, 0), (false, 0), (false, 0), (false, 0), (false, 0), (true, 0)]);
     // An environment is left to the walk, whatever the method.
     let lights = vec![disc(DVec3::Z, 2.0, 1.0), disc(DVec3::Z, 0.1, 1.0)];
     let scene = scene(mesh(), medium(1.0, 0.9, 0.2), lights, ray, 1);

@@ -35,6 +35,8 @@ pub(in crate::estimators) struct Query {
     pub w_l: DVec3,
     /// Index inside over outside.
     pub eta: f64,
+    /// Slopes of the microfacet normal that refracts; 0 at a smooth boundary.
+    pub slopes: DVec2,
 }
 
 /// A point of the boundary that refracts the light of a query to its point.
@@ -50,9 +52,9 @@ pub(in crate::estimators) struct Root {
     pub dir: DVec3,
     /// Distance from x, mm.
     pub distance: f64,
-    /// J = |d w_L / d w|.
+    /// J = |d w_L / d w|; at a rough boundary |d slopes / d w|.
     pub ratio: f64,
-    /// Fresnel transmittance.
+    /// Fresnel transmittance at the facet.
     pub transmittance: f64,
 }
 
@@ -80,41 +82,106 @@ pub(super) struct Constraint {
 }
 
 impl Query {
+    /// At a smooth boundary.
+    pub(in crate::estimators) fn new(x: DVec3, w_l: DVec3, eta: f64) -> Query {
+        Query { x, w_l, eta, slopes: DVec2::ZERO }
+    }
+
+    fn is_smooth(&self) -> bool {
+        self.slopes == DVec2::ZERO
+    }
+
+    /// The axis about which tangents of a rough boundary are laid.
+    fn axis(&self) -> DVec3 {
+        Frame::about(self.w_l).s
+    }
+
+    /// Tangents and shading normal; at a rough boundary they depend smoothly on the normal.
+    fn frame(&self, n: DVec3) -> Frame {
+        if self.is_smooth() { Frame::about(n) } else { frame_of_slopes(self.axis(), n) }
+    }
+
+    /// The unit facet normal that refracts at a point with this shading normal.
+    pub(super) fn facet_normal(&self, n: DVec3) -> DVec3 {
+        if self.is_smooth() {
+            return n;
+        }
+        let Frame { s, t, .. } = self.frame(n);
+        (n + s * self.slopes.x + t * self.slopes.y).normalize()
+    }
+
+    /// The query whose slopes refract its light at a boundary point, whose shading normal is `n`, to x.
+    pub(super) fn through(x: DVec3, w_l: DVec3, eta: f64, point: DVec3, n: DVec3) -> Query {
+        let query = Query::new(x, w_l, eta);
+        let v = frame_of_slopes(query.axis(), n).to_local((point - x).normalize() * eta - w_l);
+        Query { slopes: DVec2::new(v.x / v.z, v.y / v.z), ..query }
+    }
+
     pub(super) fn constraint(&self, patch: &SurfacePatch) -> Constraint {
         let leg = patch.point - self.x;
         let distance = leg.length();
         let dir = leg / distance;
-        let local = Frame::about(patch.shading).to_local(dir * self.eta - self.w_l);
-        let frame = Frame::about(patch.shading);
-        Constraint { frame, dir, distance, residual: DVec2::new(local.x, local.y), along: local.z }
+        let frame = self.frame(patch.shading);
+        let local = frame.to_local(dir * self.eta - self.w_l);
+        let residual = DVec2::new(local.x, local.y) - self.slopes * local.z;
+        Constraint { frame, dir, distance, residual, along: local.z }
+    }
+
+    /// Change of the residual along a step in the tangent plane: eta w - w_L changes by eta (1 - w w^T)
+    /// dp / d, the tangents s, t by -(s . dN) N, and by turning about N, which matters where the residual
+    /// is not all of eta w - w_L across N.
+    fn derivative(&self, patch: &SurfacePatch, at: &Constraint, dp: DVec3) -> DVec2 {
+        let across = dp - at.dir * at.dir.dot(dp);
+        let (dv, dn) = (across * (self.eta / at.distance), patch.turn(dp));
+        let Frame { s, t, n } = at.frame;
+        let change = dv - dn * at.along;
+        let smooth = DVec2::new(s.dot(change), t.dot(change));
+        if self.is_smooth() {
+            return smooth;
+        }
+        let across = at.residual + self.slopes * at.along;
+        let height = n.dot(self.axis());
+        let turn = -height * t.dot(dn) / (1.0 - height * height).sqrt();
+        let along = n.dot(dv) + s.dot(dn) * across.x + t.dot(dn) * across.y;
+        smooth + DVec2::new(across.y, -across.x) * turn - self.slopes * along
+    }
+
+    /// Columns of the derivative, along the tangents of the surface.
+    fn columns(&self, patch: &SurfacePatch, at: &Constraint) -> ([DVec3; 2], [DVec2; 2]) {
+        let Frame { s, t, .. } = Frame::about(patch.normal);
+        ([s, t], [s, t].map(|dp| self.derivative(patch, at, dp)))
     }
 
     /// The Newton step in the tangent plane; `None` where the derivative is singular.
-    ///
-    /// Along dp the vector eta w - w_L changes by eta (1 - w w^T) dp / d, and the tangents s, t of N by
-    /// -(s . dN) N.
     pub(super) fn step(&self, patch: &SurfacePatch, at: &Constraint) -> Option<DVec3> {
-        let Frame { s, t, .. } = Frame::about(patch.normal);
-        let [a, b] = [s, t].map(|dp| {
-            let across = dp - at.dir * at.dir.dot(dp);
-            let change = across * (self.eta / at.distance) - patch.turn(dp) * at.along;
-            DVec2::new(at.frame.s.dot(change), at.frame.t.dot(change))
-        });
+        let ([s, t], [a, b]) = self.columns(patch, at);
         let det = a.perp_dot(b);
         let [p, q] = [at.residual.perp_dot(b) / det, a.perp_dot(at.residual) / det];
         let step = s * -p - t * q;
         step.is_finite().then_some(step)
     }
 
+    /// Solid angle of w_L, or area of slopes, per solid angle of w.
+    pub(super) fn ratio(&self, patch: &SurfacePatch, at: &Constraint) -> f64 {
+        if self.is_smooth() {
+            return solid_angle_ratio(patch, at.dir, at.distance, self.w_l, self.eta);
+        }
+        let (_, [a, b]) = self.columns(patch, at);
+        let per_area = a.perp_dot(b).abs() / (at.along * at.along);
+        per_area * at.distance * at.distance / at.dir.dot(patch.normal)
+    }
+
     /// Whether a point is a root, `tolerance` being the residual that counts as 0.
     pub(super) fn judge(&self, patch: &SurfacePatch, tolerance: f64) -> Judgement {
         let at = self.constraint(patch);
-        let (ct, cl) = (at.dir.dot(patch.shading), self.w_l.dot(patch.shading));
-        let is_refracted = at.residual.length() <= tolerance && ct > 0.0 && cl > 0.0;
-        if !is_refracted {
+        let facet = self.facet_normal(patch.shading);
+        let cl = self.w_l.dot(facet);
+        let is_transmitted = |n: DVec3| at.dir.dot(n) > 0.0 && self.w_l.dot(n) > 0.0;
+        let is_refracted = at.residual.length() <= tolerance && is_transmitted(facet);
+        if !is_refracted || !is_transmitted(patch.shading) {
             return Judgement::None;
         }
-        if at.dir.dot(patch.normal) <= 0.0 || self.w_l.dot(patch.normal) <= 0.0 {
+        if !is_transmitted(patch.normal) {
             return Judgement::WrongSide;
         }
         Judgement::Root(Root {
@@ -124,10 +191,16 @@ impl Query {
             shading: patch.shading,
             dir: at.dir,
             distance: at.distance,
-            ratio: solid_angle_ratio(patch, at.dir, at.distance, self.w_l, self.eta),
+            ratio: self.ratio(patch, &at),
             transmittance: 1.0 - fresnel(cl, self.eta).reflectance,
         })
     }
+}
+
+/// A frame about a shading normal in which slopes are measured: s is across it in the plane of `axis`.
+fn frame_of_slopes(axis: DVec3, n: DVec3) -> Frame {
+    let s = (axis - n * n.dot(axis)).normalize();
+    Frame { s, t: n.cross(s), n }
 }
 
 /// J = |d w_L / d w| at the point from which a ray runs to `patch` along `dir`; see the head of the
@@ -139,9 +212,15 @@ pub(in crate::estimators) fn solid_angle_ratio(
     w_l: DVec3,
     eta: f64,
 ) -> f64 {
-    let (n, across) = (patch.shading, Frame::about(dir));
+    let n = patch.shading;
     let (cl, ct) = (w_l.dot(n), dir.dot(n));
     let mu = cl - eta * ct;
+    if let Some(curvature) = patch.curvature() {
+        // Across the plane of incidence dw_L = (eta + mu curvature d) u; in it u also turns by Snell's law.
+        let focus = -mu * curvature * distance / eta;
+        return eta * eta * (ct / cl) * ((1.0 - focus) * (1.0 - focus / (ct * ct))).abs();
+    }
+    let across = Frame::about(dir);
     let [a, b] = [across.s, across.t].map(|u| {
         let dp = (u - dir * (u.dot(patch.normal) / dir.dot(patch.normal))) * distance;
         let dn = patch.turn(dp);

@@ -63,7 +63,7 @@ fn all_forms_agree() {
                 let distance = length * (0.05 + 0.9 * stream.draw());
                 let x = hit.point - dir * distance;
                 let patch = patch_at(shape, hit.face, hit.point, hit.normal);
-                let query = Query { x, w_l, eta };
+                let query = Query::new(x, w_l, eta);
                 let Judgement::Root(root) = query.judge(&patch, 1e-9) else {
                     panic!("{name} {eta}: light that enters is no root: {:?}", query.constraint(&patch));
                 };
@@ -120,12 +120,79 @@ fn a_matched_boundary_does_nothing() {
             let w_l = direction(&mut stream);
             let Some((hit, dir, length)) = entering(&shape, w_l, 1.0, stream.draw2()) else { continue };
             let patch = patch_at(&shape, hit.face, hit.point, hit.normal);
-            let query = Query { x: hit.point - dir * (0.5 * length), w_l, eta: 1.0 };
+            let query = Query::new(hit.point - dir * (0.5 * length), w_l, 1.0);
             let Judgement::Root(root) = query.judge(&patch, 1e-12) else { panic!("{name}") };
             // Rounding of directions, over the cosines that are divided by.
             let bound = 1e-14 / (w_l.dot(patch.shading) * w_l.dot(patch.normal));
             assert!((root.ratio - 1.0).abs() < bound, "{name} {root:?} {bound:e}");
             assert!((root.dir - w_l).length() < 1e-12 && root.transmittance == 1.0);
         }
+    }
+}
+
+/// At a rough boundary: the area of slopes per solid angle of w against finite differences of the slopes that
+/// refract to where a turned ray meets its facet, or the sphere.
+#[test]
+fn slopes_per_direction_are_differences() {
+    let mut stream = stream("slopes_per_direction_are_differences");
+    let mut bodies = meshes(2);
+    bodies.push(("sphere", Shape::Sphere { radius: 1.3 }));
+    for (name, shape) in &bodies {
+        let (mut compared, mut most) = (0, 0.0f64);
+        for eta in [1.3, 1.6, 0.8] {
+            for _ in 0..300 {
+                let w_l = direction(&mut stream);
+                let Some((hit, dir, length)) = entering(shape, w_l, eta, stream.draw2()) else {
+                    continue;
+                };
+                let x = hit.point - dir * (length * (0.1 + 0.8 * stream.draw()));
+                // A ray beside the one that the smooth boundary would refract.
+                let [a, b] = stream.draw2().map(|u| 0.3 * (u - 0.5));
+                let frame = Frame::about(dir);
+                let on_surface = |w: DVec3| -> Option<SurfacePatch> {
+                    match shape {
+                        Shape::Mesh(mesh) => {
+                            let facet = Facet::new(mesh, hit.face.0);
+                            let t = (facet.corner - x).dot(facet.normal) / w.dot(facet.normal);
+                            Some(facet.patch(facet.place(x + w * t)))
+                        }
+                        _ => {
+                            let hit =
+                                shape.intersect(&Ray { origin: x, dir: w }, Side::Inside, None, 1e9)?;
+                            Some(patch_at(shape, hit.face, hit.point, hit.normal))
+                        }
+                    }
+                };
+                let toward = |a: f64, b: f64| (frame.n + frame.s * a + frame.t * b).normalize();
+                let slopes = |w: DVec3| -> Option<DVec2> {
+                    let patch = on_surface(w)?;
+                    Some(Query::through(x, w_l, eta, patch.point, patch.shading).slopes)
+                };
+                let w = toward(a, b);
+                let Some(patch) = on_surface(w) else { continue };
+                let query = Query::through(x, w_l, eta, patch.point, patch.shading);
+                let at = query.constraint(&patch);
+                let facet = query.facet_normal(patch.shading);
+                let cosines = [w, w_l].map(|v| v.dot(facet).min(v.dot(patch.normal)));
+                if cosines[0].min(cosines[1]) < 0.1 || query.slopes.length() > 2.0 {
+                    continue;
+                }
+                assert!(at.residual.length() < 1e-12, "{name}: {query:?} {at:?}");
+                let across = Frame::about(w);
+                let column = |u: DVec3| -> Option<DVec2> {
+                    let central = |h: f64| {
+                        let [p, q] = [h, -h].map(|h| slopes((w + u * h).normalize()));
+                        Some((p? - q?) / (2.0 * h))
+                    };
+                    Some((central(1e-4)? * 4.0 - central(2e-4)?) / 3.0)
+                };
+                let (Some(p), Some(q)) = (column(across.s), column(across.t)) else { continue };
+                let (expected, got) = (p.perp_dot(q).abs(), query.ratio(&patch, &at));
+                compared += 1;
+                most = most.max((got - expected).abs() / (1e-3 + expected));
+            }
+        }
+        println!("{name}: {compared} compared, {most:.1e}");
+        assert!(compared > 100 && most < 1e-6, "{name}: {compared} {most}");
     }
 }

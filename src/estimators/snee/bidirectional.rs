@@ -19,7 +19,8 @@ use crate::error::{Error, Result};
 use crate::estimators::bands::{OneBand, WalkBands};
 use crate::estimators::field::{Field, Path};
 use crate::estimators::path::PathOptions;
-use crate::estimators::walk::{CameraWalk, Rivals, Unrivalled, WalkExit};
+use crate::estimators::vertices::WalkExit;
+use crate::estimators::walk::{CameraWalk, Rivals, Unrivalled};
 use crate::estimators::{
     Bodies, Cost, Estimator, EstimatorKind, Roulette, Scores, Serves, read_options,
 };
@@ -203,8 +204,8 @@ impl Rivals for OneLightVertex<'_> {
         walk.score_with(&bands, history.class(), guide.light, value);
     }
 
-    fn meet_surface(&mut self) {
-        self.count = 0;
+    fn depart<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>) {
+        walk.rivals.count = 0;
     }
 
     fn densities<B: WalkBands>(

@@ -28,7 +28,8 @@ use super::specular;
 use super::state::{Connections, Slot};
 use super::subdivision::{self, Subdivided};
 use crate::estimators::bands::WalkBands;
-use crate::estimators::walk::{CameraWalk, Rivals, Unscattered, WalkExit, WalkVertex};
+use crate::estimators::vertices::{Unscattered, WalkExit, WalkVertex};
+use crate::estimators::walk::{CameraWalk, Rivals};
 use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, Frame};
 
@@ -73,8 +74,8 @@ impl Rivals for Connections<'_> {
         }
     }
 
-    fn meet_surface(&mut self) {
-        self.count = 0;
+    fn depart<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>) {
+        walk.rivals.count = 0;
     }
 
     fn views(&self) -> u32 {

@@ -14,7 +14,8 @@
 
 use super::state::Connections;
 use crate::estimators::bands::WalkBands;
-use crate::estimators::walk::{CameraWalk, Rivals, Unscattered};
+use crate::estimators::vertices::Unscattered;
+use crate::estimators::walk::{CameraWalk, Rivals};
 use crate::estimators::{Anomaly, Cost};
 use crate::geometry::{FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};

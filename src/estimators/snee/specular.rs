@@ -45,7 +45,8 @@ use super::state::{Connections, Slot};
 use crate::estimators::Anomaly;
 use crate::estimators::bands::WalkBands;
 use crate::estimators::connection::{Conic, Query, Root, SolverWork, SurfacePatch, solid_angle_ratio};
-use crate::estimators::walk::{CameraWalk, WalkExit};
+use crate::estimators::vertices::WalkExit;
+use crate::estimators::walk::CameraWalk;
 use crate::geometry::Hit;
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
@@ -151,7 +152,7 @@ pub(super) fn draw<'a, B: WalkBands>(
     let guide = walk.rivals.choose_guide()?;
     let light = &walk.scene.lights[guide.light];
     let sample = guide.sample(light, walk.band, walk.rivals.stream.draw2());
-    let query = Query { x: x_j, w_l: sample.wi, eta: walk.boundary.eta() };
+    let query = Query::new(x_j, sample.wi, walk.boundary.eta());
     let mut roots = std::mem::take(&mut walk.rivals.roots);
     roots.clear();
     let mut work = SolverWork::default();

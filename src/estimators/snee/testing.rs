@@ -7,7 +7,7 @@ use super::end::Middle;
 use super::subdivision::Subdivided;
 use super::*;
 use crate::estimators::Roulette;
-use crate::estimators::walk::WalkExit;
+use crate::estimators::vertices::WalkExit;
 use crate::geometry::{Hit, Ray, Shape, Side, procedural};
 use crate::math::{DVec3, Frame};
 use crate::optics::medium::Medium;
