@@ -74,6 +74,17 @@ fn unlike_lights() -> Vec<Light> {
     ]
 }
 
+/// Round and flat, with interpolated and with plain normals, convex and not.
+fn unlike_bodies() -> [Shape; 4] {
+    let mesh = |mesh: Result<crate::geometry::Mesh>| Shape::Mesh(mesh.expect("closed"));
+    [
+        Shape::Sphere { radius: 1.0 },
+        Shape::Box { half: DVec3::new(0.8, 0.6, 1.0) },
+        mesh(procedural::bumpy_sphere(1.0, 3, 0.03, 6.0, true)),
+        mesh(procedural::torus(0.7, 0.3, [24, 12], false)),
+    ]
+}
+
 /// Of a path x -> p -> light the walk's own sampling and the connection have the densities T and P p_L J
 /// / (phase e^(-sigma d)), relative to U. A technique scores f / D_t for it, D_t being what its code
 /// believes to be the sum. So f is kept exactly if the sum of p_t score_t / f is 1.
@@ -81,18 +92,10 @@ fn unlike_lights() -> Vec<Light> {
 fn weights_sum_to_one() {
     let key = StreamKey::named("weights_sum_to_one (connection)");
     let mut stream = key.pass(0).stream(0, Purpose::Sensor);
-    let lights = unlike_lights;
-    let mesh = |mesh: Result<crate::geometry::Mesh>| Shape::Mesh(mesh.expect("closed"));
-    let bodies = [
-        Shape::Sphere { radius: 1.0 },
-        Shape::Box { half: DVec3::new(0.8, 0.6, 1.0) },
-        mesh(procedural::bumpy_sphere(1.0, 3, 0.03, 6.0, true)),
-        mesh(procedural::torus(0.7, 0.3, [24, 12], false)),
-    ];
     let ray = Ray { origin: DVec3::new(0.3, -0.4, 3.0), dir: -DVec3::Z };
     let mut done = [0u32; 6];
-    for body in bodies {
-        let scene = scene(body, medium(4.0, 0.9, 0.3), lights(), ray, 1);
+    for body in unlike_bodies() {
+        let scene = scene(body, medium(4.0, 0.9, 0.3), unlike_lights(), ray, 1);
         for (index, method) in METHODS.into_iter().enumerate() {
             let estimator = SpecularConnection::new(scene.clone(), method, Roulette::Below(1e-12))
                 .expect("a scene for it");
@@ -183,24 +186,16 @@ fn weights_sum_to_one() {
 fn weights_with_facets_sum_to_one() {
     let key = StreamKey::named("weights_with_facets_sum_to_one");
     let mut stream = key.pass(0).stream(0, Purpose::Sensor);
-    let lights = unlike_lights;
-    let mesh = |mesh: Result<crate::geometry::Mesh>| Shape::Mesh(mesh.expect("closed"));
-    let bodies = [
-        Shape::Sphere { radius: 1.0 },
-        Shape::Box { half: DVec3::new(0.8, 0.6, 1.0) },
-        mesh(procedural::bumpy_sphere(1.0, 3, 0.03, 6.0, true)),
-        mesh(procedural::torus(0.7, 0.3, [24, 12], false)),
-    ];
     let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.15 };
     let ray = Ray { origin: DVec3::new(0.3, -0.4, 3.0), dir: -DVec3::Z };
     let methods = [ConnectionMethod::Newton {}, ConnectionMethod::Mnee {}, ConnectionMethod::Sms {}];
     let mut done = [0u32; 3];
-    for body in bodies {
+    for body in unlike_bodies() {
         let sensor = Sensor::Probe(Probe { ray, paths: 1 });
         let boundary = vec![Boundary::Rough { eta: ETA, facets }];
         let medium = vec![medium(4.0, 0.9, 0.3)];
         let scene =
-            Arc::new(Scene { shape: Arc::new(body), boundary, medium, lights: lights(), sensor });
+            Arc::new(Scene { shape: Arc::new(body), boundary, medium, lights: unlike_lights(), sensor });
         for (index, method) in methods.into_iter().enumerate() {
             let estimator = SpecularConnection::new(scene.clone(), method, Roulette::Below(1e-12))
                 .expect("a scene for it");
