@@ -22,6 +22,22 @@ fn bad(old: &str, new: &str, words: &[&str]) {
     ran.exits(2).complains_of(words);
 }
 
+/// Every shipped experiment, in every setting: the only error is a scan that has not been fetched.
+#[test]
+fn shipped_experiments_are_accepted() {
+    let work = Work::new();
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/experiments");
+    let ran = work.shell(&format!("\"$0\" check $(find '{root}' -name '*.toml')"));
+    let is_expected = |line: &str| line.contains("/../meshes/");
+    for line in ran.stderr().lines().filter(|line| line.starts_with("error: ")) {
+        ran.check(is_expected(line), line);
+    }
+    ran.check(
+        ran.stdout().lines().filter(|line| line.contains(": ok, ")).count() > 40,
+        "files are checked",
+    );
+}
+
 #[test]
 fn words_and_types() {
     let help = "did you mean `radius_mm`?";

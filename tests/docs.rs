@@ -12,7 +12,7 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 20] = [
+const PAGES: [&str; 21] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
@@ -29,6 +29,7 @@ const PAGES: [&str; 20] = [
     "docs/own-estimator.md",
     "docs/subdivision.md",
     "docs/verification.md",
+    "docs/walks.md",
     "examples/ci-gate/README.md",
     "examples/own-estimator/README.md",
     "results/README.md",

@@ -1,5 +1,5 @@
-//! State that a walk keeps per band: none where it traces one band alone; of a walk
-//! that all bands share, what each band would have made of it.
+//! How a walk is drawn, and the state that it keeps for it: none of a plain walk that traces one band alone; of a walk
+//! that all bands share, what each band would have made of it; of a guided walk (`guidance`), its density.
 //!
 //! Shared walks (hero wavelengths, Wilkie et al. 2014). The hero h, drawn with probability 1/n, steers:
 //! its extinction draws the flights, its phase function the directions. With f_b and p_b the integrand
@@ -16,21 +16,53 @@
 //! coefficients make every factor exactly 1, and every band the same to the last bit.
 
 use super::{Scores, TransportClass};
-use crate::math::exp;
+use crate::geometry::Ray;
+use crate::math::{DVec3, exp};
 use crate::optics::medium::Medium;
+use crate::sampling::distance::sample_exponential;
+use crate::sampling::stream::Stream;
 
-/// State that a walk keeps per band.
+/// How a walk is drawn, and the state that it keeps for it.
 pub(super) trait WalkBands: Clone {
+    /// The walk goes on inside from a boundary point with this outward normal, along `dir`.
+    #[inline]
+    fn enter(&mut self, _at: DVec3, _normal: DVec3, _dir: DVec3) {}
+
+    /// Draws a direction for light that has arrived at a medium vertex along a ray, which ends there.
+    #[inline]
+    fn draw_turn(&mut self, medium: &Medium, arrival: &Ray, stream: &mut Stream) -> DVec3 {
+        medium.phase.sample(arrival.dir, stream.draw2())
+    }
+
+    /// Draws the length of the next flight, if no boundary ends it.
+    #[inline]
+    fn draw_flight(&mut self, medium: &Medium, u: f64) -> f64 {
+        sample_exponential(medium.sigma_t, u)
+    }
+
     /// A flight of length `t` in the medium, which ends in a scattering event or at the boundary.
     fn flight(&mut self, media: &[Medium], t: f64, scatters: bool);
 
-    /// A change of direction with cosine `mu`.
-    fn turn(&mut self, media: &[Medium], mu: f64);
+    /// A passage of length `t` that is scored by its expectation: no flight is drawn.
+    fn passage(&mut self, media: &[Medium], t: f64) {
+        self.flight(media, t, false);
+    }
+
+    /// A change of direction at a medium vertex.
+    fn turn(&mut self, media: &[Medium], at: DVec3, from: DVec3, to: DVec3);
 
     /// The factor that roulette sees at a scattering event, for the medium of the walk's own band.
     fn survival(&self, medium: &Medium) -> f64;
 
-    /// Density of the walk under any hero over its density under its own: sum of rho_m / n.
+    /// What roulette multiplies the weight by at a medium vertex: importance there over that where the walk came in, and
+    /// over [`Self::density`]; 1 where a walk knows nothing of it.
+    #[inline]
+    fn importance(&mut self, _at: DVec3) -> f64 {
+        1.0
+    }
+
+    /// Density of the walk as it is drawn, over that of a plain walk in its own band; of a walk that bands share, that
+    /// under any hero: sum of rho_m / n.
     fn density(&self) -> f64;
 
     /// Adds a contribution of the walk's own band, and to every other that the walk scores what it is
@@ -62,7 +94,7 @@ pub(super) struct ScorePlace {
     pub light: usize,
 }
 
-/// A walk that one band has for itself.
+/// A plain walk that one band has for itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OneBand;
 
@@ -71,7 +103,7 @@ impl WalkBands for OneBand {
     fn flight(&mut self, _: &[Medium], _: f64, _: bool) {}
 
     #[inline]
-    fn turn(&mut self, _: &[Medium], _: f64) {}
+    fn turn(&mut self, _: &[Medium], _: DVec3, _: DVec3, _: DVec3) {}
 
     #[inline]
     fn survival(&self, medium: &Medium) -> f64 {
@@ -147,7 +179,8 @@ impl WalkBands for SharedBands {
         }
     }
 
-    fn turn(&mut self, media: &[Medium], mu: f64) {
+    fn turn(&mut self, media: &[Medium], _: DVec3, from: DVec3, to: DVec3) {
+        let mu = from.dot(to);
         let hero = media[self.hero].phase.pdf(mu);
         for (band, medium) in media.iter().enumerate() {
             let step = medium.phase.pdf(mu) / hero;

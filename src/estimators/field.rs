@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::choice::light_shares;
+use super::guidance::{Guidance, WalkDraw};
 use super::roulette::Roulette;
 use crate::geometry::BoundingSphere;
 use crate::sampling::stream::PassKey;
@@ -18,13 +19,40 @@ pub(super) struct Field {
     pub roulette: Roulette,
     /// Ball around the body, where it is finite.
     pub bounds: Option<BoundingSphere>,
+    /// Per band what guides walks; empty where all are plain.
+    guidance: Vec<Option<Guidance>>,
 }
 
 impl Field {
     /// Prepares a scene for tracing with this roulette.
     pub(super) fn new(scene: Arc<Scene>, roulette: Roulette) -> Field {
         let choice = light_shares(&scene);
-        Field { bounds: scene.shape.bounds(), roulette, choice, scene }
+        Field { bounds: scene.shape.bounds(), roulette, choice, scene, guidance: Vec::new() }
+    }
+
+    /// The same with walks that are drawn in this way.
+    pub(super) fn with_walks(scene: Arc<Scene>, roulette: Roulette, draw: WalkDraw) -> Field {
+        let guidance = match draw {
+            WalkDraw::Plain {} => Vec::new(),
+            _ => Guidance::of_bands(&scene, draw),
+        };
+        Field { guidance, ..Field::new(scene, roulette) }
+    }
+
+    /// What guides the walks of a band; `None` where they are plain.
+    pub(super) fn guidance(&self, band: usize) -> Option<&Guidance> {
+        self.guidance.get(band)?.as_ref()
+    }
+
+    /// With walks of every band guided like this.
+    #[cfg(test)]
+    pub(super) fn guided_by(self, guidance: &Guidance) -> Field {
+        Field { guidance: vec![Some(guidance.clone()); self.scene.bands()], ..self }
+    }
+
+    /// Memory on the heap, bytes.
+    pub(super) fn heap_bytes(&self) -> usize {
+        self.guidance.iter().flatten().map(Guidance::heap_bytes).sum()
     }
 }
 

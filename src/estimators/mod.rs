@@ -16,6 +16,7 @@ mod crossing;
 mod emergence;
 mod estimator;
 mod field;
+mod guidance;
 mod history;
 mod illumination;
 mod kind;
@@ -31,6 +32,7 @@ mod visibility;
 mod walk;
 
 pub use estimator::{BandUse, Bias, Estimator, HeavyTail};
+pub use guidance::WalkDraw;
 pub use history::{History, TransportClass};
 pub use kind::{BuildEstimator, EstimatorKind, read_options};
 pub use roulette::Roulette;

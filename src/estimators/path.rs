@@ -24,6 +24,7 @@ use serde::Deserialize;
 
 use super::bands::OneBand;
 use super::field::{Field, Path};
+use super::guidance::{GuidedBand, WalkDraw};
 use super::illumination::unscattered_notes;
 use super::walk::{CameraWalk, Unrivalled};
 use super::{Estimator, EstimatorKind, Scores, Serves, read_options};
@@ -34,13 +35,16 @@ use crate::scene::Scene;
 
 pub use super::Roulette;
 
-/// Options of `path` and `bidirectional`.
+/// Options of `path`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PathOptions {
     /// When a path is ended by chance; both ways are unbiased.
     #[serde(default)]
     pub roulette: Roulette,
+    /// How walks are drawn inside the body; all ways are unbiased.
+    #[serde(default)]
+    pub walk: WalkDraw,
 }
 
 /// The estimator, for one scene.
@@ -56,19 +60,24 @@ impl PathTracer {
         doc: "unidirectional path tracing with MIS between BSDF and light sampling; unbiased",
         serves: Serves { emission: true, ..Serves::WALKS },
         options_schema: || schemars::schema_for!(PathOptions),
-        build: |options, scene| {
-            let PathOptions { roulette } = read_options(options)?;
-            Ok(Box::new(PathTracer::new(scene, roulette)?))
-        },
+        build: |options, scene| Ok(Box::new(PathTracer::with_options(scene, &read_options(options)?)?)),
     };
+
+    /// With plain walks, for a scene.
+    ///
+    /// # Errors
+    /// A scene that it does not serve.
+    pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Result<PathTracer> {
+        PathTracer::with_options(scene, &PathOptions { roulette, walk: WalkDraw::Plain {} })
+    }
 
     /// For a scene.
     ///
     /// # Errors
     /// A scene that it does not serve.
-    pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Result<PathTracer> {
+    pub fn with_options(scene: Arc<Scene>, options: &PathOptions) -> Result<PathTracer> {
         PathTracer::KIND.check(&scene)?;
-        Ok(PathTracer { field: Field::new(scene, roulette) })
+        Ok(PathTracer { field: Field::with_walks(scene, options.roulette, options.walk) })
     }
 }
 
@@ -77,9 +86,20 @@ impl Estimator for PathTracer {
         for &band in bands {
             for index in 0..self.field.scene.sensor.rays_per_pass() {
                 let path = Path { field: &self.field, band, index, key };
-                CameraWalk::trace(path, scores, Unrivalled, OneBand);
+                match self.field.guidance(band) {
+                    Some(guidance) => {
+                        let medium = &self.field.scene.medium[band];
+                        let guided = GuidedBand::new(guidance, medium);
+                        CameraWalk::trace(path, scores, Unrivalled, guided)
+                    }
+                    None => CameraWalk::trace(path, scores, Unrivalled, OneBand),
+                };
             }
         }
+    }
+
+    fn working_bytes(&self) -> usize {
+        self.field.heap_bytes()
     }
 
     fn notes(&self) -> Vec<String> {

@@ -27,7 +27,7 @@ use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::{Boundary, Density, Event};
 use crate::optics::medium::Medium;
-use crate::sampling::distance::{sample_exponential, transmittance};
+use crate::sampling::distance::transmittance;
 use crate::sampling::stream::{Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::sensor::PathMeasure;
@@ -270,7 +270,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             let Some(next_side) = self.cross(&hit, side) else { return self.stream.draws() };
             side = next_side;
             let next = match side {
-                Side::Inside => self.walk_inside(),
+                Side::Inside => self.walk_inside(&hit),
                 Side::Outside => self.fly_outside(),
             };
             match next {
@@ -281,7 +281,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     }
 
     /// Flies and scatters in the medium until the path meets the boundary or ends.
-    fn walk_inside(&mut self) -> Option<Hit> {
+    fn walk_inside(&mut self, entry: &Hit) -> Option<Hit> {
+        self.bands.enter(entry.point, entry.normal, self.ray.dir);
         if !self.matched() {
             R::depart(self);
         }
@@ -289,13 +290,13 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             let t = self.flight();
             match self.end_of_flight(t) {
                 Some(hit) => {
-                    self.drawn = match self.drawn {
-                        DirectionDraw::Competing(pdf) if self.matched() => {
-                            DirectionDraw::Competing(pdf * transmittance(self.medium.sigma_t, hit.t))
-                        }
-                        drawn => drawn,
-                    };
+                    let drawn_before = self.bands.density();
                     self.bands.flight(&self.scene.medium, hit.t, false);
+                    if let (DirectionDraw::Competing(pdf), true) = (self.drawn, self.matched()) {
+                        let through = transmittance(self.medium.sigma_t, hit.t);
+                        let guided = self.bands.density() / drawn_before;
+                        self.drawn = DirectionDraw::Competing(pdf * through * guided);
+                    }
                     self.measure.fly(&self.ray, hit.t);
                     return Some(hit);
                 }
@@ -315,7 +316,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     #[inline]
     fn flight(&mut self) -> f64 {
         self.scores.count(Cost::Rays);
-        sample_exponential(self.medium.sigma_t, self.stream.draw())
+        self.bands.draw_flight(&self.medium, self.stream.draw())
     }
 
     /// Where the boundary ends a flight of length `t`, if it does; scores what the medium emits on the
@@ -374,12 +375,14 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// A new direction at a medium vertex.
     #[inline]
     fn turn(&mut self) {
-        let dir = self.medium.phase.sample(self.ray.dir, self.stream.draw2());
+        let Ray { origin, dir: arrival } = self.ray;
+        let dir = self.bands.draw_turn(&self.medium, &self.ray, &mut self.stream);
+        let drawn_before = self.bands.density();
+        self.bands.turn(&self.scene.medium, origin, arrival, dir);
         if self.matched() {
-            let pdf = self.medium.phase.pdf(self.ray.dir.dot(dir));
-            self.drawn = DirectionDraw::Competing(pdf);
+            let guided = self.bands.density() / drawn_before;
+            self.drawn = DirectionDraw::Competing(self.medium.phase.pdf(arrival.dot(dir)) * guided);
         }
-        self.bands.turn(&self.scene.medium, self.ray.dir.dot(dir));
         self.ray.dir = dir;
     }
 
@@ -391,8 +394,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             Roulette::Below(threshold) => {
                 self.throughput *= factor;
                 self.survival *= factor;
-                if self.survival < threshold {
-                    let probability = roulette(self.survival, threshold, || self.stream.draw())?;
+                let expected = self.survival * self.bands.importance(self.ray.origin);
+                if expected < threshold {
+                    let probability = roulette(expected, threshold, || self.stream.draw())?;
                     self.throughput /= probability;
                     self.survival /= probability;
                 }
@@ -602,9 +606,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
         let phase = self.medium.phase.pdf(self.ray.dir.dot(sample.wi));
         let path = self.measure; // without the connection, which is a path of its own
-        if let Some((through, entry)) = self.transmittance_out(sample.wi) {
-            let own = phase * through;
-            let value = own * sample.radiance;
+        if let Some((through, guided, entry)) = self.transmittance_out(sample.wi) {
+            let value = phase * through * sample.radiance;
+            let own = phase * through * guided;
             let light = LightDraw { index, choice, wi: sample.wi, pdf: sample.pdf };
             self.score_connection(light, entry, value, own);
         }
@@ -612,9 +616,12 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     }
 
     /// Transmittance from the path's medium vertex to infinity along `dir`, through every part of the
-    /// body on the way, and the last point of the boundary there. The path's measure follows.
-    fn transmittance_out(&mut self, dir: DVec3) -> Option<(f64, DVec3)> {
+    /// body on the way; the density with which the walk goes there, over that of a plain walk; the last point of the
+    /// boundary. The path's measure follows.
+    fn transmittance_out(&mut self, dir: DVec3) -> Option<(f64, f64, DVec3)> {
         let mut ray = Ray { origin: self.ray.origin, dir };
+        let mut bands = self.bands.clone();
+        bands.turn(&self.scene.medium, ray.origin, self.ray.dir, dir);
         let mut from = None;
         let mut inside_length = 0.0;
         let mut side = Side::Inside;
@@ -626,13 +633,18 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                     if side == Side::Inside {
                         self.measure.fly(&ray, hit.t);
                         inside_length += hit.t;
+                        bands.flight(&self.scene.medium, hit.t, false);
+                    } else {
+                        bands.enter(hit.point, hit.normal, dir);
                     }
                     ray.origin = hit.point;
                     from = Some(hit.face);
                     side = other(side);
                 }
                 None if side == Side::Outside => {
-                    return Some((transmittance(self.medium.sigma_t, inside_length), ray.origin));
+                    let through = transmittance(self.medium.sigma_t, inside_length);
+                    let guided = (bands.density() / self.bands.density()).min(f64::MAX);
+                    return Some((through, guided, ray.origin));
                 }
                 None => {
                     if self.bounds.is_some() {

@@ -37,7 +37,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let leg = point - self.ray.origin;
         let dir = leg.normalize();
         if turns {
-            self.bands.turn(&self.scene.medium, self.ray.dir.dot(dir));
+            self.bands.turn(&self.scene.medium, self.ray.origin, self.ray.dir, dir);
         }
         self.ray.dir = dir;
         leg.length()
@@ -53,9 +53,11 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let (f_cos, own) = match self.exit {
             Some(exit) => self.boundary.eval(exit.wo, exit.frame.to_local(wi)),
             None => {
-                let through = self.transmittance_out(wi).map_or(0.0, |(through, _)| through);
-                let own = self.medium.phase.pdf(self.ray.dir.dot(wi)) * through;
-                (own, own)
+                let (through, guided) = self
+                    .transmittance_out(wi)
+                    .map_or((0.0, 1.0), |(through, guided, _)| (through, guided));
+                let value = self.medium.phase.pdf(self.ray.dir.dot(wi)) * through;
+                (value, value * guided)
             }
         };
         let light = LightDraw { index, choice, wi, pdf };
@@ -73,9 +75,12 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             }
             (Some(_), boundary) => (boundary.eta() * boundary.eta(), DirectionDraw::Alone),
             (None, _) => {
-                let through = self.transmittance_out(wi).map_or(0.0, |(through, _)| through);
+                let (through, guided) = self
+                    .transmittance_out(wi)
+                    .map_or((0.0, 1.0), |(through, guided, _)| (through, guided));
                 let phase = self.medium.phase.pdf(self.ray.dir.dot(wi));
-                (1.0, DirectionDraw::Competing(phase * through))
+                // The walk's density has not followed the step out, which the test leaves out.
+                (1.0 / guided, DirectionDraw::Competing(phase * through * guided))
             }
         };
         (self.ray.dir, self.drawn) = (wi, drawn);

@@ -9,6 +9,9 @@ pub mod boundary;
 /// Reflectance of a smooth dielectric.
 pub mod fresnel;
 
+/// Turns and flights drawn towards where importance grows.
+pub mod guided;
+
 /// Directions of a single bounce towards a point, in proportion to phase function and geometry.
 pub mod joint;
 

@@ -17,6 +17,7 @@ pub mod chart;
 pub mod discrete;
 pub mod distance;
 pub mod facets;
+pub mod guided;
 pub mod joint;
 mod kind;
 pub mod light;
@@ -49,6 +50,8 @@ pub const KINDS: &[SamplerKind] = &[
     towards::DIRECTION_AND_DISTANCE,
     joint::TABLE,
     joint::MIXTURE,
+    guided::TURN,
+    guided::STEP,
     lobe::POWER,
     lobe::PLANE,
     facets::NORMALS,

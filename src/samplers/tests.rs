@@ -49,7 +49,7 @@ fn every_kind_is_in_the_file_and_every_name_once() {
 
 /// D5 and D10: a sample says of itself what is said of its place, lies inside its chart, is exact where
 /// it is discrete, and takes as many numbers as every other, except where a query takes as many as it
-/// has candidates.
+/// has candidates, and where rejection or a choice decides.
 #[test]
 fn samples_agree_with_their_density() {
     for (name, kind, sampler) in listed() {
@@ -61,7 +61,8 @@ fn samples_agree_with_their_density() {
             let draw = sampler.draw(&mut stream);
             let taken = stream.draws() - before;
             let as_many = *draws.get_or_insert(taken) == taken;
-            assert!(as_many || kind == "thinning", "{name}: numbers taken");
+            let may_differ = ["thinning", "guided_turn", "guided_step"].contains(&kind);
+            assert!(as_many || may_differ, "{name}: numbers taken");
             match draw {
                 Draw::Null => assert_ne!(sampler.null(), Null::Never, "{name}"),
                 Draw::Delta { index, exact } => {

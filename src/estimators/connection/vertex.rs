@@ -116,7 +116,7 @@ pub(super) fn score<B: WalkBands>(
     let WeightedRoot { root, weight } = *found;
     let Root { dir, distance, .. } = root;
     let Departure { vertex, mut bands, history } = departure.clone();
-    bands.turn(&walk.scene.medium, vertex.arrival.dot(dir));
+    bands.turn(&walk.scene.medium, vertex.point, vertex.arrival, dir);
     bands.flight(&walk.scene.medium, distance, false);
     let phase = walk.medium.phase.pdf(vertex.arrival.dot(dir));
     let walked = phase * transmittance(walk.medium.sigma_t, distance);

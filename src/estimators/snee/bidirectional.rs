@@ -13,12 +13,14 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::end::{End, Middle};
 use super::guide::Guide;
 use crate::error::{Error, Result};
 use crate::estimators::bands::{OneBand, WalkBands};
 use crate::estimators::field::{Field, Path};
-use crate::estimators::path::PathOptions;
 use crate::estimators::vertices::WalkExit;
 use crate::estimators::walk::{CameraWalk, Rivals, Unrivalled};
 use crate::estimators::{
@@ -31,6 +33,15 @@ use crate::sampling::discrete::choose_share;
 use crate::sampling::distance::{sample_exponential, transmittance};
 use crate::sampling::stream::{PassKey, Purpose, Stream};
 use crate::scene::Scene;
+
+/// Options of `bidirectional`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct BidirectionalOptions {
+    /// When a path is ended by chance; both ways are unbiased.
+    #[serde(default)]
+    roulette: Roulette,
+}
 
 /// The estimator, for one scene.
 #[derive(Debug)]
@@ -47,9 +58,9 @@ impl Bidirectional {
         kind: "bidirectional",
         doc: "path tracing whose medium vertices connect to one light vertex inside the body; unbiased",
         serves: Serves { bodies: Bodies::Finite, emission: true, ..Serves::WITHOUT_ENTRIES },
-        options_schema: || schemars::schema_for!(PathOptions),
+        options_schema: || schemars::schema_for!(BidirectionalOptions),
         build: |options, scene| {
-            let PathOptions { roulette } = read_options(options)?;
+            let BidirectionalOptions { roulette } = read_options(options)?;
             Ok(Box::new(Bidirectional::new(scene, roulette)?))
         },
     };

@@ -156,7 +156,7 @@ pub(super) fn score_guided<B: WalkBands>(
         return;
     }
     let mut bands = walk.bands.clone();
-    bands.turn(&walk.scene.medium, x_j.arrival.dot(leg.dir));
+    bands.turn(&walk.scene.medium, x_j.point, x_j.arrival, leg.dir);
     bands.flight(&walk.scene.medium, leg.length, false);
     let score = walk.throughput * end.value / (bands.density() * end.unidirectional + rivals);
     walk.score_with(&bands, walk.history.class(), guide.light, score);
@@ -176,11 +176,11 @@ pub(super) fn score_subdivided<B: WalkBands>(
     }
     let media = &walk.scene.medium;
     let mut bands = walk.bands.clone();
-    bands.turn(media, x_i.arrival.dot(middle.to_j.dir));
+    bands.turn(media, x_i.point, x_i.arrival, middle.to_j.dir);
     bands.flight(media, middle.to_j.length, true);
     let drawn = WalkVertex { point: *x_j, arrival: middle.to_j.dir, walks: bands.density() };
     walk.rivals.hold(Slot::Drawn, drawn);
-    bands.turn(media, middle.to_j.dir.dot(middle.to_k.dir));
+    bands.turn(media, *x_j, middle.to_j.dir, middle.to_k.dir);
     bands.flight(media, middle.to_k.length, false);
     let rivals = subdivision::density(walk, Slot::Latest, middle, exit, &end)
         + last_vertex::density(walk, Slot::Drawn, &middle.to_k, &end)

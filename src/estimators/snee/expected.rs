@@ -105,7 +105,7 @@ fn pass<B: WalkBands>(
     let factor = through * transmittance(walk.medium.sigma_t, far.t);
     let view = View { way: Unscattered::Through, from: far.point, face: far.face, towards, factor };
     let mut bands = walk.bands.clone();
-    bands.flight(&walk.scene.medium, far.t, false);
+    bands.passage(&walk.scene.medium, far.t);
     see(walk, &view, &bands);
 }
 

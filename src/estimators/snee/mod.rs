@@ -32,6 +32,7 @@ use std::sync::Arc;
 use super::bands::{MAX_SHARED, OneBand, SharedBands};
 use super::connection::{self, Conic};
 use super::field::{Field, Path};
+use super::guidance::GuidedBand;
 use super::illumination::unscattered_notes;
 use super::walk::{CameraWalk, Unrivalled};
 use super::{BandUse, Estimator, EstimatorKind, Scores, Serves, read_options};
@@ -137,7 +138,8 @@ impl Snee {
         };
         let count = if options.share_bands { 1 } else { scene.bands() };
         let setups = (0..count).map(setup).collect();
-        Ok(Snee { field: Field::new(scene, options.roulette), options, setups })
+        let field = Field::with_walks(scene, options.roulette, options.walk);
+        Ok(Snee { field, options, setups })
     }
 }
 
@@ -174,7 +176,13 @@ impl Estimator for Snee {
             for &band in bands {
                 for index in 0..rays {
                     let path = Path { field: &self.field, band, index, key };
-                    self.trace(band, path, scores, OneBand);
+                    match self.field.guidance(band) {
+                        Some(guidance) => {
+                            let medium = &self.field.scene.medium[band];
+                            self.trace(band, path, scores, GuidedBand::new(guidance, medium));
+                        }
+                        None => self.trace(band, path, scores, OneBand),
+                    }
                 }
             }
         }
@@ -186,7 +194,7 @@ impl Estimator for Snee {
 
     fn working_bytes(&self) -> usize {
         let technique = self.setups.iter().find_map(|setup| setup.specular.as_ref());
-        technique.map_or(0, |technique| technique.solver.heap_bytes())
+        self.field.heap_bytes() + technique.map_or(0, |technique| technique.solver.heap_bytes())
     }
 
     fn notes(&self) -> Vec<String> {

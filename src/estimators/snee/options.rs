@@ -8,13 +8,15 @@ use super::last_vertex::LastVertex;
 use super::probe::ProbeShares;
 use super::specular::ConnectionCall;
 use crate::error::{Error, Result};
-use crate::estimators::Roulette;
+use crate::estimators::{Roulette, WalkDraw};
 
 /// How the estimator is set up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SneeOptions {
     /// Russian roulette of the walk.
     pub roulette: Roulette,
+    /// How walks are drawn inside the body.
+    pub walk: WalkDraw,
     /// Sampling techniques that take part.
     pub strategies: Strategies,
     /// How often an edge is subdivided.
@@ -86,6 +88,9 @@ pub struct SneeChoices {
     /// When a path is ended by chance.
     #[serde(default)]
     pub roulette: Roulette,
+    /// How walks are drawn inside the body; all ways are unbiased.
+    #[serde(default)]
+    pub walk: WalkDraw,
     /// Techniques for paths whose last two medium vertices are consecutive.
     ///
     /// All other paths are always the walk's own (and the light-guided last vertex's).
@@ -203,6 +208,7 @@ impl SneePreset {
         match self {
             SneePreset::Paper => SneeOptions {
                 roulette: Roulette::default(),
+                walk: WalkDraw::Plain {},
                 strategies: all,
                 call: Call { most: 1.0, decay: 0.0 },
                 call_alone: Call { most: 1.0, decay: 0.0 },
@@ -219,6 +225,7 @@ impl SneePreset {
             },
             SneePreset::Guided => SneeOptions {
                 roulette: Roulette::default(),
+                walk: WalkDraw::Plain {},
                 strategies: Strategies { bottom_to_top: false, ..all },
                 call: Call { most: 0.15, decay: 0.75 },
                 call_alone: Call { most: 1.0, decay: 0.25 },
@@ -247,6 +254,7 @@ impl SneeChoices {
         let preset = self.preset.options();
         let mut options = SneeOptions {
             roulette: self.roulette,
+            walk: self.walk,
             call: self.call.unwrap_or(preset.call),
             call_alone: self.call_alone.or(self.call).unwrap_or(preset.call_alone),
             joint: self.joint.unwrap_or(preset.joint),
@@ -283,6 +291,12 @@ impl SneeChoices {
                 ));
             }
             options.probe = ProbeShares { uniform, plane, guided };
+        }
+        if options.share_bands && options.walk != (WalkDraw::Plain {}) {
+            return Err(Error::input_help(
+                "snee: bands that share walks share plain ones: what guides a walk differs from band to band",
+                "leave out `walk`, or use `bands = \"alone\"`",
+            ));
         }
         let Strategies { bsdf, light, .. } = options.strategies;
         let is_guided = options.last_vertex.is_some() || options.connection.is_some();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::estimators::path::PathTracer;
-use crate::estimators::{Cost, Layout, Roulette};
+use crate::estimators::{Cost, Layout, Roulette, WalkDraw};
 use crate::geometry::{Ray, Shape};
 use crate::math::{DVec3, Frame};
 use crate::optics::medium::Medium;
@@ -21,6 +21,7 @@ const SMOOTH: Boundary = Boundary::Smooth { eta: 1.4 };
 fn guided() -> SneeOptions {
     SneeOptions {
         roulette: Roulette::Below(0.25),
+        walk: WalkDraw::Plain {},
         strategies: Strategies { bsdf: true, light: true, top_to_bottom: true, bottom_to_top: true },
         call: Call { most: 0.5, decay: 0.5 },
         call_alone: Call { most: 1.0, decay: 0.5 },

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::estimators::bands::OneBand;
 use crate::estimators::field::Path;
 use crate::estimators::walk::{CameraWalk, Unrivalled};
-use crate::estimators::{Estimator, EstimatorKind, Scores, Sensors, Serves, read_options};
+use crate::estimators::{Estimator, EstimatorKind, Scores, Sensors, Serves, WalkDraw, read_options};
 use crate::sampling::stream::{PassKey, Purpose};
 use crate::scene::Scene;
 
@@ -38,13 +38,16 @@ impl TwoBounce {
     /// For a scene.
     ///
     /// # Errors
-    /// A scene that it does not serve; bands that share walks.
+    /// A scene that it does not serve; bands that share walks; walks that are guided.
     pub fn new(scene: Arc<Scene>, options: SneeOptions) -> Result<TwoBounce> {
         TwoBounce::KIND.check(&scene)?;
         if options.share_bands {
             return Err(Error::input(
                 "two_bounce traces every band alone; leave out `bands = \"shared\"`",
             ));
+        }
+        if options.walk != (WalkDraw::Plain {}) {
+            return Err(Error::input("two_bounce has no walk to guide; leave out `walk`"));
         }
         Ok(TwoBounce(Snee::set_up(scene, options)?))
     }

@@ -17,7 +17,7 @@ use super::testing::*;
 use super::*;
 use crate::estimators::vertices::WalkVertex;
 use crate::estimators::walk::Rivals;
-use crate::estimators::{Layout, TransportClass};
+use crate::estimators::{Layout, TransportClass, WalkDraw};
 use crate::geometry::{Ray, Shape, Side};
 use crate::math::DVec3;
 use crate::optics::medium::Medium;
@@ -342,6 +342,84 @@ fn shared_walks_score_alike() {
     }
 }
 
+/// Of a guided walk, per technique the density of the walk up to where the technique takes over, over that of a plain
+/// walk: at the end of the path, at x_i for subdivision, at x_j for the last vertex. From the steps' own densities.
+fn guided_over_plain(snee: &Snee, path: &FixedPath, course: Course) -> [f64; 5] {
+    let guidance = snee.field.guidance(0).expect("guided");
+    let sigma_t = snee.field.scene.medium[0].sigma_t;
+    let start = if course.vertices == 1 { path.x_i } else { path.start };
+    let between = (1..course.vertices).map(|vertex| path.vertex_before_last(course.vertices - vertex));
+    let points: Vec<DVec3> =
+        [start].into_iter().chain(between).chain([path.x_j, path.exit.hit.point]).collect();
+    let mut ratios = vec![1.0];
+    for step in points.windows(3) {
+        let [from, at, to] = [step[0], step[1], step[2]];
+        let [arrival, dir] = [(at - from).normalize(), (to - at).normalize()];
+        let (pull, _) = guidance.at(at, DVec3::Z);
+        let (turned, heading) = guidance.turns.mixed(guidance.share, &pull, arrival, dir);
+        let t = (to - at).length();
+        let is_last = to == path.exit.hit.point;
+        let flown =
+            if is_last { heading.passage_ratio(sigma_t, t) } else { heading.flight_ratio(sigma_t, t) };
+        ratios.push(ratios[ratios.len() - 1] * turned * flown);
+    }
+    let [.., at_j, at_end] = ratios[..] else { panic!("two steps at least") };
+    let at_i = if course.vertices > 1 { ratios[ratios.len() - 3] } else { f64::NAN };
+    [at_end, at_end, at_i, at_i, at_j]
+}
+
+/// The same of guided walks, whose densities are those of the guide.
+#[test]
+fn weights_with_guided_walks_sum_to_one() {
+    let key = StreamKey::named("weights_with_guided_walks_sum_to_one");
+    let mut stream = key.pass(0).stream(0, Purpose::Sensor);
+    let mut seen = [0u32; 5];
+    for (shape, g) in [(sphere(), 0.0), (ring(), 0.6)] {
+        let media = [medium(4.0, 0.9, g)];
+        for boundary in [ROUGH, SMOOTH] {
+            let [.., (_, options), _] = presets();
+            let walk = WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: 0.0 };
+            let guided = SneeOptions { walk, ..options.clone() };
+            for lamp in [Lamp::WideDisc, Lamp::Sun] {
+                let reference = one_end(&shape, boundary, &media, lamp, &options);
+                let scene = body(&shape, boundary, &media, &[lamp]);
+                let snee = Snee::new(scene.clone(), guided.clone()).expect("a scene for it");
+                let guidance = snee.field.guidance(0).expect("light comes in");
+                let mut done = 0;
+                while done < 10 {
+                    let Some(path) = FixedPath::draw(&scene, 0, &mut stream, done == 9) else {
+                        continue;
+                    };
+                    done += 1;
+                    for course in COURSES {
+                        let densities = alone(&reference, &path, course.0);
+                        let over_plain = guided_over_plain(&snee, &path, course.0);
+                        let mut scores = Scores::new(Layout::new(&scene));
+                        let pass = key.pass(1);
+                        let bands = GuidedBand::new(guidance, &media[0]);
+                        let walk = start(&snee, 0, &pass, &mut scores, &path, course.0, bands);
+                        let order = Order { is_reversed: false, cached: None };
+                        let (scores, f) = play(walk, &path, course, order, 0);
+                        let mut sum = 0.0;
+                        for t in 0..5 {
+                            if scores[t] > 0.0 {
+                                sum += over_plain[t] * densities[t] * scores[t] / f;
+                                seen[t] += 1;
+                            }
+                        }
+                        assert!(
+                            scores == [0.0; 5] || (sum - 1.0).abs() < 1e-11,
+                            "{boundary:?}, {lamp:?}, {course:?}: weights sum to {sum}: {TECHNIQUES:?} have densities \
+                             {densities:?} times {over_plain:?} and score {scores:?} of {f}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+    assert!(seen.iter().all(|&count| count > 50), "{seen:?}");
+}
+
 /// Nothing is connected through a matched boundary: light and phase sampling share its paths.
 #[test]
 fn weights_at_a_matched_boundary_sum_to_one() {
@@ -349,37 +427,61 @@ fn weights_at_a_matched_boundary_sum_to_one() {
     let (pass, mut stream) =
         (StreamKey::named(name).pass(0), StreamKey::named(name).pass(1).stream(0, Purpose::Sensor));
     let lamps = [Lamp::Disc, Lamp::WideDisc, Lamp::Sky];
-    let scene = body(&sphere(), Boundary::Matched, &[medium(2.0, 0.9, 0.3)], &lamps);
-    let snee = Snee::new(scene.clone(), SneePreset::Guided.options()).expect("a scene for it");
+    let media = [medium(2.0, 0.9, 0.3)];
+    let scene = body(&sphere(), Boundary::Matched, &media, &lamps);
+    let walk = WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: 0.0 };
+    let options = SneeOptions { walk, ..SneePreset::Guided.options() };
+    let snee = Snee::new(scene.clone(), options).expect("a scene for it");
     assert!(snee.setups[0].guides.is_empty());
-    let all: f64 = scene.lights.iter().map(|light| light.strength(0)).sum();
+    let guidance = snee.field.guidance(0).expect("light comes in");
     let mut done = 0;
     while done < 30 {
         let light = done % 3;
         let Some(path) = FixedPath::draw(&scene, light, &mut stream, false) else { continue };
         done += 1;
-        let mut scores = Scores::new(Layout::new(&scene));
         let on = Path { field: &snee.field, band: 0, index: 0, key: &pass };
-        let mut walk = CameraWalk::led(on, &mut scores, Unrivalled, OneBand, path.start);
-        walk.lead_to(path.x_i, false);
         let ray = Ray { origin: path.x_i, dir: path.w_l };
         let hit = scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY).expect("a finite body");
-        let own = walk.medium.phase.pdf(walk.ray.dir.dot(path.w_l))
-            * transmittance(walk.medium.sigma_t, hit.t);
-        let by_light = scene.lights[light].strength(0) / all * scene.lights[light].eval(0, path.w_l).1;
-        let f = walk.throughput * own * path.radiance;
-        let mut sum = 0.0;
-        for (is_own, density) in [(true, own), (false, by_light)] {
-            walk.scores.clear();
-            if is_own {
-                walk.score_own_sample(path.w_l);
-            } else {
-                walk.score_light_sample(light, path.w_l);
-            }
-            sum += density * walk.scores.observables[1 + TransportClass::ALL.len() + light] / f;
-        }
-        assert!((sum - 1.0).abs() < 1e-12, "{:?}: weights sum to {sum}", lamps[light]);
+        let (pull, _) = guidance.at(path.x_i, DVec3::Z);
+        let arrival = (path.x_i - path.start).normalize();
+        let (turned, heading) = guidance.turns.mixed(guidance.share, &pull, arrival, path.w_l);
+        let of_guide = turned * heading.passage_ratio(2.0, hit.t);
+        let mut scores = Scores::new(Layout::new(&scene));
+        let plain = CameraWalk::led(on, &mut scores, Unrivalled, OneBand, path.start);
+        matched_weights(plain, &path, hit.t, 1.0);
+        let mut scores = Scores::new(Layout::new(&scene));
+        let bands = GuidedBand::new(guidance, &media[0]);
+        let guided = CameraWalk::led(on, &mut scores, Unrivalled, bands, path.start);
+        matched_weights(guided, &path, hit.t, of_guide);
     }
+}
+
+/// At x_i, from which the boundary is `length` away; the walk's own density is `over_plain` times that of a plain walk.
+fn matched_weights<B: super::super::bands::WalkBands>(
+    mut walk: CameraWalk<'_, Unrivalled, B>,
+    path: &FixedPath,
+    length: f64,
+    over_plain: f64,
+) {
+    walk.lead_to(path.x_i, false);
+    let scene = walk.scene;
+    let all: f64 = scene.lights.iter().map(|light| light.strength(0)).sum();
+    let own =
+        walk.medium.phase.pdf(walk.ray.dir.dot(path.w_l)) * transmittance(walk.medium.sigma_t, length);
+    let light = &scene.lights[path.light];
+    let by_light = light.strength(0) / all * light.eval(0, path.w_l).1;
+    let f = walk.throughput * own * path.radiance;
+    let mut sum = 0.0;
+    for (is_own, density) in [(true, own * over_plain), (false, by_light)] {
+        walk.scores.clear();
+        if is_own {
+            walk.score_own_sample(path.w_l);
+        } else {
+            walk.score_light_sample(path.light, path.w_l);
+        }
+        sum += density * walk.scores.observables[1 + TransportClass::ALL.len() + path.light] / f;
+    }
+    assert!((sum - 1.0).abs() < 1e-12, "{}: weights sum to {sum}", light.name);
 }
 
 /// Whatever is hidden, an edge, the last leg, or the light, scores nothing; what is free does.

@@ -1,0 +1,439 @@
+//! Importance inside a body: how much light a photon that scatters at x will find, up to a factor.
+//!
+//! In the diffusion approximation, with the exact asymptotic growth kappa of transport in its place:
+//!   lap(phi) = kappa^2 phi   inside,      phi + 2 A D dphi/dn = s(y)   on the boundary,
+//! s(y) what is let in at y (`incidence`), A the mismatch of internal reflection, D = 1 / (3 sigma_t'). A half-space and a
+//! slab have it in closed form. Elsewhere it is solved by finite volumes on cubic cells whose centres lie in the body. A face
+//! between two of them carries (phi' - phi) h; one that the boundary cuts, in the direction e, carries
+//!   w h^2 (s - phi) / (2 A D + d),   w = |n.e|,   d = w t,
+//! t being the distance from the centre to the boundary along e, n the normal there: of a plane the faces of the
+//! staircase, weighted by w, have the area of the plane. h^2 kappa^2 is written 2 (cosh(kappa h) - 1), with which a plane
+//! wave along an axis grows by e^{kappa h} from node to node, however coarse the grid is.
+//!
+//! Walks ask for the gradient of ln phi over sigma_t in the cell where they are; cells outside next to the body have the
+//! mean of their neighbours. Where there is no cell (in parts thinner than one) or phi has underflowed, there is none, and
+//! the walk is plain. Nothing of this needs to be exact: it guides.
+
+use super::incidence::TransmittedLight;
+use crate::geometry::{Ray, Shape, Side};
+use crate::math::{DVec3, cos, exp, ln, ln_1p};
+use crate::optics::boundary::Boundary;
+use crate::optics::bssrdf::FresnelMoments;
+use crate::optics::guided::{Pull, diffuse_growth};
+use crate::optics::medium::Medium;
+use crate::scene::Scene;
+
+/// What diffusion says of a medium behind its boundary.
+#[derive(Clone, Copy, Debug)]
+struct Diffusion {
+    /// Growth, 1/mm.
+    kappa: f64,
+    /// 2 A D, mm.
+    reach: f64,
+}
+
+impl Diffusion {
+    fn of(scene: &Scene, band: usize) -> Diffusion {
+        let Medium { sigma_t, albedo, phase, .. } = scene.medium[band];
+        let mismatch = match scene.boundary[band] {
+            Boundary::Matched => 1.0,
+            boundary => FresnelMoments::exact(boundary.eta()).mismatch(),
+        };
+        let diffusion = 1.0 / (3.0 * sigma_t * (1.0 - albedo * phase.g));
+        Diffusion { kappa: diffuse_growth(albedo, phase.g) * sigma_t, reach: 2.0 * mismatch * diffusion }
+    }
+}
+
+/// Importance in a body, one band.
+#[derive(Clone, Debug)]
+pub(super) enum Importance {
+    /// e^{kappa z}.
+    HalfSpace { kappa: f64, pull: Pull },
+    /// a e^{kappa z} + b e^{-kappa (z + thickness)}.
+    Slab { kappa: f64, mean_free_path: f64, thickness: f64, a: f64, b: f64 },
+    /// Between nodes of a grid.
+    Grid(ImportanceGrid),
+}
+
+/// Nodes at the middles of cubic cells.
+#[derive(Clone, Debug)]
+pub(super) struct ImportanceGrid {
+    lattice: Lattice,
+    nodes: Vec<Node>,
+}
+
+/// Cubic cells, counted along x first.
+#[derive(Clone, Copy, Debug)]
+struct Lattice {
+    /// Middle of the first cell.
+    first: DVec3,
+    spacing: f64,
+    counts: [usize; 3],
+}
+
+/// What a walk asks for, in half a cache line.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    axis: DVec3,
+    /// In units that keep the body's range in single precision; 0 where nothing is known.
+    phi: f32,
+    level: u16,
+}
+
+const UNKNOWN: Node = Node { axis: DVec3::Z, phi: 0.0, level: 0 };
+
+/// phi where it is largest, as nodes keep it.
+const LARGEST: f64 = 1e30;
+
+impl Importance {
+    /// Per band, with `nodes` cells along the longest side of a finite body; `None` where nothing scatters, no light comes
+    /// in, or a finite body is nowhere as deep as `least_depth` mean free paths after similarity.
+    pub(super) fn of_bands(scene: &Scene, nodes: u32, least_depth: f64) -> Vec<Option<Importance>> {
+        let incidence = TransmittedLight::new(scene);
+        let bands = 0..scene.bands();
+        let scatters = |band: usize| scene.medium[band].sigma_t > 0.0 && scene.medium[band].albedo > 0.0;
+        match *scene.shape {
+            Shape::HalfSpace => {
+                let half_space = |band: usize| {
+                    let growth = diffuse_growth(scene.medium[band].albedo, scene.medium[band].phase.g);
+                    let kappa = growth * scene.medium[band].sigma_t;
+                    Importance::HalfSpace { kappa, pull: Pull::new(DVec3::Z * growth) }
+                };
+                bands.map(|band| scatters(band).then(|| half_space(band))).collect()
+            }
+            Shape::Slab { thickness } => {
+                let middle = DVec3::new(0.0, 0.0, -0.5 * thickness);
+                let let_in = |dir| {
+                    let ray = Ray { origin: middle, dir };
+                    let hit = scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY);
+                    hit.map(|hit| incidence.irradiance(&hit))
+                };
+                let (Some(top), Some(bottom)) = (let_in(DVec3::Z), let_in(-DVec3::Z)) else {
+                    return vec![None; scene.bands()];
+                };
+                let slab =
+                    |band: usize| Importance::slab(scene, band, thickness, top[band], bottom[band]);
+                bands.map(|band| scatters(band).then(|| slab(band)).flatten()).collect()
+            }
+            _ => {
+                let Some(cells) = Cells::of(&scene.shape, nodes) else {
+                    return vec![None; scene.bands()];
+                };
+                let borders = cells.borders(&scene.shape, &incidence);
+                let depth = cells.depth(&scene.shape);
+                let grid = |band: usize| {
+                    let Medium { sigma_t, albedo, phase, .. } = scene.medium[band];
+                    if depth * sigma_t * (1.0 - albedo * phase.g) < least_depth {
+                        return None;
+                    }
+                    let solved = cells.solve(&borders, band, Diffusion::of(scene, band))?;
+                    Some(Importance::Grid(cells.grid(&solved, 1.0 / scene.medium[band].sigma_t)))
+                };
+                bands.map(|band| scatters(band).then(|| grid(band)).flatten()).collect()
+            }
+        }
+    }
+
+    fn slab(scene: &Scene, band: usize, thickness: f64, top: f64, bottom: f64) -> Option<Importance> {
+        if top + bottom <= 0.0 {
+            return None;
+        }
+        let Diffusion { kappa, reach } = Diffusion::of(scene, band);
+        // Without absorption phi is linear, which a slow growth is, too.
+        let kappa = kappa.max(1e-3 / thickness);
+        let (p, m, e) = (1.0 + reach * kappa, 1.0 - reach * kappa, exp(-kappa * thickness));
+        let det = p * p - e * e * m * m;
+        let (a, b) = ((top * p - bottom * e * m) / det, (bottom * p - top * e * m) / det);
+        let mean_free_path = 1.0 / scene.medium[band].sigma_t;
+        Some(Importance::Slab { kappa, mean_free_path, thickness, a, b })
+    }
+
+    /// The pull at a point of the body, and phi; `None` where nothing is known.
+    #[inline]
+    pub(super) fn at(&self, x: DVec3) -> Option<(Pull, f64)> {
+        match self {
+            Importance::HalfSpace { kappa, pull } => Some((*pull, exp(kappa * x.z))),
+            Importance::Slab { kappa, mean_free_path, thickness, a, b } => {
+                let up = a * exp(kappa * x.z);
+                let down = b * exp(-kappa * (x.z + thickness));
+                let phi = up + down;
+                let growth = kappa * mean_free_path * (up - down) / phi;
+                (phi > 0.0 && growth.is_finite()).then(|| (Pull::new(DVec3::Z * growth), phi))
+            }
+            Importance::Grid(grid) => grid.at(x),
+        }
+    }
+
+    /// Memory on the heap, bytes.
+    pub(super) fn heap_bytes(&self) -> usize {
+        match self {
+            Importance::Grid(grid) => grid.nodes.len() * size_of::<Node>(),
+            _ => 0,
+        }
+    }
+}
+
+impl ImportanceGrid {
+    /// Of the cell that holds the point.
+    #[inline]
+    fn at(&self, x: DVec3) -> Option<(Pull, f64)> {
+        let Lattice { first, spacing, counts } = self.lattice;
+        let place = (x - first) / spacing + 0.5;
+        let cell = |axis: usize| (place[axis].max(0.0) as usize).min(counts[axis] - 1);
+        let Node { axis, phi, level } =
+            self.nodes[(cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)];
+        (phi > 0.0).then(|| (Pull { axis, level: usize::from(level) }, f64::from(phi)))
+    }
+}
+
+/// No cell.
+const NONE: u32 = u32::MAX;
+
+/// Cells that cover a body, and which of them have their middles inside.
+struct Cells {
+    lattice: Lattice,
+    /// Per cell its number among those inside.
+    numbers: Vec<u32>,
+    /// Their indices.
+    inside: Vec<usize>,
+}
+
+/// Directions of the six faces of a cell: -x, +x, -y, +y, -z, +z.
+const FACES: [(usize, f64); 6] = [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0), (2, -1.0), (2, 1.0)];
+
+/// Where the boundary cuts a face of a cell.
+struct Border {
+    /// |cosine| between the normal and the axis.
+    lean: f64,
+    /// From the middle, along the axis.
+    distance: f64,
+    /// Irradiance that goes in there, per band.
+    let_in: Vec<f64>,
+}
+
+/// Of the cells inside.
+struct Solved {
+    phi: Vec<f64>,
+    /// Per face phi on the boundary and its distance, where the boundary cuts it.
+    cut: Vec<[Option<(f64, f64)>; 6]>,
+}
+
+impl Lattice {
+    fn place(&self, index: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.counts;
+        [index % nx, index / nx % ny, index / (nx * ny)]
+    }
+
+    fn middle(&self, index: usize) -> DVec3 {
+        self.first + DVec3::from_array(self.place(index).map(|i| i as f64)) * self.spacing
+    }
+
+    /// The cell at an offset of -1, 0 or 1 along each axis.
+    fn neighbour(&self, index: usize, offset: [isize; 3]) -> Option<usize> {
+        let mut place = self.place(index);
+        for axis in 0..3 {
+            place[axis] = place[axis].checked_add_signed(offset[axis])?;
+            if place[axis] >= self.counts[axis] {
+                return None;
+            }
+        }
+        let [i, j, k] = place;
+        Some((k * self.counts[1] + j) * self.counts[0] + i)
+    }
+}
+
+impl Cells {
+    /// `None` where no middle is inside.
+    fn of(shape: &Shape, nodes: u32) -> Option<Cells> {
+        let [low, high] = extent(shape)?;
+        let size = high - low;
+        let spacing = size.max_element() / f64::from(nodes);
+        // One cell more on either side, for the nodes outside that interpolation asks for.
+        let counts = [0, 1, 2].map(|axis| (size[axis] / spacing).ceil() as usize + 2);
+        let spare = DVec3::from_array(counts.map(|n| n as f64)) * spacing - size;
+        let first = low - 0.5 * spare + 0.5 * spacing;
+        let lattice = Lattice { first, spacing, counts };
+        let all = 0..counts.iter().product();
+        let inside: Vec<usize> = all.clone().filter(|&i| shape.contains(lattice.middle(i))).collect();
+        let mut numbers = vec![NONE; all.len()];
+        for (number, &index) in inside.iter().enumerate() {
+            numbers[index] = number as u32;
+        }
+        (!inside.is_empty()).then_some(Cells { lattice, numbers, inside })
+    }
+
+    fn across(&self, index: usize, (axis, sign): (usize, f64)) -> u32 {
+        let mut offset = [0; 3];
+        offset[axis] = sign as isize;
+        self.lattice.neighbour(index, offset).map_or(NONE, |index| self.numbers[index])
+    }
+
+    /// The farthest from the boundary that a middle is (a lower bound of it), mm.
+    fn depth(&self, shape: &Shape) -> f64 {
+        let clearance = |&index: &usize| shape.clearance(self.lattice.middle(index));
+        self.inside.iter().map(clearance).fold(0.0, f64::max)
+    }
+
+    /// Where the boundary cuts faces of the cells inside.
+    fn borders(&self, shape: &Shape, incidence: &TransmittedLight<'_>) -> Vec<[Option<Border>; 6]> {
+        let border = |index: usize, face: (usize, f64)| {
+            if self.across(index, face) != NONE {
+                return None;
+            }
+            let (axis, sign) = face;
+            let mut dir = DVec3::ZERO;
+            dir[axis] = sign;
+            let ray = Ray { origin: self.lattice.middle(index), dir };
+            let hit = shape.intersect(&ray, Side::Inside, None, f64::INFINITY)?;
+            let lean = hit.normal.dot(dir).abs();
+            let distance = hit.t.min(self.lattice.spacing);
+            Some(Border { lean, distance, let_in: incidence.irradiance(&hit) })
+        };
+        self.inside.iter().map(|&index| FACES.map(|face| border(index, face))).collect()
+    }
+
+    /// By successive over-relaxation in a fixed order, from the body's mean.
+    fn solve(
+        &self,
+        borders: &[[Option<Border>; 6]],
+        band: usize,
+        diffusion: Diffusion,
+    ) -> Option<Solved> {
+        let h = self.lattice.spacing;
+        let e = exp((diffusion.kappa * h).min(300.0));
+        let loss = e + 1.0 / e - 2.0;
+        let count = self.inside.len();
+        let mut near = vec![[NONE; 6]; count];
+        let mut source = vec![0.0; count];
+        let mut diagonal = vec![loss; count];
+        for (number, &index) in self.inside.iter().enumerate() {
+            for (face, border) in borders[number].iter().enumerate() {
+                near[number][face] = self.across(index, FACES[face]);
+                if near[number][face] != NONE {
+                    diagonal[number] += 1.0;
+                }
+                if let Some(Border { lean, distance, let_in }) = border {
+                    let conductance = lean * h / (diffusion.reach + lean * distance);
+                    diagonal[number] += conductance;
+                    source[number] += conductance * let_in[band];
+                }
+            }
+        }
+        let supplied: f64 = source.iter().sum();
+        if supplied <= 0.0 {
+            return None;
+        }
+        let lost: f64 = diagonal.iter().sum();
+        let phi = relax(&near, &source, &diagonal, supplied / lost, self.lattice.counts);
+        let cut = |(phi, borders): (&f64, &[Option<Border>; 6])| {
+            [0, 1, 2, 3, 4, 5].map(|face: usize| {
+                borders[face].as_ref().map(|Border { lean, distance, let_in }| {
+                    let share = lean * distance / (diffusion.reach + lean * distance);
+                    (phi + share * (let_in[band] - phi), *distance)
+                })
+            })
+        };
+        let cut = phi.iter().zip(borders).map(cut).collect();
+        Some(Solved { phi, cut })
+    }
+
+    /// Growth at the nodes inside, and at those next to them.
+    fn grid(&self, solved: &Solved, mean_free_path: f64) -> ImportanceGrid {
+        let largest = solved.phi.iter().copied().fold(0.0, f64::max);
+        let least = largest * (f64::from(f32::MIN_POSITIVE) / LARGEST);
+        let mut known: Vec<Option<(DVec3, f64)>> = vec![None; self.numbers.len()];
+        for (number, &index) in self.inside.iter().enumerate() {
+            let phi = solved.phi[number];
+            if phi.is_nan() || phi < least {
+                continue;
+            }
+            // ln of what is on the other side of a face over what is here, and how far that is.
+            let towards = |face: usize| match solved.cut[number][face] {
+                Some((border, t)) if t > 0.0 => (ln_1p((border / phi - 1.0).max(-0.99)), t),
+                Some(_) => (0.0, 0.0),
+                None => match self.across(index, FACES[face]) {
+                    NONE => (0.0, 0.0),
+                    next => (ln(solved.phi[next as usize].max(least) / phi), self.lattice.spacing),
+                },
+            };
+            let gradient = [0, 1, 2].map(|axis| {
+                let [(down, d), (up, u)] = [towards(2 * axis), towards(2 * axis + 1)];
+                if d + u > 0.0 { (up - down) / (d + u) * mean_free_path } else { 0.0 }
+            });
+            known[index] = Some((DVec3::from_array(gradient), phi));
+        }
+        let node = |index: usize| {
+            let near = |offset: isize| {
+                let step = [offset % 3 - 1, offset / 3 % 3 - 1, offset / 9 - 1];
+                self.lattice.neighbour(index, step).and_then(|next| known[next])
+            };
+            let of_neighbours = || {
+                let all: Vec<(DVec3, f64)> = (0..27).filter_map(near).collect();
+                let count = all.len() as f64;
+                let sum =
+                    all.iter().fold((DVec3::ZERO, 0.0), |sum, node| (sum.0 + node.0, sum.1 + node.1));
+                (count > 0.0).then(|| (sum.0 / count, sum.1 / count))
+            };
+            match known[index].or_else(of_neighbours) {
+                Some((gradient, phi)) => {
+                    let Pull { axis, level } = Pull::new(gradient);
+                    Node { axis, phi: (phi / largest * LARGEST) as f32, level: level as u16 }
+                }
+                None => UNKNOWN,
+            }
+        };
+        let nodes = (0..self.numbers.len()).map(node).collect();
+        ImportanceGrid { lattice: self.lattice, nodes }
+    }
+}
+
+/// Solves  diagonal phi = source + sum of phi over the faces that lead inside.
+fn relax(
+    near: &[[u32; 6]],
+    source: &[f64],
+    diagonal: &[f64],
+    start: f64,
+    counts: [usize; 3],
+) -> Vec<f64> {
+    /// Relative change of a sweep below which nothing is gained.
+    const ENOUGH: f64 = 1e-4;
+    // Young's factor, for Jacobi's spectral radius cos(pi / n) on the longest side, which absorption lowers.
+    let longest = counts.into_iter().max().unwrap_or(1) as f64;
+    let mean = diagonal.iter().sum::<f64>() / diagonal.len() as f64;
+    let radius = cos(std::f64::consts::PI / longest) * 6.0 / mean.max(6.0);
+    let factor = 2.0 / (1.0 + (1.0 - radius * radius).sqrt());
+    let mut phi = vec![start; source.len()];
+    for _ in 0..20 * longest as usize {
+        let mut change = 0f64;
+        for (number, faces) in near.iter().enumerate() {
+            let mut sum = source[number];
+            for &next in faces {
+                if next != NONE {
+                    sum += phi[next as usize];
+                }
+            }
+            let old = phi[number];
+            let relaxed = old + factor * (sum / diagonal[number] - old);
+            // Over-relaxation may overshoot what is positive.
+            let new = if relaxed > 0.0 { relaxed } else { sum / diagonal[number] };
+            phi[number] = new;
+            change = change.max((new - old).abs() / new.max(f64::MIN_POSITIVE));
+        }
+        if change < ENOUGH {
+            break;
+        }
+    }
+    phi
+}
+
+/// The least box that holds a finite body.
+fn extent(shape: &Shape) -> Option<[DVec3; 2]> {
+    match *shape {
+        Shape::Box { half } => Some([-half, half]),
+        Shape::Mesh(ref mesh) => {
+            let empty = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+            Some(mesh.vertices().iter().fold(empty, |[low, high], v| [low.min(*v), high.max(*v)]))
+        }
+        _ => shape.bounds().map(|ball| [ball.center - ball.radius, ball.center + ball.radius]),
+    }
+}

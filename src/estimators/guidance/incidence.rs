@@ -1,0 +1,73 @@
+//! Light that the boundary lets in: what a walk finds that leaves the body there.
+
+use crate::geometry::{Hit, Ray};
+use crate::math::DVec3;
+use crate::optics::boundary::Boundary;
+use crate::optics::fresnel::fresnel;
+use crate::scene::Scene;
+
+/// Directions per light of finite size.
+const DIRECTIONS: u32 = 128;
+
+/// The golden ratio less 1: the integers' multiples of it lie evenly, and with i / n they make Fibonacci's lattice.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// A direction of a light, and its solid angle; 1 of parallel light, whose strength is irradiance.
+#[derive(Clone, Copy, Debug)]
+struct LightDirection {
+    light: usize,
+    wi: DVec3,
+    solid_angle: f64,
+}
+
+/// Directions that stand for all lights of a scene.
+pub(super) struct TransmittedLight<'a> {
+    scene: &'a Scene,
+    directions: Vec<LightDirection>,
+}
+
+impl TransmittedLight<'_> {
+    /// Directions are drawn from the lights as they are in the first band.
+    pub(super) fn new(scene: &Scene) -> TransmittedLight<'_> {
+        let mut directions = Vec::new();
+        for (light, source) in scene.lights.iter().enumerate() {
+            let count = if source.is_directional() { 1 } else { DIRECTIONS };
+            for index in 0..count {
+                let along = (f64::from(index) + 0.5) / f64::from(count);
+                let u = [along, (f64::from(index) * GOLDEN).fract()];
+                let sample = source.sample(0, u);
+                let solid_angle = match sample.pdf {
+                    Some(pdf) if pdf > 0.0 => 1.0 / (pdf * f64::from(count)),
+                    Some(_) => 0.0,
+                    None => 1.0,
+                };
+                directions.push(LightDirection { light, wi: sample.wi, solid_angle });
+            }
+        }
+        TransmittedLight { scene, directions }
+    }
+
+    /// Irradiance that goes in at a point of the boundary, W/mm^2, per band: the integral of radiance times cosine times
+    /// smooth transmittance, the body's own shadow included, all lights. A quadrature: it guides walks and is no part of a
+    /// result.
+    pub(super) fn irradiance(&self, at: &Hit) -> Vec<f64> {
+        let TransmittedLight { scene, directions } = self;
+        let mut sums = vec![0.0; scene.bands()];
+        for LightDirection { light, wi, solid_angle } in directions {
+            let cosine = wi.dot(at.normal);
+            let shadow = Ray { origin: at.point, dir: *wi };
+            if cosine <= 0.0 || *solid_angle == 0.0 || scene.shape.occluded(&shadow, Some(at.face)) {
+                continue;
+            }
+            for (band, sum) in sums.iter_mut().enumerate() {
+                let through = match scene.boundary[band] {
+                    Boundary::Matched => 1.0,
+                    boundary => 1.0 - fresnel(cosine, boundary.eta()).reflectance,
+                };
+                let radiance = scene.lights[*light].sampled_radiance(band, *wi);
+                *sum += radiance * solid_angle * cosine * through;
+            }
+        }
+        sums
+    }
+}

@@ -1,0 +1,226 @@
+//! The field, and walks that it guides well or badly.
+
+use std::sync::Arc;
+
+use super::importance::Importance;
+use super::*;
+use crate::estimators::field::{Field, Path};
+use crate::estimators::path::PathTracer;
+use crate::estimators::testing::measure;
+use crate::estimators::walk::{CameraWalk, Unrivalled};
+use crate::estimators::{Estimator, Layout, Roulette, Scores};
+use crate::geometry::{Ray, Shape, procedural};
+use crate::math::{Frame, exp};
+use crate::optics::boundary::Boundary;
+use crate::optics::microfacet::{MicrofacetKind, Microfacets};
+use crate::optics::phase::HenyeyGreenstein;
+use crate::sampling::stream::PassKey;
+use crate::scene::sensor::Probe;
+use crate::scene::{Emission, Light, Sensor};
+
+const SMOOTH: Boundary = Boundary::Smooth { eta: 1.3 };
+const ROUGH: Boundary =
+    Boundary::Rough { eta: 1.3, facets: Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.3 } };
+
+fn medium(sigma_t: f64, albedo: f64, g: f64) -> Medium {
+    Medium { sigma_t, albedo, phase: HenyeyGreenstein { g }, emission: 0.0 }
+}
+
+fn cap(toward: DVec3, height: f64, radiance: f64) -> Light {
+    let frame = Frame::about(toward.normalize());
+    Light { name: "cap".into(), emission: Emission::Cap { frame, height, radiance: vec![radiance] } }
+}
+
+fn sky() -> Light {
+    cap(DVec3::Z, 2.0, 1.0)
+}
+
+fn scene(shape: Shape, boundary: Boundary, medium: Medium, lights: Vec<Light>) -> Arc<Scene> {
+    let ray = Ray { origin: DVec3::new(0.3, -0.4, 3.0), dir: -DVec3::Z };
+    let sensor = Sensor::Probe(Probe { ray, paths: 64 });
+    Arc::new(Scene {
+        shape: Arc::new(shape),
+        boundary: vec![boundary],
+        medium: vec![medium],
+        lights,
+        sensor,
+    })
+}
+
+const SPHERE: Shape = Shape::Sphere { radius: 1.0 };
+
+fn first<T>(bands: Vec<Option<T>>) -> Option<T> {
+    bands.into_iter().next().expect("a band")
+}
+
+fn solution(scene: &Scene, nodes: u32) -> Importance {
+    first(Importance::of_bands(scene, nodes, 0.0)).expect("light comes in")
+}
+
+/// Per mean free path.
+fn gradient(importance: &Importance, x: DVec3) -> DVec3 {
+    let (pull, _) = importance.at(x).expect("a field");
+    pull.axis * pull.strength()
+}
+
+/// In a sphere under a sky phi = sinh(kappa r) / r: growth coth(kappa r) kappa - 1 / r per length. On coarse and fine
+/// grids, also where a cell is longer than the growth length; everywhere in a cell it is that of its middle.
+#[test]
+fn a_sphere_in_a_sky_has_its_closed_form() {
+    for (sigma_t, albedo, nodes, tolerance) in
+        [(10.0, 0.95, 32, 0.1), (10.0, 0.8, 32, 0.1), (30.0, 0.99, 16, 0.12), (40.0, 0.8, 16, 0.12)]
+    {
+        let medium = medium(sigma_t, albedo, 0.0);
+        let importance = solution(&scene(SPHERE, SMOOTH, medium, vec![sky()]), nodes);
+        let kappa = diffuse_growth(albedo, 0.0) * sigma_t;
+        for dir in [DVec3::X, DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.48, -0.6, 0.64)] {
+            for r in [0.2, 0.5, 0.8, 0.95] {
+                let growth = gradient(&importance, dir * r);
+                let e = exp(-2.0 * kappa * r);
+                let expected = (kappa * (1.0 + e) / (1.0 - e) - 1.0 / r) / sigma_t;
+                let error = (growth - dir * expected).length() / diffuse_growth(albedo, 0.0);
+                assert!(
+                    error < tolerance,
+                    "{sigma_t} {albedo} {nodes}: {growth} at {r} {dir}, {expected}"
+                );
+            }
+        }
+    }
+}
+
+/// A wide flat box is a slab: grid and closed form agree in its middle, whichever side is lit.
+#[test]
+fn a_flat_box_is_a_slab() {
+    let medium = medium(8.0, 0.97, 0.3);
+    for toward in [DVec3::Z, -DVec3::Z, DVec3::new(0.5, 0.0, 0.8)] {
+        let lights = || vec![cap(toward, 1e-3, 100.0)];
+        let slab = solution(&scene(Shape::Slab { thickness: 1.0 }, SMOOTH, medium, lights()), 4);
+        let flat = Shape::Box { half: DVec3::new(4.0, 4.0, 0.5) };
+        let grid = solution(&scene(flat, SMOOTH, medium, lights()), 128);
+        for depth in [0.1, 0.5, 0.9] {
+            let of_slab = gradient(&slab, DVec3::new(0.0, 0.0, -depth));
+            let of_grid = gradient(&grid, DVec3::new(0.0, 0.0, 0.5 - depth));
+            let error = (of_slab - of_grid).length();
+            assert!(error < 0.03, "{toward} {depth}: {of_slab:?} {of_grid:?}");
+        }
+    }
+}
+
+/// No light, no field; in parts thinner than a cell there is none, either, and walks are plain.
+#[test]
+fn where_nothing_guides() {
+    let dark = scene(SPHERE, SMOOTH, medium(5.0, 0.9, 0.0), vec![cap(DVec3::Z, 1e-3, 0.0)]);
+    assert!(first(Importance::of_bands(&dark, 16, 0.0)).is_none());
+    let still = scene(SPHERE, SMOOTH, medium(5.0, 0.0, 0.0), vec![sky()]);
+    let guided = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0 };
+    assert!(first(Guidance::of_bands(&still, guided)).is_none());
+    let shallow = |depth| scene(SPHERE, SMOOTH, medium(depth, 0.9, 0.0), vec![sky()]);
+    assert!(first(Importance::of_bands(&shallow(4.0), 16, 5.0)).is_none());
+    assert!(first(Importance::of_bands(&shallow(6.0), 16, 5.0)).is_some());
+    let ring = Shape::Mesh(procedural::torus(1.0, 0.01, [24, 6], false).expect("closed"));
+    let thin = scene(ring, SMOOTH, medium(5.0, 0.9, 0.0), vec![sky()]);
+    if let Some(importance) = first(Importance::of_bands(&thin, 4, 0.0)) {
+        let lost = (0..100).filter(|&i| {
+            let turn = f64::from(i) / 100.0;
+            let (s, c) = crate::math::sin_cos_turns(turn);
+            importance.at(DVec3::new(c, s, 0.0)).is_none()
+        });
+        assert!(lost.count() > 0, "a grid of 4 nodes resolves a ring of 0.01");
+    }
+}
+
+/// Paths of a given field.
+struct Misled(Field);
+
+impl Estimator for Misled {
+    fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        for &band in bands {
+            for index in 0..self.0.scene.sensor.rays_per_pass() {
+                let path = Path { field: &self.0, band, index, key };
+                let guidance = self.0.guidance(band).expect("guided");
+                let guided = GuidedBand::new(guidance, &self.0.scene.medium[band]);
+                CameraWalk::trace(path, scores, Unrivalled, guided);
+            }
+        }
+    }
+}
+
+/// Guides that are wrong, reversed, of another body, or too strong change no mean, in any class, at any boundary, under
+/// parallel, narrow and wide light, in media that scatter forwards, evenly and backwards.
+#[test]
+fn wrong_guides_do_not_bias() {
+    let bodies = || {
+        let mesh = |smooth| procedural::torus(0.7, 0.3, [24, 12], smooth).expect("closed");
+        [SPHERE, Shape::Mesh(mesh(false)), Shape::Mesh(mesh(true))]
+    };
+    let mut judged = 0;
+    for (index, g) in [0.0, 0.8, -0.5].into_iter().enumerate() {
+        for boundary in [SMOOTH, ROUGH, Boundary::Matched] {
+            let lights = match boundary {
+                Boundary::Smooth { .. } => vec![sky(), cap(DVec3::new(0.5, 0.1, 0.7), 0.2, 5.0)],
+                _ => vec![
+                    cap(DVec3::new(-0.5, 0.1, -0.7), 0.5, 2.0),
+                    Light {
+                        name: "sun".into(),
+                        emission: Emission::Directional {
+                            toward: DVec3::new(0.3, 0.4, 0.8).normalize(),
+                            irradiance: vec![2.0],
+                        },
+                    },
+                ],
+            };
+            let [sphere, flat, interpolated] = bodies();
+            let body = [sphere, flat, interpolated].into_iter().nth(index).expect("three");
+            let scene = scene(body, boundary, medium(2.0, 0.8, g), lights);
+            let layout = Layout::new(&scene);
+            let path = PathTracer::new(Arc::clone(&scene), Roulette::default()).expect("a scene for it");
+            let name = format!("wrong_guides_do_not_bias {g} {boundary:?}");
+            let (plain, _) = measure(&path, &layout, 1500, &name);
+            let constant = |growth: f64| {
+                let pull = Pull::new(DVec3::Z * growth);
+                Aim::Solution(Importance::HalfSpace { kappa: 2.0 * growth, pull })
+            };
+            let aims = [
+                ("right", Aim::Solution(solution(&scene, 16)), 0.9),
+                ("another body's", constant(0.5), 0.8),
+                ("reversed", constant(-0.5), 0.8),
+                ("along the normal", Aim::Normal(0.6), 0.5),
+            ];
+            for (aim_name, aim, share) in aims {
+                let turns = GuidedTurns::new(scene.medium[0].phase, scene.medium[0].albedo);
+                let guidance = Guidance { share, turns, aim };
+                let field = Field::new(Arc::clone(&scene), Roulette::default()).guided_by(&guidance);
+                let (guided, _) = measure(&Misled(field), &layout, 1500, &format!("{name} {aim_name}"));
+                for (observable, (a, b)) in plain.iter().zip(&guided).enumerate() {
+                    let error = (a.1 * a.1 + b.1 * b.1).sqrt();
+                    // Rare classes have no normal means.
+                    if a.0 == 0.0 || a.1 > 0.1 * a.0 || b.1 > 0.1 * a.0 {
+                        continue;
+                    }
+                    judged += 1;
+                    assert!(
+                        (a.0 - b.0).abs() < 5.5 * error,
+                        "{g} {boundary:?} {aim_name} {observable}: {a:?} {b:?}"
+                    );
+                }
+            }
+        }
+    }
+    assert!(judged > 150, "{judged}");
+}
+
+/// Without absorption in a sky every path sees radiance 1, whatever guides it, and no event weighs more than 1 / (1 - q).
+#[test]
+fn furnace() {
+    for (g, share) in [(0.0, 0.5), (0.7, 0.5)] {
+        let scene = scene(SPHERE, SMOOTH, medium(5.0, 1.0, g), vec![sky()]);
+        let layout = Layout::new(&scene);
+        let aim = Aim::Solution(Importance::HalfSpace { kappa: 1.0, pull: Pull::new(DVec3::Z * 0.2) });
+        let turns = GuidedTurns::new(scene.medium[0].phase, 1.0);
+        let guidance = Guidance { share, turns, aim };
+        let field = Field::new(Arc::clone(&scene), Roulette::default()).guided_by(&guidance);
+        let (means, _) = measure(&Misled(field), &layout, 1500, "furnace of guided walks");
+        let (mean, error) = means[0];
+        assert!((mean - 1.0).abs() < 5.0 * error && error < 0.02, "{g}: {mean} {error}");
+    }
+}
