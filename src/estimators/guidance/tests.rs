@@ -68,19 +68,26 @@ fn gradient(importance: &Importance, x: DVec3) -> DVec3 {
 #[test]
 fn a_sphere_in_a_sky_has_its_closed_form() {
     for (sigma_t, albedo, nodes, tolerance) in
-        [(10.0, 0.95, 32, 0.1), (10.0, 0.8, 32, 0.1), (30.0, 0.99, 16, 0.12), (40.0, 0.8, 16, 0.12)]
+        [(10.0, 0.95, 32, 0.05), (10.0, 0.8, 32, 0.05), (30.0, 0.99, 16, 0.05), (40.0, 0.8, 16, 0.15)]
     {
         let medium = medium(sigma_t, albedo, 0.0);
         let importance = solution(&scene(SPHERE, SMOOTH, medium, vec![sky()]), nodes);
         let kappa = diffuse_growth(albedo, 0.0) * sigma_t;
         for dir in [DVec3::X, DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.48, -0.6, 0.64)] {
             for r in [0.2, 0.5, 0.8, 0.95] {
+                // The last cell before the boundary is not resolved where it is longer than the growth length.
+                let cell = 2.0 / f64::from(nodes);
+                if kappa * cell > 1.0 && 1.0 - r < cell {
+                    continue;
+                }
                 let growth = gradient(&importance, dir * r);
                 let e = exp(-2.0 * kappa * r);
                 let expected = (kappa * (1.0 + e) / (1.0 - e) - 1.0 / r) / sigma_t;
                 let error = (growth - dir * expected).length() / diffuse_growth(albedo, 0.0);
+                // Half a diagonal of a cell away the field turns by 1 / r and changes by kappa / 3 at most.
+                let within = 0.87 * cell * (kappa / 3.0).min(1.0 / r);
                 assert!(
-                    error < tolerance,
+                    error < tolerance + within,
                     "{sigma_t} {albedo} {nodes}: {growth} at {r} {dir}, {expected}"
                 );
             }
