@@ -14,9 +14,10 @@
 //! where Q_l are Legendre functions of the second kind, the convolution with HG multiplies the l-th term by g^l:
 //!   N(m) = -b + (1 + b) nu sum_l (2l+1) g^l Q_l(nu) P_l(m).
 //! For g = 0 that is its first term, the logarithm of Dwivedi's density, and f has its closed form. Otherwise the series of f
-//! itself, which falls off as (nu - sqrt(nu^2 - 1))^l, is cut where the rest is below [`REST`] of its least value: a
-//! polynomial guides as well, and its N has as few terms, without an error. s is rounded to one of [`LEVELS`] values, closer to each other where they are small, each with its own series; any s gives an
-//! exact density, so that this rounding is no error.
+//! itself, which falls off as (nu - sqrt(nu^2 - 1))^l, is cut where the rest is below `REST` of its least value: a
+//! polynomial guides as well, and its N has as few terms, without an error. s is rounded to one of `LEVELS` values, closer
+//! to each other where they are small, each with its own series; any s gives an exact density, so that this rounding is no
+//! error.
 //!
 //! What a walk needs is the ratio to the plain walk: f / N for a turn; for a flight of length t with the pull p = s m,
 //!   (1 - p) e^{p sigma_t t} where it ends in the medium, e^{p sigma_t t} where it reaches the boundary.
