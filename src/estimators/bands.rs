@@ -52,7 +52,10 @@ pub(super) trait WalkBands: Clone {
     fn turn(&mut self, media: &[Medium], at: DVec3, from: DVec3, to: DVec3);
 
     /// The factor that roulette sees at a scattering event, for the medium of the walk's own band.
-    fn survival(&self, medium: &Medium) -> f64;
+    #[inline]
+    fn survival(&self, medium: &Medium) -> f64 {
+        medium.albedo
+    }
 
     /// What roulette multiplies the weight by at a medium vertex: importance there over that where the walk came in, and
     /// over [`Self::density`]; 1 where a walk knows nothing of it.
@@ -67,10 +70,16 @@ pub(super) trait WalkBands: Clone {
 
     /// Adds a contribution of the walk's own band, and to every other that the walk scores what it is
     /// there.
-    fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64);
+    #[inline]
+    fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64) {
+        scores.add(own.slot, own.band, own.class, own.light, value);
+    }
 
     /// Whether the medium emits in a band that a walk of band `own` scores.
-    fn emits(&self, media: &[Medium], own: usize) -> bool;
+    #[inline]
+    fn emits(&self, media: &[Medium], own: usize) -> bool {
+        media[own].emission > 0.0
+    }
 
     /// Adds, for every band that the walk scores, `factor` times the emission that reaches the walk's
     /// vertex along the next `t` mm of its direction.
@@ -81,7 +90,9 @@ pub(super) trait WalkBands: Clone {
         media: &[Medium],
         t: f64,
         factor: f64,
-    );
+    ) {
+        self.score(scores, own, factor * media[own.band].emitted(t));
+    }
 }
 
 /// Where a contribution counts.
@@ -106,34 +117,8 @@ impl WalkBands for OneBand {
     fn turn(&mut self, _: &[Medium], _: DVec3, _: DVec3, _: DVec3) {}
 
     #[inline]
-    fn survival(&self, medium: &Medium) -> f64 {
-        medium.albedo
-    }
-
-    #[inline]
     fn density(&self) -> f64 {
         1.0
-    }
-
-    #[inline]
-    fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64) {
-        scores.add(own.slot, own.band, own.class, own.light, value);
-    }
-
-    #[inline]
-    fn emits(&self, media: &[Medium], own: usize) -> bool {
-        media[own].emission > 0.0
-    }
-
-    fn score_emission(
-        &self,
-        scores: &mut Scores,
-        own: ScorePlace,
-        media: &[Medium],
-        t: f64,
-        factor: f64,
-    ) {
-        self.score(scores, own, factor * media[own.band].emitted(t));
     }
 }
 

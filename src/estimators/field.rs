@@ -32,11 +32,7 @@ impl Field {
 
     /// The same with walks that are drawn in this way.
     pub(super) fn with_walks(scene: Arc<Scene>, roulette: Roulette, draw: WalkDraw) -> Field {
-        let guidance = match draw {
-            WalkDraw::Plain {} => Vec::new(),
-            _ => Guidance::of_bands(&scene, draw),
-        };
-        Field { guidance, ..Field::new(scene, roulette) }
+        Field { guidance: Guidance::of_bands(&scene, draw), ..Field::new(scene, roulette) }
     }
 
     /// What guides the walks of a band; `None` where they are plain.

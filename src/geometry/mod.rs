@@ -98,7 +98,7 @@ impl BoundingSphere {
 }
 
 /// Least and greatest coordinates of points.
-fn extent(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+pub(crate) fn extent(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     points.fold(empty, |(min, max), point| (min.min(point), max.max(point)))
 }

@@ -8,8 +8,8 @@ use serde::Deserialize;
 use super::chart::{AXIS, Charted, Directions, EvenAngle, Grade, Measure, Technique, Unbounded};
 use super::kind::{SamplerKind, sampler_kind};
 use super::sampler::{Contrast, Coordinate, Draw, Piece, Sampler};
-use crate::math::{DVec3, Frame, cos, exp_m1, ln_1p, sin, sin_cos_turns};
-use crate::optics::guided::{GuidedTurns, Heading, Pull};
+use crate::math::{DVec3, Frame, cos, exp, exp_m1, ln_1p, sin, sin_cos_turns};
+use crate::optics::guided::{GuidedTurns, Pull};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::Stream;
 
@@ -155,8 +155,8 @@ impl Step {
 
     fn joint(&self, dir: DVec3, theta: f64, t: f64, slope: f64) -> f64 {
         let (turned, heading) = self.turns.mixed(self.share, &self.pull, DVec3::X, dir);
-        let plain = self.sigma_t * crate::math::exp(-self.sigma_t * t) / (4.0 * PI);
-        let ratio = turned * Heading::flight_ratio(&heading, self.sigma_t, t);
+        let plain = self.sigma_t * exp(-self.sigma_t * t) / (4.0 * PI);
+        let ratio = turned * heading.flight_ratio(self.sigma_t, t);
         plain * ratio * EvenAngle::solid_angle(theta) * slope
     }
 }

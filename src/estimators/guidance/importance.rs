@@ -15,7 +15,7 @@
 //! the walk is plain. Nothing of this needs to be exact: it guides.
 
 use super::incidence::TransmittedLight;
-use crate::geometry::{Ray, Shape, Side};
+use crate::geometry::{self, Ray, Shape, Side};
 use crate::math::{DVec3, cos, exp, ln, ln_1p};
 use crate::optics::boundary::Boundary;
 use crate::optics::bssrdf::FresnelMoments;
@@ -431,8 +431,8 @@ fn extent(shape: &Shape) -> Option<[DVec3; 2]> {
     match *shape {
         Shape::Box { half } => Some([-half, half]),
         Shape::Mesh(ref mesh) => {
-            let empty = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-            Some(mesh.vertices().iter().fold(empty, |[low, high], v| [low.min(*v), high.max(*v)]))
+            let (low, high) = geometry::extent(mesh.vertices().iter().copied());
+            Some([low, high])
         }
         _ => shape.bounds().map(|ball| [ball.center - ball.radius, ball.center + ball.radius]),
     }

@@ -12,8 +12,7 @@
 //! all the way.
 
 use super::Guidance;
-use crate::estimators::Scores;
-use crate::estimators::bands::{OneBand, ScorePlace, WalkBands};
+use crate::estimators::bands::WalkBands;
 use crate::geometry::Ray;
 use crate::math::DVec3;
 use crate::optics::guided::{Heading, Pull};
@@ -96,10 +95,6 @@ impl WalkBands for GuidedBand<'_> {
     /// A passage is not drawn.
     fn passage(&mut self, _: &[Medium], _: f64) {}
 
-    fn survival(&self, medium: &Medium) -> f64 {
-        medium.albedo
-    }
-
     fn importance(&mut self, at: DVec3) -> f64 {
         self.at(at);
         let importance = self.last.2 * self.per_entry;
@@ -108,24 +103,5 @@ impl WalkBands for GuidedBand<'_> {
 
     fn density(&self) -> f64 {
         self.ratio
-    }
-
-    fn score(&self, scores: &mut Scores, own: ScorePlace, value: f64) {
-        OneBand.score(scores, own, value);
-    }
-
-    fn emits(&self, media: &[Medium], own: usize) -> bool {
-        OneBand.emits(media, own)
-    }
-
-    fn score_emission(
-        &self,
-        scores: &mut Scores,
-        own: ScorePlace,
-        media: &[Medium],
-        t: f64,
-        factor: f64,
-    ) {
-        OneBand.score_emission(scores, own, media, t, factor);
     }
 }

@@ -373,6 +373,8 @@ mod tests {
         assert!(none.contains("nothing takes part"), "{none}");
         let partial = message("strategies = [\"top_to_bottom\"]");
         assert!(partial.contains("never sampled"), "{partial}");
+        let shared = message("walk = { guided = {} }\nbands = \"shared\"");
+        assert!(shared.contains("differs from band to band") && shared.contains("alone"), "{shared}");
         let last_alone = words("strategies = []\nleast_concentration = 1").options();
         assert!(last_alone.is_ok(), "the last vertex is left");
     }
