@@ -51,6 +51,12 @@ pub(super) trait WalkBands: Clone {
     /// A change of direction at a medium vertex.
     fn turn(&mut self, media: &[Medium], at: DVec3, from: DVec3, to: DVec3);
 
+    /// Whether a path follows both what the boundary reflects and what it refracts where it first meets it.
+    #[inline]
+    fn splits_at_entry(&self) -> bool {
+        false
+    }
+
     /// The factor that roulette sees at a scattering event, for the medium of the walk's own band.
     #[inline]
     fn survival(&self, medium: &Medium) -> f64 {

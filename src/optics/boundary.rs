@@ -74,35 +74,62 @@ impl Boundary {
     /// surface, the sample scores 0 (what multiple scattering between facets would carry is lost).
     #[inline]
     pub fn sample(&self, wo: DVec3, u: [f64; 3]) -> Option<BoundarySample> {
+        let Some((h, relative)) = self.facet(wo, [u[1], u[2]]) else {
+            let (weight, density) = (1.0, Density::Delta);
+            return Some(BoundarySample { wi: -wo, weight, density, event: Event::Refract });
+        };
+        let (wi, event) = split(wo, h, relative, u[0]);
+        self.of_lobe(wo, wi, event)
+    }
+
+    /// Both lobes of one facet in place of a choice: reflection and refraction, each weighing what [`Self::sample`] gives it
+    /// times its probability; without what weighs nothing or fails. The densities are those of [`Self::sample`]: weights of
+    /// the balance heuristic may use them, since they need but sum to 1.
+    #[inline]
+    pub fn sample_both(&self, wo: DVec3, u: [f64; 2]) -> [Option<BoundarySample>; 2] {
+        let Some((h, relative)) = self.facet(wo, u) else { return [None, self.sample(wo, [0.0; 3])] };
+        let reflectance = fresnel(wo.dot(h), relative).reflectance;
+        [(reflectance, 0.0), (1.0 - reflectance, 1.0)].map(|(probability, choice)| {
+            if probability == 0.0 {
+                return None;
+            }
+            let (wi, event) = split(wo, h, relative, choice);
+            let sample = self.of_lobe(wo, wi, event)?;
+            Some(BoundarySample { weight: probability * sample.weight, ..sample })
+        })
+    }
+
+    /// The normal of the facet that `wo` meets, and the index of the far side over that of the side of `wo`; `None` where there
+    /// is no surface.
+    #[inline]
+    fn facet(&self, wo: DVec3, u: [f64; 2]) -> Option<(DVec3, f64)> {
         match *self {
-            Boundary::Matched => Some(BoundarySample {
-                wi: -wo,
-                weight: 1.0,
-                density: Density::Delta,
-                event: Event::Refract,
-            }),
+            Boundary::Matched => None,
             Boundary::Smooth { eta } => {
-                let h = DVec3::new(0.0, 0.0, 1f64.copysign(wo.z));
-                let (wi, event) = split(wo, h, side_eta(eta, wo), u[0]);
-                let radiance =
-                    if event == Event::Refract { 1.0 / square(side_eta(eta, wo)) } else { 1.0 };
-                Some(BoundarySample { wi, weight: radiance, density: Density::Delta, event })
+                Some((DVec3::new(0.0, 0.0, 1f64.copysign(wo.z)), side_eta(eta, wo)))
             }
             Boundary::Rough { eta, ref facets } => {
-                let relative = side_eta(eta, wo);
-                let sign = 1f64.copysign(wo.z);
-                let h = visible_facet(facets, wo, [u[1], u[2]]);
-                let (wi, event) = split(wo, h, relative, u[0]);
-                let expected_side = if event == Event::Reflect { sign } else { -sign };
-                if wi.z * expected_side <= 0.0 {
-                    return None;
-                }
-                let radiance = if event == Event::Refract { 1.0 / square(relative) } else { 1.0 };
-                let (_, pdf) = rough(eta, facets, wo, wi);
-                let weight = facets.g1(wi) * radiance;
-                Some(BoundarySample { wi, weight, density: Density::Finite(pdf), event })
+                Some((visible_facet(facets, wo, u), side_eta(eta, wo)))
             }
         }
+    }
+
+    /// A direction that a facet sends `wo` to, with the lobe chosen by its probability.
+    #[inline]
+    fn of_lobe(&self, wo: DVec3, wi: DVec3, event: Event) -> Option<BoundarySample> {
+        let radiance =
+            if event == Event::Refract { 1.0 / square(side_eta(self.eta(), wo)) } else { 1.0 };
+        let Boundary::Rough { eta, ref facets } = *self else {
+            return Some(BoundarySample { wi, weight: radiance, density: Density::Delta, event });
+        };
+        let sign = 1f64.copysign(wo.z);
+        let expected_side = if event == Event::Reflect { sign } else { -sign };
+        if wi.z * expected_side <= 0.0 {
+            return None;
+        }
+        let (_, pdf) = rough(eta, facets, wo, wi);
+        let weight = facets.g1(wi) * radiance;
+        Some(BoundarySample { wi, weight, density: Density::Finite(pdf), event })
     }
 
     /// f |cos_i| (1/sr) and the density of `wi` given `wo` (1/sr), both without delta lobes: the pair
@@ -324,6 +351,39 @@ mod tests {
 
     fn grid(n: u32) -> impl Iterator<Item = f64> {
         (0..n).map(move |i| (f64::from(i) + 0.43) / f64::from(n))
+    }
+
+    /// Both lobes of a facet are what a choice between them gives on average.
+    #[test]
+    fn both_lobes_are_the_mean_of_a_choice() {
+        const CHOICES: u32 = 4000;
+        let smooth = [Boundary::Smooth { eta: 1.4 }, Boundary::Smooth { eta: 0.7 }, Boundary::Matched];
+        for surface in rough_surfaces().chain(smooth) {
+            for cos in [0.95, 0.4, 0.1, -0.1, -0.4, -0.95] {
+                let wo = direction(cos, 0.21);
+                for u in [[0.3, 0.9], [0.8, 0.2]] {
+                    let mut mean = [(0.0, DVec3::ZERO, None); 2];
+                    for choice in grid(CHOICES) {
+                        let Some(s) = surface.sample(wo, [choice, u[0], u[1]]) else { continue };
+                        let lobe = &mut mean[usize::from(s.event == Event::Refract)];
+                        lobe.0 += s.weight / f64::from(CHOICES);
+                        (lobe.1, lobe.2) = (s.wi, Some(s.density));
+                    }
+                    for ((weight, wi, density), both) in mean.into_iter().zip(surface.sample_both(wo, u))
+                    {
+                        let own = both.map_or(0.0, |s| s.weight);
+                        // The choice is counted to a step of its grid.
+                        assert!(
+                            (own - weight).abs() < 2.5 / f64::from(CHOICES),
+                            "{surface:?} {cos} {u:?}"
+                        );
+                        if let (Some(density), Some(s)) = (density, both) {
+                            assert_eq!((s.wi, s.density), (wi, density));
+                        }
+                    }
+                }
+            }
+        }
     }
 
     /// D5: every sample's weight times its density is the value, the density asked again is the one

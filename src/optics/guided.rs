@@ -23,9 +23,10 @@
 //!   (1 - p) e^{p sigma_t t} where it ends in the medium, e^{p sigma_t t} where it reaches the boundary.
 //!
 //! The guide alone is not safe: where it is wrong, weights have no bound. With a share q of guided steps, turn and flight
-//! together, and both weighted by the balance heuristic, no step weighs more than 1 / (1 - q) of a plain one. The turn has
-//! the ratio 1 - q + q f/N; given its direction it was guided with probability q' = q (f/N) / (1 - q + q f/N), and so is
-//! the flight: 1 - q' + q' (1 - p) e^{p sigma_t t}. The product is the mixture over both.
+//! together, and both weighted by the balance heuristic, no step weighs more than 1 / (1 - q) of a plain one. The step has
+//! the ratio
+//!   (1 - q) + q (f / N) (1 - p) e^{p sigma_t t},
+//! whose two parts [`Heading`] keeps when the direction is known and the flight is not.
 
 use super::phase::HenyeyGreenstein;
 use crate::math::{DVec3, Frame, exp, exp_m1, increasing_root, ln, ln_1p, sin_cos_turns};
@@ -71,8 +72,9 @@ impl Pull {
     /// s, the growth per mean free path.
     #[inline]
     pub fn strength(&self) -> f64 {
-        let part = self.level as f64 / (LEVELS - 1) as f64;
-        MOST * part * part
+        const STEP: f64 = 1.0 / (LEVELS - 1) as f64;
+        let part = self.level as f64 * STEP;
+        MOST * (part * part)
     }
 
     /// s m for the direction of a flight.
@@ -82,40 +84,63 @@ impl Pull {
     }
 }
 
-/// What a turn needs for one s.
+/// What a turn after isotropic scattering needs for one s.
+#[derive(Clone, Copy, Debug)]
+struct IsotropicLevel {
+    s: f64,
+    /// L = ln((1 + s) / (1 - s)).
+    spread: f64,
+    /// (1 + s) / s.
+    reach: f64,
+    /// N.
+    norm: f64,
+}
+
+/// What a turn after scattering of another kind needs for one s.
 #[derive(Clone, Debug)]
 struct Level {
-    s: f64,
-    /// ln((1 + s) / (1 - s)).
-    spread: f64,
-    /// f in Legendre polynomials; for isotropic scattering its closed form stands for it.
+    /// f in Legendre polynomials.
     factor: LegendreSeries,
     /// N in Legendre polynomials.
     series: LegendreSeries,
-    /// The largest f.
-    most: f64,
+    /// Coefficient of P_1 in f.
+    linear: f64,
+    /// Sum of all others.
+    even: f64,
 }
 
-/// Turns of a walk in a medium, for every level.
+/// Turns of a walk in a medium.
 #[derive(Clone, Debug)]
 pub struct GuidedTurns {
     phase: HenyeyGreenstein,
-    levels: Vec<Level>,
+    levels: Levels,
+}
+
+/// Every level; the first is not asked for.
+#[derive(Clone, Debug)]
+enum Levels {
+    Isotropic(Vec<IsotropicLevel>),
+    Product(Vec<Level>),
 }
 
 impl GuidedTurns {
     /// For a phase function and an albedo, both of the medium.
     pub fn new(phase: HenyeyGreenstein, albedo: f64) -> GuidedTurns {
+        let strength = |level: usize| Pull { axis: DVec3::Z, level: level.max(1) }.strength();
+        let spread = |s: f64| ln_1p(2.0 * s / (1.0 - s));
+        let levels = 0..LEVELS;
+        if phase.g == 0.0 {
+            let level = |s: f64| {
+                let (spread, reach) = (spread(s), (1.0 + s) / s);
+                IsotropicLevel { s, spread, reach, norm: 0.5 * spread / s }
+            };
+            let levels = Levels::Isotropic(levels.map(strength).map(level).collect());
+            return GuidedTurns { phase, levels };
+        }
         let b = albedo * phase.g / (1.0 - albedo * phase.g);
-        let level = |level: usize| {
-            let s = Pull { axis: DVec3::Z, level }.strength();
-            if level == 0 {
-                let one = LegendreSeries::new(&[1.0]);
-                return Level { s, spread: 0.0, factor: one.clone(), series: one, most: 1.0 };
-            }
+        let level = |s: f64| {
             let bend = b.min(MOST_BEND / s);
-            let spread = ln_1p(2.0 * s / (1.0 - s));
-            let factor = factor(phase.g, s, bend, spread);
+            let factor = factor(s, bend, spread(s));
             let mut power = 1.0;
             let convolved: Vec<f64> = factor
                 .iter()
@@ -125,11 +150,12 @@ impl GuidedTurns {
                     term
                 })
                 .collect();
-            let most = factor.iter().sum();
+            let linear = factor.get(1).copied().unwrap_or(0.0);
+            let even = factor.iter().sum::<f64>() - linear;
             let [factor, series] = [factor, convolved].map(|series| LegendreSeries::new(&series));
-            Level { s, spread, factor, series, most }
+            Level { factor, series, linear, even }
         };
-        GuidedTurns { phase, levels: (0..LEVELS).map(level).collect() }
+        GuidedTurns { phase, levels: Levels::Product(levels.map(strength).map(level).collect()) }
     }
 
     /// Density of a turn from `from` to `to`, over that of the phase function.
@@ -138,15 +164,20 @@ impl GuidedTurns {
         if pull.level == 0 {
             return 1.0;
         }
-        let Level { s, ref factor, ref series, .. } = self.levels[pull.level];
         let m = pull.axis.dot(to);
-        if self.phase.g == 0.0 {
-            return 1.0 / ((1.0 - s * m) * series.first);
+        match &self.levels {
+            Levels::Isotropic(levels) => {
+                let IsotropicLevel { s, norm, .. } = levels[pull.level];
+                1.0 / ((1.0 - s * m) * norm)
+            }
+            Levels::Product(levels) => {
+                let Level { factor, series, .. } = &levels[pull.level];
+                factor.sum(m) / series.sum(pull.axis.dot(from))
+            }
         }
-        factor.sum(m) / series.sum(pull.axis.dot(from))
     }
 
-    /// A turn that is guided with probability `share`, else as the phase function has it.
+    /// A turn that is guided with probability `share`, else as the phase function has it; and which of them it is.
     #[inline]
     pub fn sample_mixed(
         &self,
@@ -154,43 +185,61 @@ impl GuidedTurns {
         pull: &Pull,
         from: DVec3,
         mut draw: impl FnMut() -> f64,
-    ) -> DVec3 {
+    ) -> (DVec3, bool) {
         if pull.level > 0 && draw() < share {
-            self.sample(pull, from, draw)
+            (self.sample(pull, from, draw), true)
         } else {
-            self.phase.sample(from, [draw(), draw()])
+            (self.phase.sample(from, [draw(), draw()]), false)
         }
     }
 
-    /// Density of [`Self::sample_mixed`] over that of the phase function, and what is then known of the flight.
+    /// What [`Self::sample_mixed`] says of the step that goes on along `to`.
     #[inline]
-    pub fn mixed(&self, share: f64, pull: &Pull, from: DVec3, to: DVec3) -> (f64, Heading) {
+    pub fn heading(&self, share: f64, pull: &Pull, from: DVec3, to: DVec3) -> Heading {
         let guided = share * self.ratio(pull, from, to);
-        let turned = (1.0 - share) + guided;
-        (turned, Heading { share: guided / turned, pull: pull.along(to) })
+        Heading { plain: 1.0 - share, guided, pull: pull.along(to) }
     }
 
     /// A direction after light that travelled along `from`. Isotropic: with L = ln((1 + s) / (1 - s)), the distribution
     /// function of m inverts to 1 + m = (1 + s) (1 - e^{-L u}) / s.
-    /// Otherwise by rejection from the phase function, f being largest at m' = 1 (its coefficients are positive).
+    /// Otherwise by rejection from the phase function. A direction and that with the opposite azimuth about `from` are drawn
+    /// together, since the phase function has the same value there, and one of them is taken in proportion to its f. With m and mu
+    /// the cosines of `from` to the axis and to the direction, the two have m' = m mu +- c; the mean of their P_1 is m mu, and no
+    /// other |P_l| exceeds 1, so that the mean of their f is at most c_1 |m| and the other coefficients, which are positive.
     pub fn sample(&self, pull: &Pull, from: DVec3, mut draw: impl FnMut() -> f64) -> DVec3 {
         if pull.level == 0 {
             return self.phase.sample(from, [draw(), draw()]);
         }
-        let Level { s, spread, ref factor, most, .. } = self.levels[pull.level];
-        if self.phase.g == 0.0 {
-            let [u, v] = [draw(), draw()];
-            let above = (1.0 + s) * (1.0 - exp(-spread * u)) / s;
-            let (sin_phi, cos_phi) = sin_cos_turns(v);
-            let r = (above * (2.0 - above)).max(0.0).sqrt();
-            let dir =
-                Frame::about(pull.axis).to_world(DVec3::new(r * cos_phi, r * sin_phi, above - 1.0));
-            return dir * (1.5 - 0.5 * dir.length_squared());
-        }
-        loop {
-            let dir = self.phase.sample(from, [draw(), draw()]);
-            if draw() * most < factor.sum(pull.axis.dot(dir)) {
-                return dir;
+        match &self.levels {
+            Levels::Isotropic(levels) => {
+                let IsotropicLevel { spread, reach, .. } = levels[pull.level];
+                let [u, v] = [draw(), draw()];
+                let above = reach * (1.0 - exp(-spread * u));
+                let (sin_phi, cos_phi) = sin_cos_turns(v);
+                let r = (above * (2.0 - above)).max(0.0).sqrt();
+                let local = DVec3::new(r * cos_phi, r * sin_phi, above - 1.0);
+                let dir = Frame::about(pull.axis).to_world(local);
+                dir * (1.5 - 0.5 * dir.length_squared())
+            }
+            Levels::Product(levels) => {
+                let Level { factor, linear, even, .. } = &levels[pull.level];
+                let frame = Frame::about(from);
+                let axis = frame.to_local(pull.axis);
+                let most = 2.0 * (linear * axis.z.abs() + even);
+                let local = loop {
+                    let local = self.phase.sample_local([draw(), draw()]);
+                    let opposite = DVec3::new(-local.x, -local.y, local.z);
+                    let level = draw() * most;
+                    let of_first = factor.sum(axis.dot(local));
+                    if level < of_first {
+                        break local;
+                    }
+                    if level - of_first < factor.sum(axis.dot(opposite)) {
+                        break opposite;
+                    }
+                };
+                let dir = frame.to_world(local);
+                dir * (1.5 - 0.5 * dir.length_squared())
             }
         }
     }
@@ -199,38 +248,63 @@ impl GuidedTurns {
     pub fn heap_bytes(&self) -> usize {
         let of_level =
             |level: &Level| size_of::<Level>() + level.factor.heap_bytes() + level.series.heap_bytes();
-        self.levels.iter().map(of_level).sum()
+        match &self.levels {
+            Levels::Isotropic(levels) => size_of_val(&**levels),
+            Levels::Product(levels) => levels.iter().map(of_level).sum(),
+        }
     }
 }
 
-/// What is known of a flight when its direction is: with which share it is guided, and the pull p = s m along it.
+/// A step whose direction is known: its density over that of a plain one, in two parts, and the pull along it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heading {
-    /// Probability that the flight is guided.
-    pub share: f64,
-    /// p; below 1.
+    /// Of steps that are not guided.
+    pub plain: f64,
+    /// Of those that are.
+    pub guided: f64,
+    /// p = s m; below 1.
     pub pull: f64,
 }
 
 impl Heading {
+    /// No step: the density is that of what has been drawn.
+    pub const NONE: Heading = Heading { plain: 1.0, guided: 0.0, pull: 0.0 };
+
+    /// Of a direction that is given: the flight alone is guided, with probability `share`.
+    #[inline]
+    pub fn given(share: f64, pull: f64) -> Heading {
+        Heading { plain: 1.0 - share, guided: share, pull }
+    }
+
+    /// Density of the direction over the plain one.
+    #[inline]
+    pub fn turned(&self) -> f64 {
+        self.plain + self.guided
+    }
+
+    /// Whether the step is guided, and a number that is uniform again, from a uniform one.
+    #[inline]
+    pub fn choose(&self, u: f64) -> (bool, f64) {
+        choose(u, self.guided / self.turned())
+    }
+
     /// The distance of the flight, if no boundary ends it.
     #[inline]
-    pub fn sample_distance(&self, sigma_t: f64, u: f64) -> f64 {
-        let (is_guided, u) = choose(u, self.share);
+    pub fn sample_distance(&self, sigma_t: f64, is_guided: bool, u: f64) -> f64 {
         let pull = if is_guided { self.pull } else { 0.0 };
         sample_exponential(sigma_t * (1.0 - pull), u)
     }
 
-    /// Density of a flight that ends in the medium at distance `t`, over the plain one.
+    /// Density of direction and flight over the plain one, for a flight that ends in the medium at distance `t`.
     #[inline]
     pub fn flight_ratio(&self, sigma_t: f64, t: f64) -> f64 {
-        (1.0 - self.share) + self.share * ((1.0 - self.pull) * growth(self.pull, sigma_t, t))
+        self.plain + self.guided * ((1.0 - self.pull) * growth(self.pull, sigma_t, t))
     }
 
-    /// Probability of a flight longer than `t`, over the plain one.
+    /// The same for a flight longer than `t`, with its probability.
     #[inline]
     pub fn passage_ratio(&self, sigma_t: f64, t: f64) -> f64 {
-        (1.0 - self.share) + self.share * growth(self.pull, sigma_t, t)
+        self.plain + self.guided * growth(self.pull, sigma_t, t)
     }
 }
 
@@ -240,16 +314,12 @@ fn growth(pull: f64, sigma_t: f64, t: f64) -> f64 {
     if pull == 0.0 { 1.0 } else { exp((pull * sigma_t * t).min(MOST_EXPONENT)) }
 }
 
-/// Coefficients of f: all of it in the first for isotropic scattering, else until the rest is small beside its least value,
-/// (1 - b s) / (1 + s) at m = -1. |P_l| <= 1, so that the rest is bounded by the sum of its coefficients, and f stays
-/// positive.
-fn factor(g: f64, s: f64, bend: f64, spread: f64) -> Vec<f64> {
+/// Coefficients of f, until the rest is small beside its least value, (1 - b s) / (1 + s) at m = -1. |P_l| <= 1, so that
+/// the rest is bounded by the sum of its coefficients, and f stays positive.
+fn factor(s: f64, bend: f64, spread: f64) -> Vec<f64> {
     let nu = 1.0 / s;
     // Q_0 = L / 2.
     let first = -bend + (1.0 + bend) * nu * 0.5 * spread;
-    if g == 0.0 {
-        return vec![first];
-    }
     let legendre_q = second_kind(nu, 0.5 * spread);
     let coefficient = |l: usize| (1.0 + bend) * nu * (2 * l + 1) as f64 * legendre_q[l];
     let mut rest: f64 = (1..legendre_q.len()).map(coefficient).sum();
@@ -471,7 +541,7 @@ mod tests {
     #[test]
     fn flights_are_normalised() {
         let sigma_t = 3.0;
-        for heading in [Heading { share: 0.9, pull: 0.7 }, Heading { share: 0.5, pull: -0.8 }] {
+        for heading in [Heading::given(0.9, 0.7), Heading::given(0.5, -0.8)] {
             let reach = 2.0;
             let density = |t: f64| sigma_t * exp(-sigma_t * t) * heading.flight_ratio(sigma_t, t);
             let ended = integrate(density, 0.0, reach, 1e-13).value;
@@ -479,6 +549,6 @@ mod tests {
             assert!((ended + passed - 1.0).abs() < 1e-12);
         }
         // A depth that no double holds has a finite ratio.
-        assert!(Heading { share: 0.9, pull: 0.9 }.passage_ratio(1e6, 1.0).is_finite());
+        assert!(Heading::given(0.9, 0.9).passage_ratio(1e6, 1.0).is_finite());
     }
 }

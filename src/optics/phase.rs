@@ -55,18 +55,24 @@ impl HenyeyGreenstein {
     /// density [`Self::pdf`].
     #[inline]
     pub fn sample(&self, dir: DVec3, u: [f64; 2]) -> DVec3 {
-        let (below, above) = self.sample_poles(u[0]);
-        let (sin_phi, cos_phi) = sin_cos_turns(u[1]);
-        let r = (below * above).sqrt();
-        // The smaller distance carries the digits of mu.
-        let mu = if below < above { 1.0 - below } else { above - 1.0 };
-        let local = DVec3::new(r * cos_phi, r * sin_phi, mu);
+        let local = self.sample_local(u);
         if self.g == 0.0 {
             return local;
         }
         // One Newton step towards unit length, so that rounding does not add up along a walk.
         let next = Frame::about(dir).to_world(local);
         next * (1.5 - 0.5 * next.length_squared())
+    }
+
+    /// The same in a frame about the direction of travel, which is its z axis.
+    #[inline]
+    pub fn sample_local(&self, u: [f64; 2]) -> DVec3 {
+        let (below, above) = self.sample_poles(u[0]);
+        let (sin_phi, cos_phi) = sin_cos_turns(u[1]);
+        let r = (below * above).sqrt();
+        // The smaller distance carries the digits of mu.
+        let mu = if below < above { 1.0 - below } else { above - 1.0 };
+        DVec3::new(r * cos_phi, r * sin_phi, mu)
     }
 }
 

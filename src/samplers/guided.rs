@@ -91,12 +91,12 @@ impl Grade for PeakGrade {
 
 impl Technique<Directions<PeakGrade>> for GuidedTurn {
     fn sample(&self, stream: &mut Stream) -> (DVec3, Option<f64>) {
-        let dir = self.turns.sample_mixed(self.share, &self.pull, AXIS, || stream.draw());
+        let (dir, _) = self.turns.sample_mixed(self.share, &self.pull, AXIS, || stream.draw());
         (dir, Some(self.pdf(dir)))
     }
 
     fn pdf(&self, dir: DVec3) -> f64 {
-        self.phase.pdf(AXIS.dot(dir)) * self.turns.mixed(self.share, &self.pull, AXIS, dir).0
+        self.phase.pdf(AXIS.dot(dir)) * self.turns.heading(self.share, &self.pull, AXIS, dir).turned()
     }
 
     fn contrasts(&self, chart: &Directions<PeakGrade>) -> Vec<Contrast> {
@@ -154,18 +154,18 @@ impl Step {
     }
 
     fn joint(&self, dir: DVec3, theta: f64, t: f64, slope: f64) -> f64 {
-        let (turned, heading) = self.turns.mixed(self.share, &self.pull, DVec3::X, dir);
+        let heading = self.turns.heading(self.share, &self.pull, DVec3::X, dir);
         let plain = self.sigma_t * exp(-self.sigma_t * t) / (4.0 * PI);
-        let ratio = turned * heading.flight_ratio(self.sigma_t, t);
-        plain * ratio * EvenAngle::solid_angle(theta) * slope
+        plain * heading.flight_ratio(self.sigma_t, t) * EvenAngle::solid_angle(theta) * slope
     }
 }
 
 impl Sampler for Step {
     fn draw(&self, stream: &mut Stream) -> Draw {
-        let dir = self.turns.sample_mixed(self.share, &self.pull, DVec3::X, || stream.draw());
-        let (_, heading) = self.turns.mixed(self.share, &self.pull, DVec3::X, dir);
-        let t = heading.sample_distance(self.sigma_t, stream.draw());
+        let (dir, is_guided) =
+            self.turns.sample_mixed(self.share, &self.pull, DVec3::X, || stream.draw());
+        let heading = self.turns.heading(self.share, &self.pull, DVec3::X, dir);
+        let t = heading.sample_distance(self.sigma_t, is_guided, stream.draw());
         let theta = EvenAngle::theta(AXIS, dir);
         let x = t / (t + 1.0 / self.sigma_t);
         let slope = self.distances().at(x).map_or(0.0, |(_, slope)| slope);

@@ -58,7 +58,10 @@ pub(super) enum Importance {
 /// Nodes at the middles of cubic cells.
 #[derive(Clone, Debug)]
 pub(super) struct ImportanceGrid {
-    lattice: Lattice,
+    /// Where the first cell begins.
+    low: DVec3,
+    per_spacing: f64,
+    counts: [usize; 3],
     nodes: Vec<Node>,
 }
 
@@ -177,8 +180,8 @@ impl ImportanceGrid {
     /// Of the cell that holds the point.
     #[inline]
     fn at(&self, x: DVec3) -> Option<(Pull, f64)> {
-        let Lattice { first, spacing, counts } = self.lattice;
-        let place = (x - first) / spacing + 0.5;
+        let counts = self.counts;
+        let place = (x - self.low) * self.per_spacing;
         let cell = |axis: usize| (place[axis].max(0.0) as usize).min(counts[axis] - 1);
         let Node { axis, phi, level } =
             self.nodes[(cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)];
@@ -383,7 +386,8 @@ impl Cells {
             }
         };
         let nodes = (0..self.numbers.len()).map(node).collect();
-        ImportanceGrid { lattice: self.lattice, nodes }
+        let Lattice { first, spacing, counts } = self.lattice;
+        ImportanceGrid { low: first - 0.5 * spacing, per_spacing: 1.0 / spacing, counts, nodes }
     }
 }
 

@@ -356,12 +356,12 @@ fn guided_over_plain(snee: &Snee, path: &FixedPath, course: Course) -> [f64; 5] 
         let [from, at, to] = [step[0], step[1], step[2]];
         let [arrival, dir] = [(at - from).normalize(), (to - at).normalize()];
         let (pull, _) = guidance.at(at, DVec3::Z);
-        let (turned, heading) = guidance.turns.mixed(guidance.share, &pull, arrival, dir);
+        let heading = guidance.turns.heading(guidance.share, &pull, arrival, dir);
         let t = (to - at).length();
         let is_last = to == path.exit.hit.point;
         let flown =
             if is_last { heading.passage_ratio(sigma_t, t) } else { heading.flight_ratio(sigma_t, t) };
-        ratios.push(ratios[ratios.len() - 1] * turned * flown);
+        ratios.push(ratios[ratios.len() - 1] * flown);
     }
     let [.., at_j, at_end] = ratios[..] else { panic!("two steps at least") };
     let at_i = if course.vertices > 1 { ratios[ratios.len() - 3] } else { f64::NAN };
@@ -444,8 +444,8 @@ fn weights_at_a_matched_boundary_sum_to_one() {
         let hit = scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY).expect("a finite body");
         let (pull, _) = guidance.at(path.x_i, DVec3::Z);
         let arrival = (path.x_i - path.start).normalize();
-        let (turned, heading) = guidance.turns.mixed(guidance.share, &pull, arrival, path.w_l);
-        let of_guide = turned * heading.passage_ratio(2.0, hit.t);
+        let heading = guidance.turns.heading(guidance.share, &pull, arrival, path.w_l);
+        let of_guide = heading.passage_ratio(2.0, hit.t);
         let mut scores = Scores::new(Layout::new(&scene));
         let plain = CameraWalk::led(on, &mut scores, Unrivalled, OneBand, path.start);
         matched_weights(plain, &path, hit.t, 1.0);
