@@ -9,7 +9,7 @@ use super::chart::{AXIS, Charted, Directions, EvenAngle, Grade, Measure, Techniq
 use super::kind::{SamplerKind, sampler_kind};
 use super::sampler::{Contrast, Coordinate, Draw, Piece, Sampler};
 use crate::math::{DVec3, Frame, cos, exp, exp_m1, ln_1p, sin, sin_cos_turns};
-use crate::optics::guided::{GuidedTurns, Pull};
+use crate::optics::guided::{Escape, GuidedTurns, Pull, StepGuide};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::Stream;
 
@@ -22,8 +22,11 @@ pub const TURN: SamplerKind = sampler_kind!(
         let frame = Frame::about(AXIS);
         let angle = o.angle_deg.to_radians();
         let axis = frame.n * cos(angle) + frame.s * sin(angle);
-        let pull = Pull::new(axis * o.growth);
-        let turn = GuidedTurn { phase, turns: GuidedTurns::new(phase, o.albedo), share: o.share, pull };
+        let angle = o.exit_deg.to_radians();
+        let normal = frame.n * cos(angle) - frame.t * sin(angle);
+        let escape = Escape { normal, least_cosine: cos(o.cone_deg.to_radians()), chance: o.escapes };
+        let guide = StepGuide { pull: Pull::new(axis * o.growth), escape };
+        let turn = GuidedTurn { phase, turns: GuidedTurns::new(phase, o.albedo), share: o.share, guide };
         let scale = (1.0 - o.g.abs()) * (1.0 - o.g.abs());
         let grade = PeakGrade { scale, length: ln_1p(2.0 / scale), is_backward: o.g < 0.0 };
         Ok(Charted::new(turn, Directions::graded(grade)))
@@ -49,13 +52,29 @@ struct TurnOptions {
     /// Share of guided turns.
     #[schemars(range(min = 0.0, max = 1.0))]
     share: f64,
+    /// Chance that a guided turn is an escape.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    escapes: f64,
+    /// Between the direction of arrival and the axis of the cone, degrees; at right angles to the plane of growth.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 180.0))]
+    exit_deg: f64,
+    /// Half angle of the cone, degrees.
+    #[serde(default = "right_angle")]
+    #[schemars(range(max = 90.0), extend("exclusiveMinimum" = 0))]
+    cone_deg: f64,
+}
+
+fn right_angle() -> f64 {
+    90.0
 }
 
 struct GuidedTurn {
     phase: HenyeyGreenstein,
     turns: GuidedTurns,
     share: f64,
-    pull: Pull,
+    guide: StepGuide,
 }
 
 /// By the cosine to the peak of the phase function, as for the phase function alone: 1 - mu = s (e^{L x} - 1), s = (1 - |g|)^2,
@@ -91,16 +110,16 @@ impl Grade for PeakGrade {
 
 impl Technique<Directions<PeakGrade>> for GuidedTurn {
     fn sample(&self, stream: &mut Stream) -> (DVec3, Option<f64>) {
-        let (dir, _) = self.turns.sample_mixed(self.share, &self.pull, AXIS, || stream.draw());
+        let (dir, _) = self.turns.sample_mixed(self.share, &self.guide, AXIS, || stream.draw());
         (dir, Some(self.pdf(dir)))
     }
 
     fn pdf(&self, dir: DVec3) -> f64 {
-        self.phase.pdf(AXIS.dot(dir)) * self.turns.heading(self.share, &self.pull, AXIS, dir).turned()
+        self.phase.pdf(AXIS.dot(dir)) * self.turns.heading(self.share, &self.guide, AXIS, dir).turned()
     }
 
     fn contrasts(&self, chart: &Directions<PeakGrade>) -> Vec<Contrast> {
-        let (grade, frame, axis) = (chart.grade, chart.frame, self.pull.axis);
+        let (grade, frame, axis) = (chart.grade, chart.frame, self.guide.pull.axis);
         let along =
             move |[x, turns]: [f64; 2]| frame.to_world(grade.local(x, sin_cos_turns(turns)).0).dot(axis);
         let ahead = move |[x, _]: [f64; 2]| grade.local(x, (0.0, 1.0)).0.z;
@@ -118,7 +137,8 @@ pub const STEP: SamplerKind = sampler_kind!(
     StepOptions => |o| {
         let phase = HenyeyGreenstein { g: 0.0 };
         let turns = GuidedTurns::new(phase, o.albedo);
-        Ok(Step { turns, share: o.share, pull: Pull::new(AXIS * o.growth), sigma_t: o.sigma_t_per_mm })
+        let guide = StepGuide::inner(Pull::new(AXIS * o.growth));
+        Ok(Step { turns, share: o.share, guide, sigma_t: o.sigma_t_per_mm })
     }
 );
 
@@ -144,7 +164,7 @@ struct StepOptions {
 struct Step {
     turns: GuidedTurns,
     share: f64,
-    pull: Pull,
+    guide: StepGuide,
     sigma_t: f64,
 }
 
@@ -154,7 +174,7 @@ impl Step {
     }
 
     fn joint(&self, dir: DVec3, theta: f64, t: f64, slope: f64) -> f64 {
-        let heading = self.turns.heading(self.share, &self.pull, DVec3::X, dir);
+        let heading = self.turns.heading(self.share, &self.guide, DVec3::X, dir);
         let plain = self.sigma_t * exp(-self.sigma_t * t) / (4.0 * PI);
         plain * heading.flight_ratio(self.sigma_t, t) * EvenAngle::solid_angle(theta) * slope
     }
@@ -162,10 +182,9 @@ impl Step {
 
 impl Sampler for Step {
     fn draw(&self, stream: &mut Stream) -> Draw {
-        let (dir, is_guided) =
-            self.turns.sample_mixed(self.share, &self.pull, DVec3::X, || stream.draw());
-        let heading = self.turns.heading(self.share, &self.pull, DVec3::X, dir);
-        let t = heading.sample_distance(self.sigma_t, is_guided, stream.draw());
+        let (dir, drawn) = self.turns.sample_mixed(self.share, &self.guide, DVec3::X, || stream.draw());
+        let heading = self.turns.heading(self.share, &self.guide, DVec3::X, dir);
+        let t = heading.sample_distance(self.sigma_t, drawn, stream.draw());
         let theta = EvenAngle::theta(AXIS, dir);
         let x = t / (t + 1.0 / self.sigma_t);
         let slope = self.distances().at(x).map_or(0.0, |(_, slope)| slope);

@@ -14,12 +14,13 @@
 //! mean of their neighbours. Where there is no cell (in parts thinner than one) or phi has underflowed, there is none, and
 //! the walk is plain. Nothing of this needs to be exact: it guides.
 
-use super::incidence::TransmittedLight;
+use super::exit::{Exit, ExitRule, REACH};
+use super::incidence::{LetIn, TransmittedLight};
 use crate::geometry::{self, Ray, Shape, Side};
 use crate::math::{DVec3, cos, exp, ln, ln_1p};
 use crate::optics::boundary::Boundary;
 use crate::optics::bssrdf::FresnelMoments;
-use crate::optics::guided::{Pull, diffuse_growth};
+use crate::optics::guided::{Escape, Pull, StepGuide, diffuse_growth};
 use crate::optics::medium::Medium;
 use crate::scene::Scene;
 
@@ -48,9 +49,17 @@ impl Diffusion {
 #[derive(Clone, Debug)]
 pub(super) enum Importance {
     /// e^{kappa z}.
-    HalfSpace { kappa: f64, pull: Pull },
-    /// a e^{kappa z} + b e^{-kappa (z + thickness)}.
-    Slab { kappa: f64, mean_free_path: f64, thickness: f64, a: f64, b: f64 },
+    HalfSpace { kappa: f64, pull: Pull, rule: ExitRule, exit: Option<Exit> },
+    /// a e^{kappa z} + b e^{-kappa (z + thickness)}; exits above and below.
+    Slab {
+        kappa: f64,
+        mean_free_path: f64,
+        thickness: f64,
+        a: f64,
+        b: f64,
+        rule: ExitRule,
+        exits: [Option<Exit>; 2],
+    },
     /// Between nodes of a grid.
     Grid(ImportanceGrid),
 }
@@ -63,6 +72,8 @@ pub(super) struct ImportanceGrid {
     per_spacing: f64,
     counts: [usize; 3],
     nodes: Vec<Node>,
+    rule: ExitRule,
+    exits: Vec<Exit>,
 }
 
 /// Cubic cells, counted along x first.
@@ -80,10 +91,13 @@ struct Node {
     axis: DVec3,
     /// In units that keep the body's range in single precision; 0 where nothing is known.
     phi: f32,
-    level: u16,
+    /// The level of the pull in the last byte, before it the index of the exit; [`NO_EXIT`] where none is near.
+    level_and_exit: u32,
 }
 
-const UNKNOWN: Node = Node { axis: DVec3::Z, phi: 0.0, level: 0 };
+const NO_EXIT: u32 = (1 << 24) - 1;
+
+const UNKNOWN: Node = Node { axis: DVec3::Z, phi: 0.0, level_and_exit: NO_EXIT << 8 };
 
 /// phi where it is largest, as nodes keep it.
 const LARGEST: f64 = 1e30;
@@ -95,27 +109,35 @@ impl Importance {
         let incidence = TransmittedLight::new(scene);
         let bands = 0..scene.bands();
         let scatters = |band: usize| scene.medium[band].sigma_t > 0.0 && scene.medium[band].albedo > 0.0;
+        let let_in = |origin: DVec3, dir: DVec3| {
+            let hit = scene.shape.intersect(&Ray { origin, dir }, Side::Inside, None, f64::INFINITY)?;
+            Some(incidence.irradiance(&hit))
+        };
         match *scene.shape {
             Shape::HalfSpace => {
+                let Some(let_in) = let_in(DVec3::NEG_Z, DVec3::Z) else {
+                    return vec![None; scene.bands()];
+                };
                 let half_space = |band: usize| {
                     let growth = diffuse_growth(scene.medium[band].albedo, scene.medium[band].phase.g);
-                    let kappa = growth * scene.medium[band].sigma_t;
-                    Importance::HalfSpace { kappa, pull: Pull::new(DVec3::Z * growth) }
+                    let (kappa, pull) =
+                        (growth * scene.medium[band].sigma_t, Pull::new(DVec3::Z * growth));
+                    let LetIn { all, wide } = let_in[band];
+                    let phi = all / (1.0 + Diffusion::of(scene, band).reach * kappa);
+                    let rule = ExitRule::of(scene, band);
+                    let exit = rule.exit(DVec3::ZERO, DVec3::Z, wide, phi);
+                    Importance::HalfSpace { kappa, pull, rule, exit }
                 };
                 bands.map(|band| scatters(band).then(|| half_space(band))).collect()
             }
             Shape::Slab { thickness } => {
                 let middle = DVec3::new(0.0, 0.0, -0.5 * thickness);
-                let let_in = |dir| {
-                    let ray = Ray { origin: middle, dir };
-                    let hit = scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY);
-                    hit.map(|hit| incidence.irradiance(&hit))
-                };
-                let (Some(top), Some(bottom)) = (let_in(DVec3::Z), let_in(-DVec3::Z)) else {
+                let (Some(top), Some(bottom)) = (let_in(middle, DVec3::Z), let_in(middle, -DVec3::Z))
+                else {
                     return vec![None; scene.bands()];
                 };
                 let slab =
-                    |band: usize| Importance::slab(scene, band, thickness, top[band], bottom[band]);
+                    |band: usize| Importance::slab(scene, band, thickness, [top[band], bottom[band]]);
                 bands.map(|band| scatters(band).then(|| slab(band)).flatten()).collect()
             }
             _ => {
@@ -124,20 +146,28 @@ impl Importance {
                 };
                 let borders = cells.borders(&scene.shape, &incidence);
                 let depth = cells.depth(&scene.shape);
+                let thinnest = scene.medium.iter().map(|medium| medium.sigma_t).filter(|s| *s > 0.0);
+                let reach = REACH / thinnest.fold(f64::INFINITY, f64::min);
+                let shores = cells.shores(&scene.shape, &incidence, reach);
                 let grid = |band: usize| {
                     let Medium { sigma_t, albedo, phase, .. } = scene.medium[band];
                     if depth * sigma_t * (1.0 - albedo * phase.g) < least_depth {
                         return None;
                     }
-                    let solved = cells.solve(&borders, band, Diffusion::of(scene, band))?;
-                    Some(Importance::Grid(cells.grid(&solved, 1.0 / scene.medium[band].sigma_t)))
+                    let diffusion = Diffusion::of(scene, band);
+                    let solved = cells.solve(&borders, band, diffusion)?;
+                    let mut grid = cells.grid(&solved, 1.0 / sigma_t, ExitRule::of(scene, band));
+                    cells.place_exits(&mut grid, &solved, &shores, band, diffusion);
+                    Some(Importance::Grid(grid))
                 };
                 bands.map(|band| scatters(band).then(|| grid(band)).flatten()).collect()
             }
         }
     }
 
-    fn slab(scene: &Scene, band: usize, thickness: f64, top: f64, bottom: f64) -> Option<Importance> {
+    /// What is let in: above, below.
+    fn slab(scene: &Scene, band: usize, thickness: f64, let_in: [LetIn; 2]) -> Option<Importance> {
+        let [top, bottom] = let_in.map(|let_in| let_in.all);
         if top + bottom <= 0.0 {
             return None;
         }
@@ -148,29 +178,46 @@ impl Importance {
         let det = p * p - e * e * m * m;
         let (a, b) = ((top * p - bottom * e * m) / det, (bottom * p - top * e * m) / det);
         let mean_free_path = 1.0 / scene.medium[band].sigma_t;
-        Some(Importance::Slab { kappa, mean_free_path, thickness, a, b })
+        let rule = ExitRule::of(scene, band);
+        let exits = [
+            rule.exit(DVec3::ZERO, DVec3::Z, let_in[0].wide, a + b * e),
+            rule.exit(-DVec3::Z * thickness, -DVec3::Z, let_in[1].wide, a * e + b),
+        ];
+        Some(Importance::Slab { kappa, mean_free_path, thickness, a, b, rule, exits })
     }
 
-    /// The pull at a point of the body, and phi; `None` where nothing is known.
+    /// What guides a step from a point of the body, and phi; 0 where nothing is known.
     #[inline]
-    pub(super) fn at(&self, x: DVec3) -> Option<(Pull, f64)> {
+    pub(super) fn at(&self, x: DVec3, guide: &mut StepGuide) -> f64 {
+        let escape = |rule: &ExitRule, exit: &Option<Exit>| {
+            exit.as_ref().map_or(Escape::NONE, |exit| rule.escape(exit, x))
+        };
         match self {
-            Importance::HalfSpace { kappa, pull } => Some((*pull, exp(kappa * x.z))),
-            Importance::Slab { kappa, mean_free_path, thickness, a, b } => {
+            Importance::HalfSpace { kappa, pull, rule, exit } => {
+                *guide = StepGuide { pull: *pull, escape: escape(rule, exit) };
+                exp(kappa * x.z)
+            }
+            Importance::Slab { kappa, mean_free_path, thickness, a, b, rule, exits } => {
                 let up = a * exp(kappa * x.z);
                 let down = b * exp(-kappa * (x.z + thickness));
                 let phi = up + down;
                 let growth = kappa * mean_free_path * (up - down) / phi;
-                (phi > 0.0 && growth.is_finite()).then(|| (Pull::new(DVec3::Z * growth), phi))
+                if phi <= 0.0 || !growth.is_finite() {
+                    *guide = StepGuide::NONE;
+                    return 0.0;
+                }
+                let exit = &exits[usize::from(x.z < -0.5 * thickness)];
+                *guide = StepGuide { pull: Pull::new(DVec3::Z * growth), escape: escape(rule, exit) };
+                phi
             }
-            Importance::Grid(grid) => grid.at(x),
+            Importance::Grid(grid) => grid.at(x, guide),
         }
     }
 
     /// Memory on the heap, bytes.
     pub(super) fn heap_bytes(&self) -> usize {
         match self {
-            Importance::Grid(grid) => grid.nodes.len() * size_of::<Node>(),
+            Importance::Grid(grid) => size_of_val(&*grid.nodes) + size_of_val(&*grid.exits),
             _ => 0,
         }
     }
@@ -179,13 +226,18 @@ impl Importance {
 impl ImportanceGrid {
     /// Of the cell that holds the point.
     #[inline]
-    fn at(&self, x: DVec3) -> Option<(Pull, f64)> {
+    fn at(&self, x: DVec3, guide: &mut StepGuide) -> f64 {
         let counts = self.counts;
         let place = (x - self.low) * self.per_spacing;
-        let cell = |axis: usize| (place[axis].max(0.0) as usize).min(counts[axis] - 1);
-        let Node { axis, phi, level } =
-            self.nodes[(cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)];
-        (phi > 0.0).then(|| (Pull { axis, level: usize::from(level) }, f64::from(phi)))
+        // The cast takes what is negative to 0.
+        let cell = |axis: usize| (place[axis] as u32 as usize).min(counts[axis] - 1);
+        let node = &self.nodes[(cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)];
+        guide.pull = Pull { axis: node.axis, level: (node.level_and_exit & 0xff) as usize };
+        match self.exits.get((node.level_and_exit >> 8) as usize) {
+            Some(exit) => guide.escape = self.rule.escape(exit, x),
+            None => guide.escape.chance = 0.0,
+        }
+        f64::from(node.phi)
     }
 }
 
@@ -210,8 +262,18 @@ struct Border {
     lean: f64,
     /// From the middle, along the axis.
     distance: f64,
-    /// Irradiance that goes in there, per band.
-    let_in: Vec<f64>,
+    /// What goes in there, per band.
+    let_in: Vec<LetIn>,
+}
+
+/// The boundary near a cell, as a plane.
+struct Shore {
+    at: DVec3,
+    normal: DVec3,
+    /// From the cell's middle, mm.
+    distance: f64,
+    /// What goes in there, per band.
+    let_in: Vec<LetIn>,
 }
 
 /// Of the cells inside.
@@ -242,6 +304,13 @@ impl Lattice {
         }
         let [i, j, k] = place;
         Some((k * self.counts[1] + j) * self.counts[0] + i)
+    }
+
+    /// The 27 cells around one, itself included, that there are.
+    fn around(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..27).filter_map(move |offset: isize| {
+            self.neighbour(index, [offset % 3 - 1, offset / 3 % 3 - 1, offset / 9 - 1])
+        })
     }
 }
 
@@ -295,6 +364,62 @@ impl Cells {
         self.inside.iter().map(|&index| FACES.map(|face| border(index, face))).collect()
     }
 
+    /// Per cell inside that is nearer to the boundary than `reach`, of what lies ahead along the axes the plane that is nearest.
+    fn shores(&self, shape: &Shape, incidence: &TransmittedLight<'_>, reach: f64) -> Vec<Option<Shore>> {
+        let shore = |&index: &usize| {
+            let middle = self.lattice.middle(index);
+            let within = reach + self.lattice.spacing;
+            if shape.clearance(middle) > within {
+                return None;
+            }
+            let ahead = |(axis, sign): (usize, f64)| {
+                let mut dir = DVec3::ZERO;
+                dir[axis] = sign;
+                let ray = Ray { origin: middle, dir };
+                let hit = shape.intersect(&ray, Side::Inside, None, f64::INFINITY)?;
+                Some((hit.normal.dot(hit.point - middle), hit))
+            };
+            let nearest = FACES.into_iter().filter_map(ahead).min_by(|a, b| a.0.total_cmp(&b.0));
+            let (distance, hit) = nearest.filter(|(distance, _)| *distance < within)?;
+            let let_in = incidence.irradiance(&hit);
+            Some(Shore { at: hit.point, normal: hit.normal, distance, let_in })
+        };
+        self.inside.iter().map(shore).collect()
+    }
+
+    /// Gives the cells near the boundary their exits; those outside next to the body have the nearest plane of their
+    /// neighbours.
+    fn place_exits(
+        &self,
+        grid: &mut ImportanceGrid,
+        solved: &Solved,
+        shores: &[Option<Shore>],
+        band: usize,
+        diffusion: Diffusion,
+    ) {
+        let mut known: Vec<Option<Exit>> = vec![None; self.numbers.len()];
+        for (number, shore) in shores.iter().enumerate() {
+            let Some(Shore { at, normal, distance, let_in }) = shore else { continue };
+            let LetIn { all, wide } = let_in[band];
+            let phi =
+                (all * distance + solved.phi[number] * diffusion.reach) / (distance + diffusion.reach);
+            known[self.inside[number]] = grid.rule.exit(*at, *normal, wide, phi);
+        }
+        for index in 0..self.numbers.len() {
+            let middle = self.lattice.middle(index);
+            let exit = if self.numbers[index] == NONE {
+                let near = self.lattice.around(index).filter_map(|next| known[next]);
+                near.min_by(|a, b| a.depth(middle).abs().total_cmp(&b.depth(middle).abs()))
+            } else {
+                known[index]
+            };
+            let Some(exit) = exit.filter(|_| grid.exits.len() < NO_EXIT as usize) else { continue };
+            let place = &mut grid.nodes[index].level_and_exit;
+            *place = (*place & 0xff) | (grid.exits.len() as u32) << 8;
+            grid.exits.push(exit);
+        }
+    }
+
     /// By successive over-relaxation in a fixed order, from the body's mean.
     fn solve(
         &self,
@@ -318,7 +443,7 @@ impl Cells {
                 if let Some(Border { lean, distance, let_in }) = border {
                     let conductance = lean * h / (diffusion.reach + lean * distance);
                     diagonal[number] += conductance;
-                    source[number] += conductance * let_in[band];
+                    source[number] += conductance * let_in[band].all;
                 }
             }
         }
@@ -332,7 +457,7 @@ impl Cells {
             [0, 1, 2, 3, 4, 5].map(|face: usize| {
                 borders[face].as_ref().map(|Border { lean, distance, let_in }| {
                     let share = lean * distance / (diffusion.reach + lean * distance);
-                    (phi + share * (let_in[band] - phi), *distance)
+                    (phi + share * (let_in[band].all - phi), *distance)
                 })
             })
         };
@@ -341,7 +466,7 @@ impl Cells {
     }
 
     /// Growth at the nodes inside, and at those next to them.
-    fn grid(&self, solved: &Solved, mean_free_path: f64) -> ImportanceGrid {
+    fn grid(&self, solved: &Solved, mean_free_path: f64, rule: ExitRule) -> ImportanceGrid {
         let largest = solved.phi.iter().copied().fold(0.0, f64::max);
         let least = largest * (f64::from(f32::MIN_POSITIVE) / LARGEST);
         let mut known: Vec<Option<(DVec3, f64)>> = vec![None; self.numbers.len()];
@@ -366,12 +491,9 @@ impl Cells {
             known[index] = Some((DVec3::from_array(gradient), phi));
         }
         let node = |index: usize| {
-            let near = |offset: isize| {
-                let step = [offset % 3 - 1, offset / 3 % 3 - 1, offset / 9 - 1];
-                self.lattice.neighbour(index, step).and_then(|next| known[next])
-            };
             let of_neighbours = || {
-                let all: Vec<(DVec3, f64)> = (0..27).filter_map(near).collect();
+                let all: Vec<(DVec3, f64)> =
+                    self.lattice.around(index).filter_map(|next| known[next]).collect();
                 let count = all.len() as f64;
                 let sum =
                     all.iter().fold((DVec3::ZERO, 0.0), |sum, node| (sum.0 + node.0, sum.1 + node.1));
@@ -380,14 +502,16 @@ impl Cells {
             match known[index].or_else(of_neighbours) {
                 Some((gradient, phi)) => {
                     let Pull { axis, level } = Pull::new(gradient);
-                    Node { axis, phi: (phi / largest * LARGEST) as f32, level: level as u16 }
+                    let phi = (phi / largest * LARGEST) as f32;
+                    Node { axis, phi, level_and_exit: NO_EXIT << 8 | level as u32 }
                 }
                 None => UNKNOWN,
             }
         };
         let nodes = (0..self.numbers.len()).map(node).collect();
         let Lattice { first, spacing, counts } = self.lattice;
-        ImportanceGrid { low: first - 0.5 * spacing, per_spacing: 1.0 / spacing, counts, nodes }
+        let (low, per_spacing) = (first - 0.5 * spacing, 1.0 / spacing);
+        ImportanceGrid { low, per_spacing, counts, nodes, rule, exits: Vec::new() }
     }
 }
 

@@ -9,6 +9,9 @@ use crate::scene::Scene;
 /// Directions per light of finite size.
 const DIRECTIONS: u32 = 128;
 
+/// Solid angle from which on light that leaves the body finds a light in whatever direction, sr.
+const WIDE: f64 = 3.0;
+
 /// The golden ratio less 1: the integers' multiples of it lie evenly, and with i / n they make Fibonacci's lattice.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
@@ -18,6 +21,16 @@ struct LightDirection {
     light: usize,
     wi: DVec3,
     solid_angle: f64,
+    is_wide: bool,
+}
+
+/// Irradiance that goes in at a point, W/mm^2.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LetIn {
+    /// Of all lights.
+    pub all: f64,
+    /// Of those that are wide.
+    pub wide: f64,
 }
 
 /// Directions that stand for all lights of a scene.
@@ -41,19 +54,23 @@ impl TransmittedLight<'_> {
                     Some(_) => 0.0,
                     None => 1.0,
                 };
-                directions.push(LightDirection { light, wi: sample.wi, solid_angle });
+                let wi = sample.wi;
+                directions.push(LightDirection { light, wi, solid_angle, is_wide: false });
             }
+            let own = directions.len() - count as usize..;
+            let whole: f64 = directions[own.clone()].iter().map(|one| one.solid_angle).sum();
+            let is_wide = !source.is_directional() && whole > WIDE;
+            directions[own].iter_mut().for_each(|one| one.is_wide = is_wide);
         }
         TransmittedLight { scene, directions }
     }
 
-    /// Irradiance that goes in at a point of the boundary, W/mm^2, per band: the integral of radiance times cosine times
-    /// smooth transmittance, the body's own shadow included, all lights. A quadrature: it guides walks and is no part of a
-    /// result.
-    pub(super) fn irradiance(&self, at: &Hit) -> Vec<f64> {
+    /// Irradiance that goes in at a point of the boundary, per band: the integral of radiance times cosine times smooth
+    /// transmittance, the body's own shadow included. A quadrature: it guides walks and is no part of a result.
+    pub(super) fn irradiance(&self, at: &Hit) -> Vec<LetIn> {
         let TransmittedLight { scene, directions } = self;
-        let mut sums = vec![0.0; scene.bands()];
-        for LightDirection { light, wi, solid_angle } in directions {
+        let mut sums = vec![LetIn::default(); scene.bands()];
+        for LightDirection { light, wi, solid_angle, is_wide } in directions {
             let cosine = wi.dot(at.normal);
             let shadow = Ray { origin: at.point, dir: *wi };
             if cosine <= 0.0 || *solid_angle == 0.0 || scene.shape.occluded(&shadow, Some(at.face)) {
@@ -65,7 +82,11 @@ impl TransmittedLight<'_> {
                     boundary => 1.0 - fresnel(cosine, boundary.eta()).reflectance,
                 };
                 let radiance = scene.lights[*light].sampled_radiance(band, *wi);
-                *sum += radiance * solid_angle * cosine * through;
+                let let_in = radiance * solid_angle * cosine * through;
+                sum.all += let_in;
+                if *is_wide {
+                    sum.wide += let_in;
+                }
             }
         }
         sums

@@ -10,6 +10,7 @@
 //! lights, boundary, medium, body -> Importance -> Guidance (one per band) -> GuidedBand (state of a walk)
 //! ```
 
+mod exit;
 mod importance;
 mod incidence;
 mod steered;
@@ -18,7 +19,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::math::DVec3;
-use crate::optics::guided::{GuidedTurns, Pull, diffuse_growth};
+use crate::optics::guided::{GuidedTurns, Pull, StepGuide, diffuse_growth};
 use crate::optics::medium::Medium;
 use crate::scene::Scene;
 
@@ -69,7 +70,7 @@ fn half() -> f64 {
 }
 
 fn most() -> f64 {
-    0.9
+    0.95
 }
 
 fn least_depth() -> f64 {
@@ -121,13 +122,16 @@ impl Guidance {
         aims.into_iter().zip(&scene.medium).map(of_band).collect()
     }
 
-    /// The pull at a point, and phi (0 where nothing is known), of a walk that last came in at a boundary point with this
-    /// normal.
+    /// What guides a step from a point, and phi (0 where nothing is known), of a walk that last came in at a boundary point with
+    /// this normal. In place, since a walk asks at every step.
     #[inline]
-    pub(super) fn at(&self, x: DVec3, normal: DVec3) -> (Pull, f64) {
+    pub(super) fn at(&self, x: DVec3, normal: DVec3, guide: &mut StepGuide) -> f64 {
         match &self.aim {
-            Aim::Normal(growth) => (Pull::new(normal * *growth), 0.0),
-            Aim::Solution(importance) => importance.at(x).unwrap_or((Pull::NONE, 0.0)),
+            Aim::Normal(growth) => {
+                *guide = StepGuide::inner(Pull::new(normal * *growth));
+                0.0
+            }
+            Aim::Solution(importance) => importance.at(x, guide),
         }
     }
 

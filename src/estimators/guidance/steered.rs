@@ -15,7 +15,7 @@ use super::Guidance;
 use crate::estimators::bands::WalkBands;
 use crate::geometry::Ray;
 use crate::math::DVec3;
-use crate::optics::guided::{Heading, Pull};
+use crate::optics::guided::{Heading, StepDraw, StepGuide};
 use crate::optics::medium::Medium;
 use crate::sampling::stream::Stream;
 
@@ -28,14 +28,14 @@ pub(in crate::estimators) struct GuidedBand<'a> {
     ratio: f64,
     /// Of the step that leads on.
     heading: Heading,
-    /// Whether that step is guided; `None` where its direction was given.
-    is_guided: Option<bool>,
+    /// How that step is drawn; `None` where its direction was given.
+    drawn: Option<StepDraw>,
     /// Where the walk last met the boundary, the normal.
     normal: DVec3,
     /// 1 / phi where the walk first came in; 0 where nothing is known there.
     per_entry: f64,
-    /// The last point that was asked for, its pull and phi.
-    last: (DVec3, Pull, f64),
+    /// The last point that was asked for, its guide and phi.
+    last: (DVec3, StepGuide, f64),
 }
 
 impl<'a> GuidedBand<'a> {
@@ -46,20 +46,21 @@ impl<'a> GuidedBand<'a> {
             sigma_t: medium.sigma_t,
             ratio: 1.0,
             heading: Heading::NONE,
-            is_guided: None,
+            drawn: None,
             normal: DVec3::Z,
             per_entry: 0.0,
-            last: (DVec3::NAN, Pull::NONE, 0.0),
+            last: (DVec3::NAN, StepGuide::NONE, 0.0),
         }
     }
 
     #[inline]
-    fn at(&mut self, x: DVec3) -> Pull {
-        if self.last.0 != x {
-            let (pull, phi) = self.guidance.at(x, self.normal);
-            self.last = (x, pull, phi);
+    fn at(&mut self, x: DVec3) -> &StepGuide {
+        let (last, guide, phi) = &mut self.last;
+        if *last != x {
+            *last = x;
+            *phi = self.guidance.at(x, self.normal, guide);
         }
-        self.last.1
+        guide
     }
 }
 
@@ -67,8 +68,8 @@ impl WalkBands for GuidedBand<'_> {
     fn enter(&mut self, at: DVec3, normal: DVec3, dir: DVec3) {
         self.normal = normal;
         self.last.0 = DVec3::NAN;
-        self.heading = Heading::given(self.guidance.share, self.at(at).along(dir));
-        self.is_guided = None;
+        self.heading = Heading::given(self.guidance.share, self.at(at).pull.along(dir));
+        self.drawn = None;
         if self.per_entry == 0.0 && self.last.2 > 0.0 {
             self.per_entry = 1.0 / self.last.2;
         }
@@ -76,26 +77,26 @@ impl WalkBands for GuidedBand<'_> {
 
     #[inline]
     fn draw_turn(&mut self, _: &Medium, arrival: &Ray, stream: &mut Stream) -> DVec3 {
-        let pull = self.at(arrival.origin);
         let Guidance { turns, share, .. } = self.guidance;
-        let (dir, is_guided) = turns.sample_mixed(*share, &pull, arrival.dir, || stream.draw());
-        self.is_guided = Some(is_guided);
+        let guide = self.at(arrival.origin);
+        let (dir, drawn) = turns.sample_mixed(*share, guide, arrival.dir, || stream.draw());
+        self.drawn = Some(drawn);
         dir
     }
 
     #[inline]
     fn draw_flight(&mut self, medium: &Medium, u: f64) -> f64 {
-        let (is_guided, u) = match self.is_guided {
-            Some(is_guided) => (is_guided, u),
+        let (drawn, u) = match self.drawn {
+            Some(drawn) => (drawn, u),
             None => self.heading.choose(u),
         };
-        self.heading.sample_distance(medium.sigma_t, is_guided, u)
+        self.heading.sample_distance(medium.sigma_t, drawn, u)
     }
 
     #[inline]
     fn turn(&mut self, _: &[Medium], at: DVec3, from: DVec3, to: DVec3) {
-        let pull = self.at(at);
-        self.heading = self.guidance.turns.heading(self.guidance.share, &pull, from, to);
+        let Guidance { turns, share, .. } = self.guidance;
+        self.heading = turns.heading(*share, self.at(at), from, to);
     }
 
     #[inline]

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::exit::ExitRule;
 use super::importance::Importance;
 use super::*;
 use crate::estimators::field::{Field, Path};
@@ -12,6 +13,7 @@ use crate::estimators::{Estimator, Layout, Roulette, Scores};
 use crate::geometry::{Ray, Shape, procedural};
 use crate::math::{Frame, exp};
 use crate::optics::boundary::Boundary;
+use crate::optics::guided::Escape;
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::PassKey;
@@ -59,8 +61,14 @@ fn solution(scene: &Scene, nodes: u32) -> Importance {
 
 /// Per mean free path.
 fn gradient(importance: &Importance, x: DVec3) -> DVec3 {
-    let (pull, _) = importance.at(x).expect("a field");
+    let pull = guide(importance, x).pull;
     pull.axis * pull.strength()
+}
+
+fn guide(importance: &Importance, x: DVec3) -> StepGuide {
+    let mut guide = StepGuide::NONE;
+    assert!(importance.at(x, &mut guide) > 0.0, "a field");
+    guide
 }
 
 /// In a sphere under a sky phi = sinh(kappa r) / r: growth coth(kappa r) kappa - 1 / r per length. On coarse and fine
@@ -116,6 +124,34 @@ fn a_flat_box_is_a_slab() {
     }
 }
 
+/// Ways out of a sphere in a sky: along the normal, the more often the more is absorbed and the nearer the boundary is; none
+/// in its middle, in parallel light, and where nothing is absorbed.
+#[test]
+fn ways_out() {
+    let chance = |albedo: f64, boundary: Boundary, light: Light, r: f64| {
+        let scene = scene(SPHERE, boundary, medium(10.0, albedo, 0.0), vec![light]);
+        let dir = DVec3::new(0.48, -0.6, 0.64);
+        let escape = guide(&solution(&scene, 24), dir * r).escape;
+        // A plane is that of another point of its cell, whose diagonal is 0.14.
+        assert!(escape.chance == 0.0 || escape.normal.dot(dir) > 0.98, "{:?}", escape.normal);
+        escape.chance
+    };
+    let at_boundary = [0.8, 0.95, 0.99, 1.0].map(|albedo| chance(albedo, SMOOTH, sky(), 0.999));
+    assert!(at_boundary.is_sorted_by(|a, b| a > b) && at_boundary[3] < 0.01, "{at_boundary:?}");
+    assert!(at_boundary[0] > 0.05 && at_boundary[0] < 0.3, "{at_boundary:?}");
+    assert!(chance(0.8, SMOOTH, sky(), 0.85) < 0.5 * at_boundary[0]);
+    assert_eq!(chance(0.8, SMOOTH, sky(), 0.3), 0.0);
+    assert!(chance(0.8, Boundary::Matched, sky(), 0.999) > 0.05);
+    assert_eq!(chance(0.8, SMOOTH, cap(DVec3::Z, 1e-3, 100.0), 0.99), 0.0);
+    let slab = scene(Shape::Slab { thickness: 1.0 }, SMOOTH, medium(10.0, 0.9, 0.0), vec![sky()]);
+    let slab = solution(&slab, 4);
+    for (z, normal) in [(-0.01, DVec3::Z), (-0.99, -DVec3::Z)] {
+        let Escape { normal: own, chance, .. } = guide(&slab, DVec3::new(0.0, 0.0, z)).escape;
+        assert!(own == normal && chance > 0.05, "{own} {chance}");
+    }
+    assert_eq!(guide(&slab, DVec3::new(0.0, 0.0, -0.5)).escape.chance, 0.0);
+}
+
 /// No light, no field; in parts thinner than a cell there is none, either, and walks are plain.
 #[test]
 fn where_nothing_guides() {
@@ -132,9 +168,19 @@ fn where_nothing_guides() {
     let importance = first(Importance::of_bands(&thin, 4, 0.0));
     let is_lost = |i: u32| {
         let (s, c) = crate::math::sin_cos_turns(f64::from(i) / 100.0);
-        importance.as_ref().is_none_or(|field| field.at(DVec3::new(c, s, 0.0)).is_none())
+        let mut guide = StepGuide::NONE;
+        importance.as_ref().is_none_or(|field| field.at(DVec3::new(c, s, 0.0), &mut guide) == 0.0)
     };
     assert!((0..100).any(is_lost), "a grid of 4 nodes resolves a ring of 0.01");
+}
+
+/// What would be right in a half-space, with a way out wherever z > -1.
+fn half_space(scene: &Scene, growth: f64) -> Aim {
+    let rule = ExitRule::of(scene, 0);
+    let exit = rule.exit(DVec3::Z, DVec3::Z, 3.0, 1.0);
+    assert!(exit.is_some_and(|exit| exit.parts().1 > 0.02));
+    let pull = Pull::new(DVec3::Z * growth);
+    Aim::Solution(Importance::HalfSpace { kappa: 2.0 * growth, pull, rule, exit })
 }
 
 /// Paths of a given field.
@@ -184,10 +230,7 @@ fn wrong_guides_do_not_bias() {
             let path = PathTracer::new(Arc::clone(&scene), Roulette::default()).expect("a scene for it");
             let name = format!("wrong_guides_do_not_bias {g} {boundary:?}");
             let (plain, _) = measure(&path, &layout, 1500, &name);
-            let constant = |growth: f64| {
-                let pull = Pull::new(DVec3::Z * growth);
-                Aim::Solution(Importance::HalfSpace { kappa: 2.0 * growth, pull })
-            };
+            let constant = |growth: f64| half_space(&scene, growth);
             let aims = [
                 ("right", Aim::Solution(solution(&scene, 16)), 0.9),
                 ("another body's", constant(0.5), 0.8),
@@ -223,7 +266,7 @@ fn furnace() {
     for (g, share) in [(0.0, 0.5), (0.7, 0.5)] {
         let scene = scene(SPHERE, SMOOTH, medium(5.0, 1.0, g), vec![sky()]);
         let layout = Layout::new(&scene);
-        let aim = Aim::Solution(Importance::HalfSpace { kappa: 1.0, pull: Pull::new(DVec3::Z * 0.2) });
+        let aim = half_space(&scene, 0.2);
         let turns = GuidedTurns::new(scene.medium[0].phase, 1.0);
         let guidance = Guidance { share, turns, aim };
         let field = Field::new(Arc::clone(&scene), Roulette::default()).guided_by(&guidance);

@@ -20,6 +20,7 @@ use crate::estimators::walk::Rivals;
 use crate::estimators::{Layout, TransportClass, WalkDraw};
 use crate::geometry::{Ray, Shape, Side};
 use crate::math::DVec3;
+use crate::optics::guided::StepGuide;
 use crate::optics::medium::Medium;
 use crate::sampling::distance::transmittance;
 use crate::sampling::stream::StreamKey;
@@ -355,8 +356,9 @@ fn guided_over_plain(snee: &Snee, path: &FixedPath, course: Course) -> [f64; 5] 
     for step in points.windows(3) {
         let [from, at, to] = [step[0], step[1], step[2]];
         let [arrival, dir] = [(at - from).normalize(), (to - at).normalize()];
-        let (pull, _) = guidance.at(at, DVec3::Z);
-        let heading = guidance.turns.heading(guidance.share, &pull, arrival, dir);
+        let mut guide = StepGuide::NONE;
+        guidance.at(at, DVec3::Z, &mut guide);
+        let heading = guidance.turns.heading(guidance.share, &guide, arrival, dir);
         let t = (to - at).length();
         let is_last = to == path.exit.hit.point;
         let flown =
@@ -442,9 +444,10 @@ fn weights_at_a_matched_boundary_sum_to_one() {
         let on = Path { field: &snee.field, band: 0, index: 0, key: &pass };
         let ray = Ray { origin: path.x_i, dir: path.w_l };
         let hit = scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY).expect("a finite body");
-        let (pull, _) = guidance.at(path.x_i, DVec3::Z);
+        let mut guide = StepGuide::NONE;
+        guidance.at(path.x_i, DVec3::Z, &mut guide);
         let arrival = (path.x_i - path.start).normalize();
-        let heading = guidance.turns.heading(guidance.share, &pull, arrival, path.w_l);
+        let heading = guidance.turns.heading(guidance.share, &guide, arrival, path.w_l);
         let of_guide = heading.passage_ratio(2.0, hit.t);
         let mut scores = Scores::new(Layout::new(&scene));
         let plain = CameraWalk::led(on, &mut scores, Unrivalled, OneBand, path.start);

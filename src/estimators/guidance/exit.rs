@@ -1,0 +1,88 @@
+//! Where light leaves the body near a point.
+//!
+//! Diffusion knows the boundary by its mean: phi there is what a photon finds that may leave, be reflected, or scatter
+//! again. One that meets the boundary inside the cone that refraction lets out finds s, the light itself, which is more;
+//! one outside of the cone is reflected and finds less. For a walk this is the difference between an end and a detour, and most
+//! of the variance that a guide leaves. So near the boundary some guided steps are escapes ([`Escape`]). With
+//!   x = s / phi - 1   at the boundary,   P = (1 - cos_c) / 2   (the cone's share of all directions),
+//! an escape is worth P x e^{-tau / mu} more, tau being the depth in mean free paths, mu near 0.85, than what phi has of it; it
+//! takes half of that as its share y / (1 + y), y = P x / 2, since the guide takes the cone as well. Under forward
+//! scattering, where most of them turn too far, y has the factor 1 - g. The half is measured; weights know the chance,
+//! whatever it is, and larger ones make them grow from step to step.
+//! e^{-tau / mu} is written as the square of a square, which ends.
+
+use crate::math::DVec3;
+use crate::optics::boundary::Boundary;
+use crate::optics::guided::Escape;
+use crate::scene::Scene;
+
+/// Depth from which on there are no escapes, mean free paths.
+pub(super) const REACH: f64 = 4.0;
+
+/// The boundary near a point, as a plane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Exit {
+    /// Outwards.
+    normal: DVec3,
+    /// Of the plane, along the normal.
+    offset: f64,
+    /// Chance of an escape at the plane.
+    chance: f64,
+}
+
+/// What exits of one band have in common.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ExitRule {
+    least_cosine: f64,
+    sigma_t: f64,
+    /// y / x.
+    per_gain: f64,
+}
+
+impl ExitRule {
+    pub(super) fn of(scene: &Scene, band: usize) -> ExitRule {
+        let eta = match scene.boundary[band] {
+            Boundary::Matched => 1.0,
+            boundary => boundary.eta(),
+        };
+        let least_cosine = (1.0 - 1.0 / (eta * eta)).max(0.0).sqrt();
+        let medium = &scene.medium[band];
+        let per_gain = 0.25 * (1.0 - least_cosine) * (1.0 - medium.phase.g.abs());
+        ExitRule { least_cosine, sigma_t: medium.sigma_t, per_gain }
+    }
+
+    /// At a plane through `at`, where phi is `phi` and light that leaves finds `found`; `None` where that is no gain.
+    pub(super) fn exit(&self, at: DVec3, normal: DVec3, found: f64, phi: f64) -> Option<Exit> {
+        let y = self.per_gain * (found / phi - 1.0);
+        (y > 0.0 && y.is_finite()).then(|| Exit {
+            normal,
+            offset: normal.dot(at),
+            chance: y / (1.0 + y),
+        })
+    }
+
+    /// From a point inside.
+    #[inline]
+    pub(super) fn escape(&self, exit: &Exit, x: DVec3) -> Escape {
+        let depth = exit.depth(x).max(0.0) * self.sigma_t;
+        let part = (1.0 - depth * (1.0 / REACH)).max(0.0);
+        let chance = exit.chance * ((part * part) * (part * part));
+        Escape { normal: exit.normal, least_cosine: self.least_cosine, chance }
+    }
+}
+
+impl Exit {
+    /// Below the plane, mm.
+    #[inline]
+    pub(super) fn depth(&self, x: DVec3) -> f64 {
+        self.offset - self.normal.dot(x)
+    }
+}
+
+#[cfg(test)]
+impl Exit {
+    /// Unit normal and the chance at the plane.
+    pub(super) fn parts(&self) -> (DVec3, f64) {
+        (self.normal, self.chance)
+    }
+}
