@@ -51,9 +51,10 @@ pub(super) trait WalkBands: Clone {
     /// A change of direction at a medium vertex.
     fn turn(&mut self, media: &[Medium], at: DVec3, from: DVec3, to: DVec3);
 
-    /// Whether a path follows both what the boundary reflects and what it refracts where it first meets it.
+    /// Whether the boundary is worth more than one sample: both what it reflects and what it refracts are followed where the
+    /// path first meets it, and one direction is chosen out of several facets.
     #[inline]
-    fn splits_at_entry(&self) -> bool {
+    fn refines_boundary(&self) -> bool {
         false
     }
 

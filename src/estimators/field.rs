@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::choice::light_shares;
+use super::choice::{light_shares, shares_of_uneven};
 use super::guidance::{Guidance, WalkDraw};
 use super::roulette::Roulette;
 use crate::geometry::BoundingSphere;
@@ -33,6 +33,11 @@ impl Field {
     /// The same with walks that are drawn in this way.
     pub(super) fn with_walks(scene: Arc<Scene>, roulette: Roulette, draw: WalkDraw) -> Field {
         Field { guidance: Guidance::of_bands(&scene, draw), ..Field::new(scene, roulette) }
+    }
+
+    /// The same without light sampling of lights that are even.
+    pub(super) fn finding_even_lights(self) -> Field {
+        Field { choice: shares_of_uneven(&self.scene), ..self }
     }
 
     /// What guides the walks of a band; `None` where they are plain.

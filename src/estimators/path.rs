@@ -45,6 +45,9 @@ pub struct PathOptions {
     /// How walks are drawn inside the body; all ways are unbiased.
     #[serde(default)]
     pub walk: WalkDraw,
+    /// Whether lights that are even, 4 pi int L^2 / (int L)^2 < 2, are sampled as well as found by the directions that the
+    /// boundary draws; by default where walks are not guided.
+    pub sample_even_lights: Option<bool>,
 }
 
 /// The estimator, for one scene.
@@ -68,7 +71,7 @@ impl PathTracer {
     /// # Errors
     /// A scene that it does not serve.
     pub fn new(scene: Arc<Scene>, roulette: Roulette) -> Result<PathTracer> {
-        PathTracer::with_options(scene, &PathOptions { roulette, walk: WalkDraw::Plain {} })
+        PathTracer::with_options(scene, &PathOptions { roulette, ..PathOptions::default() })
     }
 
     /// For a scene.
@@ -77,7 +80,9 @@ impl PathTracer {
     /// A scene that it does not serve.
     pub fn with_options(scene: Arc<Scene>, options: &PathOptions) -> Result<PathTracer> {
         PathTracer::KIND.check(&scene)?;
-        Ok(PathTracer { field: Field::with_walks(scene, options.roulette, options.walk) })
+        let field = Field::with_walks(scene, options.roulette, options.walk);
+        let samples_even = options.sample_even_lights.unwrap_or(!options.walk.is_guided());
+        Ok(PathTracer { field: if samples_even { field } else { field.finding_even_lights() } })
     }
 }
 

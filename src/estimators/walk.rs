@@ -264,7 +264,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
 
     /// Runs from a first hit until the path ends.
     fn run(mut self, hit: Hit) -> u64 {
-        if self.bands.splits_at_entry() && !self.matched() {
+        if self.bands.refines_boundary() && !self.matched() {
             self.follow_both(&hit);
         } else if let Some(side) = self.cross(&hit, Side::Outside) {
             self.follow(hit, side);
@@ -289,11 +289,11 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// mostly takes a ray, a walk inside many; chosen by chance, the two differ by more than guided walks do.
     fn follow_both(&mut self, hit: &Hit) {
         let Some((frame, wo)) = self.meet(hit, Side::Outside) else { return };
-        let u = self.stream.draw2();
+        let samples = self.boundary.sample_both(wo, self.stream.draw3());
         let (ray, from, exit) = (self.ray, self.from, self.exit);
         let (throughput, survival) = (self.throughput, self.survival);
         let (history, measure, bands) = (self.history, self.measure, self.bands.clone());
-        for sample in self.boundary.sample_both(wo, u).into_iter().flatten() {
+        for sample in samples.into_iter().flatten() {
             if let Some(side) = self.leave(hit, Side::Outside, &frame, sample) {
                 self.follow(*hit, side);
             }
@@ -446,7 +446,12 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             return Some(other(side)); // direction and competition stay as they are
         }
         let (frame, wo) = self.meet(hit, side)?;
-        let sample = self.boundary.sample(wo, self.stream.draw3())?;
+        let u = self.stream.draw3();
+        let sample = if self.bands.refines_boundary() {
+            self.boundary.sample_of_several(wo, u)?
+        } else {
+            self.boundary.sample(wo, u)?
+        };
         self.leave(hit, side, &frame, sample)
     }
 

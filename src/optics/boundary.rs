@@ -18,6 +18,7 @@
 use super::fresnel::fresnel;
 use super::microfacet::Microfacets;
 use crate::math::DVec3;
+use crate::sampling::discrete::{choose, choose_share};
 
 /// The surface, one band.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,6 +70,41 @@ pub struct BoundarySample {
     pub event: Event,
 }
 
+/// Facets out of which one is chosen.
+const FACETS: usize = 3;
+
+/// The golden ratio less 1: its multiples spread evenly over the unit interval.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// Where facets send light, of one lobe.
+#[derive(Clone, Copy)]
+struct Lobe {
+    facets: usize,
+    weights: [f64; FACETS],
+    directions: [DVec3; FACETS],
+}
+
+impl Lobe {
+    fn of(facets: usize) -> Lobe {
+        Lobe { facets, weights: [0.0; FACETS], directions: [DVec3::Z; FACETS] }
+    }
+
+    /// Mean over the facets.
+    fn weight(&self) -> f64 {
+        self.weights.iter().sum::<f64>() / self.facets as f64
+    }
+
+    /// One direction, in proportion to its weight; `None` where none weighs anything.
+    fn choose(&self, u: f64) -> Option<DVec3> {
+        let sum: f64 = self.weights.iter().sum();
+        if sum == 0.0 {
+            return None;
+        }
+        let (index, _) = choose_share(self.weights.iter().map(|weight| weight / sum), u)?;
+        Some(self.directions[index])
+    }
+}
+
 impl Boundary {
     /// Draws `wi` for `wo`; `u[0]` chooses the lobe. `None`: the microfacet sends the light into the
     /// surface, the sample scores 0 (what multiple scattering between facets would carry is lost).
@@ -79,24 +115,64 @@ impl Boundary {
             return Some(BoundarySample { wi: -wo, weight, density, event: Event::Refract });
         };
         let (wi, event) = split(wo, h, relative, u[0]);
-        self.of_lobe(wo, wi, event)
+        let shadowing = self.shadowing(wo, wi, event)?;
+        Some(self.sample_of(wo, wi, event, shadowing))
     }
 
-    /// Both lobes of one facet in place of a choice: reflection and refraction, each weighing what [`Self::sample`] gives it
-    /// times its probability; without what weighs nothing or fails. The densities are those of [`Self::sample`]: weights of
-    /// the balance heuristic may use them, since they need but sum to 1.
-    #[inline]
-    pub fn sample_both(&self, wo: DVec3, u: [f64; 2]) -> [Option<BoundarySample>; 2] {
-        let Some((h, relative)) = self.facet(wo, u) else { return [None, self.sample(wo, [0.0; 3])] };
-        let reflectance = fresnel(wo.dot(h), relative).reflectance;
-        [(reflectance, 0.0), (1.0 - reflectance, 1.0)].map(|(probability, choice)| {
-            if probability == 0.0 {
-                return None;
+    /// The same out of several facets, which a rough surface has, and both lobes of each: one direction in proportion to its
+    /// weight, with the mean weight of a facet. Its density is that of [`Self::sample`]: weights of the balance heuristic may
+    /// use it, since they need but sum to 1.
+    pub fn sample_of_several(&self, wo: DVec3, u: [f64; 3]) -> Option<BoundarySample> {
+        if self.is_delta() {
+            return self.sample(wo, u);
+        }
+        let [reflections, refractions] = self.lobes(wo, [u[1], u[2]]);
+        let [reflected, refracted] = [&reflections, &refractions].map(Lobe::weight);
+        let sum = reflected + refracted;
+        if sum == 0.0 {
+            return None;
+        }
+        let (reflects, u) = choose(u[0], reflected / sum);
+        let (lobe, event) =
+            if reflects { (reflections, Event::Reflect) } else { (refractions, Event::Refract) };
+        Some(self.sample_of(wo, lobe.choose(u)?, event, sum))
+    }
+
+    /// Both lobes in place of a choice between them, each out of several facets where the surface has them: reflection and
+    /// refraction, weighing together what [`Self::sample_of_several`] weighs; without what weighs nothing or fails.
+    pub fn sample_both(&self, wo: DVec3, u: [f64; 3]) -> [Option<BoundarySample>; 2] {
+        if *self == Boundary::Matched {
+            return [None, self.sample(wo, u)];
+        }
+        let of_lobe = |(lobe, event): (Lobe, Event)| {
+            let wi = lobe.choose(u[0])?;
+            Some(self.sample_of(wo, wi, event, lobe.weight()))
+        };
+        let [reflections, refractions] = self.lobes(wo, [u[1], u[2]]);
+        [(reflections, Event::Reflect), (refractions, Event::Refract)].map(of_lobe)
+    }
+
+    /// Where several facets reflect and refract `wo`. They are the points of a lattice that `u` shifts, each of them
+    /// uniform, and together spread evenly, so that their mean varies less than that of independent ones.
+    fn lobes(&self, wo: DVec3, u: [f64; 2]) -> [Lobe; 2] {
+        let count = if self.is_delta() { 1 } else { FACETS };
+        let mut lobes = [Lobe::of(count), Lobe::of(count)];
+        for facet in 0..count {
+            let i = facet as f64;
+            let shifted = [(u[0] + i / count as f64).fract(), (u[1] + i * GOLDEN).fract()];
+            let Some((h, relative)) = self.facet(wo, shifted) else { continue };
+            let reflectance = fresnel(wo.dot(h), relative).reflectance;
+            // `split` reflects at 0, where there is reflection, and refracts at 1.
+            let choices = [(reflectance, 0.0), (1.0 - reflectance, 1.0)];
+            for (lobe, (probability, choice)) in lobes.iter_mut().zip(choices) {
+                if probability > 0.0 {
+                    let (wi, event) = split(wo, h, relative, choice);
+                    lobe.directions[facet] = wi;
+                    lobe.weights[facet] = probability * self.shadowing(wo, wi, event).unwrap_or(0.0);
+                }
             }
-            let (wi, event) = split(wo, h, relative, choice);
-            let sample = self.of_lobe(wo, wi, event)?;
-            Some(BoundarySample { weight: probability * sample.weight, ..sample })
-        })
+        }
+        lobes
     }
 
     /// The normal of the facet that `wo` meets, and the index of the far side over that of the side of `wo`; `None` where there
@@ -114,22 +190,25 @@ impl Boundary {
         }
     }
 
-    /// A direction that a facet sends `wo` to, with the lobe chosen by its probability.
+    /// G1 of a direction that a facet sends `wo` to; `None` where that is on the wrong side of the surface.
     #[inline]
-    fn of_lobe(&self, wo: DVec3, wi: DVec3, event: Event) -> Option<BoundarySample> {
-        let radiance =
-            if event == Event::Refract { 1.0 / square(side_eta(self.eta(), wo)) } else { 1.0 };
-        let Boundary::Rough { eta, ref facets } = *self else {
-            return Some(BoundarySample { wi, weight: radiance, density: Density::Delta, event });
-        };
+    fn shadowing(&self, wo: DVec3, wi: DVec3, event: Event) -> Option<f64> {
+        let Boundary::Rough { ref facets, .. } = *self else { return Some(1.0) };
         let sign = 1f64.copysign(wo.z);
         let expected_side = if event == Event::Reflect { sign } else { -sign };
-        if wi.z * expected_side <= 0.0 {
-            return None;
-        }
-        let (_, pdf) = rough(eta, facets, wo, wi);
-        let weight = facets.g1(wi) * radiance;
-        Some(BoundarySample { wi, weight, density: Density::Finite(pdf), event })
+        (wi.z * expected_side > 0.0).then(|| facets.g1(wi))
+    }
+
+    /// With this weight beside the squared index of refraction that radiance has.
+    #[inline]
+    fn sample_of(&self, wo: DVec3, wi: DVec3, event: Event, weight: f64) -> BoundarySample {
+        let radiance =
+            if event == Event::Refract { 1.0 / square(side_eta(self.eta(), wo)) } else { 1.0 };
+        let density = match *self {
+            Boundary::Rough { eta, ref facets } => Density::Finite(rough(eta, facets, wo, wi).1),
+            _ => Density::Delta,
+        };
+        BoundarySample { wi, weight: weight * radiance, density, event }
     }
 
     /// f |cos_i| (1/sr) and the density of `wi` given `wo` (1/sr), both without delta lobes: the pair
@@ -322,6 +401,7 @@ mod tests {
     use super::*;
     use crate::math::{Integral, integrate, sin_cos_turns};
     use crate::optics::microfacet::MicrofacetKind;
+    use crate::sampling::stream::{Purpose, StreamKey};
     use std::f64::consts::PI;
 
     fn direction(cos: f64, phi: f64) -> DVec3 {
@@ -353,33 +433,51 @@ mod tests {
         (0..n).map(move |i| (f64::from(i) + 0.43) / f64::from(n))
     }
 
-    /// Both lobes of a facet are what a choice between them gives on average.
+    /// Several facets, and both lobes of each, are what one facet gives on average: weight, and a direction weighted by it;
+    /// with densities that are those of the directions.
     #[test]
-    fn both_lobes_are_the_mean_of_a_choice() {
-        const CHOICES: u32 = 4000;
+    fn several_facets_are_the_mean_of_one() {
         let smooth = [Boundary::Smooth { eta: 1.4 }, Boundary::Smooth { eta: 0.7 }, Boundary::Matched];
+        let mut stream = StreamKey::named("several_facets").pass(0).stream(0, Purpose::Walk);
         for surface in rough_surfaces().chain(smooth) {
             for cos in [0.95, 0.4, 0.1, -0.1, -0.4, -0.95] {
                 let wo = direction(cos, 0.21);
-                for u in [[0.3, 0.9], [0.8, 0.2]] {
-                    let mut mean = [(0.0, DVec3::ZERO, None); 2];
-                    for choice in grid(CHOICES) {
-                        let Some(s) = surface.sample(wo, [choice, u[0], u[1]]) else { continue };
-                        let lobe = &mut mean[usize::from(s.event == Event::Refract)];
-                        lobe.0 += s.weight / f64::from(CHOICES);
-                        (lobe.1, lobe.2) = (s.wi, Some(s.density));
-                    }
-                    for ((weight, wi, density), both) in mean.into_iter().zip(surface.sample_both(wo, u))
-                    {
-                        let own = both.map_or(0.0, |s| s.weight);
-                        // The choice is counted to a step of its grid.
-                        assert!(
-                            (own - weight).abs() < 2.5 / f64::from(CHOICES),
-                            "{surface:?} {cos} {u:?}"
-                        );
-                        if let (Some(density), Some(s)) = (density, both) {
-                            assert_eq!((s.wi, s.density), (wi, density));
+                // Per way of sampling and lobe: weight, weight times x, weight times z; sums and squares.
+                let mut sums = [[[[0.0; 2]; 3]; 2]; 3];
+                const COUNT: usize = 4000;
+                for _ in 0..COUNT {
+                    let u = stream.draw3();
+                    let several = surface.sample_of_several(wo, stream.draw3());
+                    let [a, b] = surface.sample_both(wo, stream.draw3());
+                    let drawn = [[surface.sample(wo, u), None], [several, None], [a, b]];
+                    for (sums, drawn) in sums.iter_mut().zip(drawn) {
+                        for s in drawn.into_iter().flatten() {
+                            let own = match surface {
+                                Boundary::Rough { .. } => Density::Finite(surface.eval(wo, s.wi).1),
+                                _ => Density::Delta,
+                            };
+                            assert_eq!(s.density, own);
+                            let values = [s.weight, s.weight * s.wi.x, s.weight * s.wi.z];
+                            for (sum, x) in
+                                sums[usize::from(s.event == Event::Refract)].iter_mut().zip(values)
+                            {
+                                sum[0] += x;
+                                sum[1] += x * x;
+                            }
                         }
+                    }
+                }
+                let count = COUNT as f64;
+                let mean = |[sum, squares]: [f64; 2]| {
+                    let mean = sum / count;
+                    (mean, (squares / count - mean * mean).max(0.0) / count)
+                };
+                let [one, others @ ..] = sums;
+                for other in others {
+                    for (own, other) in one.iter().flatten().zip(other.iter().flatten()) {
+                        let [(a, a2), (b, b2)] = [mean(*own), mean(*other)];
+                        let error = (a2 + b2).sqrt() + 1e-12;
+                        assert!((a - b).abs() < 5.5 * error, "{surface:?} {cos}: {a} {b} {error}");
                     }
                 }
             }

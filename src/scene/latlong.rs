@@ -153,6 +153,18 @@ impl LatLong {
     pub fn strength(&self, band: usize) -> f64 {
         self.bands[band].strength
     }
+
+    /// 4 pi int L^2 / (int L)^2.
+    pub fn concentration(&self, band: usize) -> f64 {
+        let radiance = &self.bands[band].radiance;
+        let (mut strength, mut squares) = (0.0, 0.0);
+        for (texel, value) in radiance.iter().enumerate() {
+            let weight = self.weight(radiance, texel);
+            strength += weight;
+            squares += weight * value;
+        }
+        4.0 * PI * squares / (strength * strength)
+    }
 }
 
 /// A bright part of a map, in one band, drawn by itself.

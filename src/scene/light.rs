@@ -61,6 +61,14 @@ impl Light {
         }
     }
 
+    /// 4 pi int L^2 / (int L)^2 of the whole light, a map included, in one band.
+    pub(crate) fn whole_concentration(&self, band: usize) -> f64 {
+        match &self.emission {
+            Emission::Map(map) => map.concentration(band),
+            _ => self.concentration(),
+        }
+    }
+
     /// Draws a direction towards the light.
     #[inline]
     pub fn sample(&self, band: usize, u: [f64; 2]) -> LightSample {

@@ -65,6 +65,13 @@ impl Default for WalkDraw {
     }
 }
 
+impl WalkDraw {
+    /// By a solution in the body.
+    pub(super) fn is_guided(&self) -> bool {
+        matches!(self, WalkDraw::Guided { .. })
+    }
+}
+
 fn half() -> f64 {
     0.5
 }

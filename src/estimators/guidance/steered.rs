@@ -109,7 +109,7 @@ impl WalkBands for GuidedBand<'_> {
     }
 
     #[inline]
-    fn splits_at_entry(&self) -> bool {
+    fn refines_boundary(&self) -> bool {
         true
     }
 

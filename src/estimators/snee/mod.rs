@@ -138,7 +138,10 @@ impl Snee {
         };
         let count = if options.share_bands { 1 } else { scene.bands() };
         let setups = (0..count).map(setup).collect();
-        let field = Field::with_walks(scene, options.roulette, options.walk);
+        let mut field = Field::with_walks(scene, options.roulette, options.walk);
+        if options.walk.is_guided() && options.strategies.bsdf {
+            field = field.finding_even_lights();
+        }
         Ok(Snee { field, options, setups })
     }
 }

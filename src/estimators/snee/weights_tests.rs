@@ -24,6 +24,7 @@ use crate::optics::guided::StepGuide;
 use crate::optics::medium::Medium;
 use crate::sampling::distance::transmittance;
 use crate::sampling::stream::StreamKey;
+use crate::scene::Light;
 
 /// Ways of making the end of a path, in the order of all arrays here.
 const TECHNIQUES: [&str; 5] = ["bsdf", "light", "top to bottom", "bottom to top", "last vertex"];
@@ -468,14 +469,19 @@ fn matched_weights<B: super::super::bands::WalkBands>(
 ) {
     walk.lead_to(path.x_i, false);
     let scene = walk.scene;
-    let all: f64 = scene.lights.iter().map(|light| light.strength(0)).sum();
+    // The sky is even: it is found by directions alone.
+    let sampled = |light: &Light| if light.concentration() < 2.0 { 0.0 } else { light.strength(0) };
+    let all: f64 = scene.lights.iter().map(sampled).sum();
     let own =
         walk.medium.phase.pdf(walk.ray.dir.dot(path.w_l)) * transmittance(walk.medium.sigma_t, length);
     let light = &scene.lights[path.light];
-    let by_light = light.strength(0) / all * light.eval(0, path.w_l).1;
+    let by_light = sampled(light) / all * light.eval(0, path.w_l).1;
     let f = walk.throughput * own * path.radiance;
     let mut sum = 0.0;
     for (is_own, density) in [(true, own * over_plain), (false, by_light)] {
+        if density == 0.0 {
+            continue;
+        }
         walk.scores.clear();
         if is_own {
             walk.score_own_sample(path.w_l);
