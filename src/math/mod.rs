@@ -34,6 +34,9 @@ portable! {
     ln_gamma = lgamma: "Logarithm of |Gamma(x)|.";
 }
 
+/// The golden ratio less 1: its multiples spread evenly over the unit interval, and with i / n they make Fibonacci's lattice.
+pub const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
 /// x y + z rounded once, in software: the exact remainder of a product. Slow, and the same everywhere.
 pub fn fma(x: f64, y: f64, z: f64) -> f64 {
     libm::fma(x, y, z)

@@ -18,7 +18,9 @@
 use super::fresnel::fresnel;
 use super::microfacet::Microfacets;
 use crate::math::DVec3;
-use crate::sampling::discrete::{choose, choose_share};
+
+#[path = "boundary_facets.rs"]
+mod facets;
 
 /// The surface, one band.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,41 +72,6 @@ pub struct BoundarySample {
     pub event: Event,
 }
 
-/// Facets out of which one is chosen.
-const FACETS: usize = 3;
-
-/// The golden ratio less 1: its multiples spread evenly over the unit interval.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
-
-/// Where facets send light, of one lobe.
-#[derive(Clone, Copy)]
-struct Lobe {
-    facets: usize,
-    weights: [f64; FACETS],
-    directions: [DVec3; FACETS],
-}
-
-impl Lobe {
-    fn of(facets: usize) -> Lobe {
-        Lobe { facets, weights: [0.0; FACETS], directions: [DVec3::Z; FACETS] }
-    }
-
-    /// Mean over the facets.
-    fn weight(&self) -> f64 {
-        self.weights.iter().sum::<f64>() / self.facets as f64
-    }
-
-    /// One direction, in proportion to its weight; `None` where none weighs anything.
-    fn choose(&self, u: f64) -> Option<DVec3> {
-        let sum: f64 = self.weights.iter().sum();
-        if sum == 0.0 {
-            return None;
-        }
-        let (index, _) = choose_share(self.weights.iter().map(|weight| weight / sum), u)?;
-        Some(self.directions[index])
-    }
-}
-
 impl Boundary {
     /// Draws `wi` for `wo`; `u[0]` chooses the lobe. `None`: the microfacet sends the light into the
     /// surface, the sample scores 0 (what multiple scattering between facets would carry is lost).
@@ -117,62 +84,6 @@ impl Boundary {
         let (wi, event) = split(wo, h, relative, u[0]);
         let shadowing = self.shadowing(wo, wi, event)?;
         Some(self.sample_of(wo, wi, event, shadowing))
-    }
-
-    /// The same out of several facets, which a rough surface has, and both lobes of each: one direction in proportion to its
-    /// weight, with the mean weight of a facet. Its density is that of [`Self::sample`]: weights of the balance heuristic may
-    /// use it, since they need but sum to 1.
-    pub fn sample_of_several(&self, wo: DVec3, u: [f64; 3]) -> Option<BoundarySample> {
-        if self.is_delta() {
-            return self.sample(wo, u);
-        }
-        let [reflections, refractions] = self.lobes(wo, [u[1], u[2]]);
-        let [reflected, refracted] = [&reflections, &refractions].map(Lobe::weight);
-        let sum = reflected + refracted;
-        if sum == 0.0 {
-            return None;
-        }
-        let (reflects, u) = choose(u[0], reflected / sum);
-        let (lobe, event) =
-            if reflects { (reflections, Event::Reflect) } else { (refractions, Event::Refract) };
-        Some(self.sample_of(wo, lobe.choose(u)?, event, sum))
-    }
-
-    /// Both lobes in place of a choice between them, each out of several facets where the surface has them: reflection and
-    /// refraction, weighing together what [`Self::sample_of_several`] weighs; without what weighs nothing or fails.
-    pub fn sample_both(&self, wo: DVec3, u: [f64; 3]) -> [Option<BoundarySample>; 2] {
-        if *self == Boundary::Matched {
-            return [None, self.sample(wo, u)];
-        }
-        let of_lobe = |(lobe, event): (Lobe, Event)| {
-            let wi = lobe.choose(u[0])?;
-            Some(self.sample_of(wo, wi, event, lobe.weight()))
-        };
-        let [reflections, refractions] = self.lobes(wo, [u[1], u[2]]);
-        [(reflections, Event::Reflect), (refractions, Event::Refract)].map(of_lobe)
-    }
-
-    /// Where several facets reflect and refract `wo`. They are the points of a lattice that `u` shifts, each of them
-    /// uniform, and together spread evenly, so that their mean varies less than that of independent ones.
-    fn lobes(&self, wo: DVec3, u: [f64; 2]) -> [Lobe; 2] {
-        let count = if self.is_delta() { 1 } else { FACETS };
-        let mut lobes = [Lobe::of(count), Lobe::of(count)];
-        for facet in 0..count {
-            let i = facet as f64;
-            let shifted = [(u[0] + i / count as f64).fract(), (u[1] + i * GOLDEN).fract()];
-            let Some((h, relative)) = self.facet(wo, shifted) else { continue };
-            let reflectance = fresnel(wo.dot(h), relative).reflectance;
-            // `split` reflects at 0, where there is reflection, and refracts at 1.
-            let choices = [(reflectance, 0.0), (1.0 - reflectance, 1.0)];
-            for (lobe, (probability, choice)) in lobes.iter_mut().zip(choices) {
-                if probability > 0.0 {
-                    let (wi, event) = split(wo, h, relative, choice);
-                    lobe.directions[facet] = wi;
-                    lobe.weights[facet] = probability * self.shadowing(wo, wi, event).unwrap_or(0.0);
-                }
-            }
-        }
-        lobes
     }
 
     /// The normal of the facet that `wo` meets, and the index of the far side over that of the side of `wo`; `None` where there
@@ -401,16 +312,15 @@ mod tests {
     use super::*;
     use crate::math::{Integral, integrate, sin_cos_turns};
     use crate::optics::microfacet::MicrofacetKind;
-    use crate::sampling::stream::{Purpose, StreamKey};
     use std::f64::consts::PI;
 
-    fn direction(cos: f64, phi: f64) -> DVec3 {
+    pub(super) fn direction(cos: f64, phi: f64) -> DVec3 {
         let sin = (1.0 - cos * cos).sqrt();
         let (s, c) = sin_cos_turns(phi);
         DVec3::new(sin * c, sin * s, cos)
     }
 
-    fn rough_surfaces() -> impl Iterator<Item = Boundary> {
+    pub(super) fn rough_surfaces() -> impl Iterator<Item = Boundary> {
         [MicrofacetKind::Ggx, MicrofacetKind::Beckmann].into_iter().flat_map(|kind| {
             [(1.3, 0.2), (1.5, 0.04), (1.5, 0.5), (0.8, 0.3)]
                 .map(|(eta, alpha)| Boundary::Rough { eta, facets: Microfacets { kind, alpha } })
@@ -431,57 +341,6 @@ mod tests {
 
     fn grid(n: u32) -> impl Iterator<Item = f64> {
         (0..n).map(move |i| (f64::from(i) + 0.43) / f64::from(n))
-    }
-
-    /// Several facets, and both lobes of each, are what one facet gives on average: weight, and a direction weighted by it;
-    /// with densities that are those of the directions.
-    #[test]
-    fn several_facets_are_the_mean_of_one() {
-        let smooth = [Boundary::Smooth { eta: 1.4 }, Boundary::Smooth { eta: 0.7 }, Boundary::Matched];
-        let mut stream = StreamKey::named("several_facets").pass(0).stream(0, Purpose::Walk);
-        for surface in rough_surfaces().chain(smooth) {
-            for cos in [0.95, 0.4, 0.1, -0.1, -0.4, -0.95] {
-                let wo = direction(cos, 0.21);
-                // Per way of sampling and lobe: weight, weight times x, weight times z; sums and squares.
-                let mut sums = [[[[0.0; 2]; 3]; 2]; 3];
-                const COUNT: usize = 4000;
-                for _ in 0..COUNT {
-                    let u = stream.draw3();
-                    let several = surface.sample_of_several(wo, stream.draw3());
-                    let [a, b] = surface.sample_both(wo, stream.draw3());
-                    let drawn = [[surface.sample(wo, u), None], [several, None], [a, b]];
-                    for (sums, drawn) in sums.iter_mut().zip(drawn) {
-                        for s in drawn.into_iter().flatten() {
-                            let own = match surface {
-                                Boundary::Rough { .. } => Density::Finite(surface.eval(wo, s.wi).1),
-                                _ => Density::Delta,
-                            };
-                            assert_eq!(s.density, own);
-                            let values = [s.weight, s.weight * s.wi.x, s.weight * s.wi.z];
-                            for (sum, x) in
-                                sums[usize::from(s.event == Event::Refract)].iter_mut().zip(values)
-                            {
-                                sum[0] += x;
-                                sum[1] += x * x;
-                            }
-                        }
-                    }
-                }
-                let count = COUNT as f64;
-                let mean = |[sum, squares]: [f64; 2]| {
-                    let mean = sum / count;
-                    (mean, (squares / count - mean * mean).max(0.0) / count)
-                };
-                let [one, others @ ..] = sums;
-                for other in others {
-                    for (own, other) in one.iter().flatten().zip(other.iter().flatten()) {
-                        let [(a, a2), (b, b2)] = [mean(*own), mean(*other)];
-                        let error = (a2 + b2).sqrt() + 1e-12;
-                        assert!((a - b).abs() < 5.5 * error, "{surface:?} {cos}: {a} {b} {error}");
-                    }
-                }
-            }
-        }
     }
 
     /// D5: every sample's weight times its density is the value, the density asked again is the one

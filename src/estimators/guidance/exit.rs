@@ -21,7 +21,7 @@ pub(super) const REACH: f64 = 4.0;
 
 /// The boundary near a point, as a plane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Exit {
+pub(super) struct ExitPlane {
     /// Outwards.
     normal: DVec3,
     /// Of the plane, along the normal.
@@ -52,9 +52,9 @@ impl ExitRule {
     }
 
     /// At a plane through `at`, where phi is `phi` and light that leaves finds `found`; `None` where that is no gain.
-    pub(super) fn exit(&self, at: DVec3, normal: DVec3, found: f64, phi: f64) -> Option<Exit> {
+    pub(super) fn exit(&self, at: DVec3, normal: DVec3, found: f64, phi: f64) -> Option<ExitPlane> {
         let y = self.per_gain * (found / phi - 1.0);
-        (y > 0.0 && y.is_finite()).then(|| Exit {
+        (y > 0.0 && y.is_finite()).then(|| ExitPlane {
             normal,
             offset: normal.dot(at),
             chance: y / (1.0 + y),
@@ -63,7 +63,7 @@ impl ExitRule {
 
     /// From a point inside.
     #[inline]
-    pub(super) fn escape(&self, exit: &Exit, x: DVec3) -> Escape {
+    pub(super) fn escape(&self, exit: &ExitPlane, x: DVec3) -> Escape {
         let depth = exit.depth(x).max(0.0) * self.sigma_t;
         let part = (1.0 - depth * (1.0 / REACH)).max(0.0);
         let chance = exit.chance * ((part * part) * (part * part));
@@ -71,7 +71,7 @@ impl ExitRule {
     }
 }
 
-impl Exit {
+impl ExitPlane {
     /// Below the plane, mm.
     #[inline]
     pub(super) fn depth(&self, x: DVec3) -> f64 {
@@ -80,7 +80,7 @@ impl Exit {
 }
 
 #[cfg(test)]
-impl Exit {
+impl ExitPlane {
     /// Unit normal and the chance at the plane.
     pub(super) fn parts(&self) -> (DVec3, f64) {
         (self.normal, self.chance)

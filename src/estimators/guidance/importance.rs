@@ -14,7 +14,7 @@
 //! mean of their neighbours. Where there is no cell (in parts thinner than one) or phi has underflowed, there is none, and
 //! the walk is plain. Nothing of this needs to be exact: it guides.
 
-use super::exit::{Exit, ExitRule, REACH};
+use super::exit::{ExitPlane, ExitRule, REACH};
 use super::incidence::{LetIn, TransmittedLight};
 use crate::geometry::{self, Ray, Shape, Side};
 use crate::math::{DVec3, cos, exp, ln, ln_1p};
@@ -49,7 +49,7 @@ impl Diffusion {
 #[derive(Clone, Debug)]
 pub(super) enum Importance {
     /// e^{kappa z}.
-    HalfSpace { kappa: f64, pull: Pull, rule: ExitRule, exit: Option<Exit> },
+    HalfSpace { kappa: f64, pull: Pull, rule: ExitRule, exit: Option<ExitPlane> },
     /// a e^{kappa z} + b e^{-kappa (z + thickness)}; exits above and below.
     Slab {
         kappa: f64,
@@ -58,7 +58,7 @@ pub(super) enum Importance {
         a: f64,
         b: f64,
         rule: ExitRule,
-        exits: [Option<Exit>; 2],
+        exits: [Option<ExitPlane>; 2],
     },
     /// Between nodes of a grid.
     Grid(ImportanceGrid),
@@ -73,7 +73,7 @@ pub(super) struct ImportanceGrid {
     counts: [usize; 3],
     nodes: Vec<Node>,
     rule: ExitRule,
-    exits: Vec<Exit>,
+    exits: Vec<ExitPlane>,
 }
 
 /// Cubic cells, counted along x first.
@@ -189,7 +189,7 @@ impl Importance {
     /// What guides a step from a point of the body, and phi; 0 where nothing is known.
     #[inline]
     pub(super) fn at(&self, x: DVec3, guide: &mut StepGuide) -> f64 {
-        let escape = |rule: &ExitRule, exit: &Option<Exit>| {
+        let escape = |rule: &ExitRule, exit: &Option<ExitPlane>| {
             exit.as_ref().map_or(Escape::NONE, |exit| rule.escape(exit, x))
         };
         match self {
@@ -397,7 +397,7 @@ impl Cells {
         band: usize,
         diffusion: Diffusion,
     ) {
-        let mut known: Vec<Option<Exit>> = vec![None; self.numbers.len()];
+        let mut known: Vec<Option<ExitPlane>> = vec![None; self.numbers.len()];
         for (number, shore) in shores.iter().enumerate() {
             let Some(Shore { at, normal, distance, let_in }) = shore else { continue };
             let LetIn { all, wide } = let_in[band];

@@ -1,7 +1,7 @@
 //! Light that the boundary lets in: what a walk finds that leaves the body there.
 
 use crate::geometry::{Hit, Ray};
-use crate::math::DVec3;
+use crate::math::{DVec3, GOLDEN};
 use crate::optics::boundary::Boundary;
 use crate::optics::fresnel::fresnel;
 use crate::scene::Scene;
@@ -11,9 +11,6 @@ const DIRECTIONS: u32 = 128;
 
 /// Solid angle from which on light that leaves the body finds a light in whatever direction, sr.
 const WIDE: f64 = 3.0;
-
-/// The golden ratio less 1: the integers' multiples of it lie evenly, and with i / n they make Fibonacci's lattice.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// A direction of a light, and its solid angle; 1 of parallel light, whose strength is irradiance.
 #[derive(Clone, Copy, Debug)]
