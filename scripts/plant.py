@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Plants known defects in a copy of the source, one at a time, and asks whether the claims find them.
 
-    scripts/plant.py [--only TEXT] [--out DIR]
+    scripts/plant.py [--only TEXT...] [--out DIR]
 
 The defects are those of tests/planted.toml. For each, the copy is built and played: `scatterproof verify` on the named
 files at the ci setting, or the named unit tests, must fail. Before that, the sound source must pass all of them. Writes
@@ -116,14 +116,15 @@ def write(out, rows):
 
 def main():
     parser = argparse.ArgumentParser(description="Plants known defects in a copy of the source.")
-    parser.add_argument("--only", default="", metavar="TEXT", help="defects whose names contain TEXT")
+    parser.add_argument("--only", nargs="+", default=[""], metavar="TEXT", help="defects whose names contain a TEXT")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where the tables go; default results/published")
     asked = parser.parse_args()
-    if asked.only and not asked.out:
+    if any(asked.only) and not asked.out:
         refuse("a part of the list is not published: --out DIR")
-    defects = [d for d in tomllib.loads(LIST.read_text())["defect"] if asked.only in d["name"]]
+    defects = [d for d in tomllib.loads(LIST.read_text())["defect"]
+               if any(text in d["name"] for text in asked.only)]
     if not defects:
-        refuse(f"no defect of {LIST.name} has `{asked.only}` in its name")
+        refuse(f"no defect of {LIST.name} has `{'`, `'.join(asked.only)}` in its name")
     with tempfile.TemporaryDirectory() as folder:
         copy = Copy(Path(folder))
         texts = [planted(defect, copy.source) for defect in defects]

@@ -1,9 +1,9 @@
 //! Directions out of several facets.
 //!
 //! One facet of a rough surface, drawn from the visible normals, gives a direction whose weight is G1, or none where the
-//! direction is on the wrong side: from inside a body of index 1.4 and GGX roughness 0.2 that is 5 % of the light, and the variance of
-//! a weight is 0.054. A weight that is the mean over a few facets, and a direction chosen in proportion to theirs (resampling),
-//! have the same expectation.
+//! direction is on the wrong side: from inside a body of index 1.4 and GGX roughness 0.2 that is 5 % of the light, and the
+//! variance of a weight is 0.054 (directions by cosine). The mean weight of a few facets, with a direction chosen in proportion to
+//! theirs (resampled importance sampling, Talbot et al. 2005), has the same expectation.
 
 use super::{Boundary, BoundarySample, Event, split};
 use crate::math::{DVec3, GOLDEN};
@@ -44,8 +44,8 @@ impl FacetLobe {
 
 impl Boundary {
     /// [`Boundary::sample`] out of several facets, which a rough surface has, and both lobes of each: one direction in
-    /// proportion to its weight, with the mean weight of a facet. Its density is that of [`Self::sample`]: weights of the balance heuristic may
-    /// use it, since they need but sum to 1.
+    /// proportion to its weight, with the mean weight of a facet. Its density is that of [`Self::sample`]: weights of the
+    /// balance heuristic may use it, since they need but sum to 1.
     pub fn sample_of_several(&self, wo: DVec3, u: [f64; 3]) -> Option<BoundarySample> {
         if self.is_delta() {
             return self.sample(wo, u);
@@ -105,6 +105,7 @@ mod tests {
     use super::super::Density;
     use super::super::tests::{direction, rough_surfaces};
     use super::*;
+    use crate::optics::microfacet::{MicrofacetKind, Microfacets};
     use crate::sampling::stream::{Purpose, StreamKey};
 
     /// Several facets, and both lobes of each, are what one facet gives on average: weight, and a direction weighted by it;
@@ -156,5 +157,35 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// What the head of this file says of one facet, and that several vary less: light from inside, even over the cosine.
+    #[test]
+    fn a_mean_over_facets_varies_less() {
+        let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.2 };
+        let surface = Boundary::Rough { eta: 1.4, facets };
+        let mut stream =
+            StreamKey::named("a_mean_over_facets_varies_less").pass(0).stream(0, Purpose::Walk);
+        const COUNT: u32 = 100_000;
+        let (mut failed, mut sums) = (0, [[0.0; 2]; 2]);
+        for _ in 0..COUNT {
+            let wo = direction(-stream.draw().sqrt(), stream.draw());
+            let one = surface.sample(wo, stream.draw3());
+            let several = surface.sample_of_several(wo, stream.draw3());
+            failed += u32::from(one.is_none());
+            for (sums, sample) in sums.iter_mut().zip([one, several]) {
+                // Without the squared index, which a crossing has.
+                let scale = |s: &BoundarySample| if s.event == Event::Refract { 1.96 } else { 1.0 };
+                let weight = sample.map_or(0.0, |s| s.weight / scale(&s));
+                sums[0] += weight;
+                sums[1] += weight * weight;
+            }
+        }
+        let count = f64::from(COUNT);
+        let [one, several] = sums.map(|[sum, squares]| squares / count - (sum / count) * (sum / count));
+        let failed = f64::from(failed) / count;
+        assert!((failed - 0.0475).abs() < 0.004, "{failed}");
+        assert!((one - 0.054).abs() < 0.004, "{one}");
+        assert!(several < 0.4 * one, "{several} {one}");
     }
 }

@@ -11,7 +11,7 @@
 //! whatever it is, and larger ones make them grow from step to step.
 //! e^{-tau / mu} is written as the square of a square, which ends.
 
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 use crate::optics::boundary::Boundary;
 use crate::optics::guided::Escape;
 use crate::scene::Scene;
@@ -22,12 +22,19 @@ pub(super) const REACH: f64 = 4.0;
 /// The boundary near a point, as a plane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ExitPlane {
-    /// Outwards.
-    normal: DVec3,
+    /// Unit, outwards, in single precision: [`unit`].
+    normal: Vec3,
     /// Of the plane, along the normal.
-    offset: f64,
+    offset: f32,
     /// Chance of an escape at the plane.
-    chance: f64,
+    chance: f32,
+}
+
+/// A unit vector out of single precision, to 1e-14: one Newton step.
+#[inline]
+pub(super) fn unit(vector: Vec3) -> DVec3 {
+    let vector = vector.as_dvec3();
+    vector * (1.5 - 0.5 * vector.length_squared())
 }
 
 /// What exits of one band have in common.
@@ -55,9 +62,9 @@ impl ExitRule {
     pub(super) fn exit(&self, at: DVec3, normal: DVec3, found: f64, phi: f64) -> Option<ExitPlane> {
         let y = self.per_gain * (found / phi - 1.0);
         (y > 0.0 && y.is_finite()).then(|| ExitPlane {
-            normal,
-            offset: normal.dot(at),
-            chance: y / (1.0 + y),
+            normal: normal.as_vec3(),
+            offset: normal.dot(at) as f32,
+            chance: (y / (1.0 + y)) as f32,
         })
     }
 
@@ -66,8 +73,8 @@ impl ExitRule {
     pub(super) fn escape(&self, exit: &ExitPlane, x: DVec3) -> Escape {
         let depth = exit.depth(x).max(0.0) * self.sigma_t;
         let part = (1.0 - depth * (1.0 / REACH)).max(0.0);
-        let chance = exit.chance * ((part * part) * (part * part));
-        Escape { normal: exit.normal, least_cosine: self.least_cosine, chance }
+        let chance = f64::from(exit.chance) * ((part * part) * (part * part));
+        Escape { normal: unit(exit.normal), least_cosine: self.least_cosine, chance }
     }
 }
 
@@ -75,7 +82,7 @@ impl ExitPlane {
     /// Below the plane, mm.
     #[inline]
     pub(super) fn depth(&self, x: DVec3) -> f64 {
-        self.offset - self.normal.dot(x)
+        f64::from(self.offset) - unit(self.normal).dot(x)
     }
 }
 
@@ -83,6 +90,6 @@ impl ExitPlane {
 impl ExitPlane {
     /// Unit normal and the chance at the plane.
     pub(super) fn parts(&self) -> (DVec3, f64) {
-        (self.normal, self.chance)
+        (unit(self.normal), f64::from(self.chance))
     }
 }

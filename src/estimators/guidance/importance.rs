@@ -14,10 +14,10 @@
 //! mean of their neighbours. Where there is no cell (in parts thinner than one) or phi has underflowed, there is none, and
 //! the walk is plain. Nothing of this needs to be exact: it guides.
 
-use super::exit::{ExitPlane, ExitRule, REACH};
+use super::exit::{ExitPlane, ExitRule, REACH, unit};
 use super::incidence::{LetIn, TransmittedLight};
 use crate::geometry::{self, Ray, Shape, Side};
-use crate::math::{DVec3, cos, exp, ln, ln_1p};
+use crate::math::{DVec3, Vec3, cos, exp, ln, ln_1p};
 use crate::optics::boundary::Boundary;
 use crate::optics::bssrdf::FresnelMoments;
 use crate::optics::guided::{Escape, Pull, StepGuide, diffuse_growth};
@@ -85,10 +85,11 @@ struct Lattice {
     counts: [usize; 3],
 }
 
-/// What a walk asks for, in half a cache line.
+/// What a walk asks for, small since the grid is to stay in the cache.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    axis: DVec3,
+    /// Unit, in single precision: [`unit`].
+    axis: Vec3,
     /// In units that keep the body's range in single precision; 0 where nothing is known.
     phi: f32,
     /// The level of the pull in the last byte, before it the index of the exit; [`NO_EXIT`] where none is near.
@@ -97,7 +98,7 @@ struct Node {
 
 const NO_EXIT: u32 = (1 << 24) - 1;
 
-const UNKNOWN: Node = Node { axis: DVec3::Z, phi: 0.0, level_and_exit: NO_EXIT << 8 };
+const UNKNOWN: Node = Node { axis: Vec3::Z, phi: 0.0, level_and_exit: NO_EXIT << 8 };
 
 /// phi where it is largest, as nodes keep it.
 const LARGEST: f64 = 1e30;
@@ -232,7 +233,7 @@ impl ImportanceGrid {
         // The cast takes what is negative to 0.
         let cell = |axis: usize| (place[axis] as u32 as usize).min(counts[axis] - 1);
         let node = &self.nodes[(cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)];
-        guide.pull = Pull { axis: node.axis, level: (node.level_and_exit & 0xff) as usize };
+        guide.pull = Pull { axis: unit(node.axis), level: (node.level_and_exit & 0xff) as usize };
         match self.exits.get((node.level_and_exit >> 8) as usize) {
             Some(exit) => guide.escape = self.rule.escape(exit, x),
             None => guide.escape.chance = 0.0,
@@ -502,7 +503,7 @@ impl Cells {
             match known[index].or_else(of_neighbours) {
                 Some((gradient, phi)) => {
                     let Pull { axis, level } = Pull::new(gradient);
-                    let phi = (phi / largest * LARGEST) as f32;
+                    let (axis, phi) = (axis.as_vec3(), (phi / largest * LARGEST) as f32);
                     Node { axis, phi, level_and_exit: NO_EXIT << 8 | level as u32 }
                 }
                 None => UNKNOWN,

@@ -72,3 +72,30 @@ impl Estimator for TwoBounce {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Lamp, body, medium, sphere};
+    use super::*;
+    use crate::estimators::snee::SneePreset;
+    use crate::geometry::Ray;
+    use crate::math::DVec3;
+    use crate::optics::boundary::Boundary;
+    use crate::scene::sensor::{Sensor, Vertex};
+
+    #[test]
+    fn has_no_walk_to_guide() {
+        let scene =
+            body(&sphere(), Boundary::Smooth { eta: 1.4 }, &[medium(2.0, 0.9, 0.0)], &[Lamp::Disc]);
+        let mut scene = Arc::into_inner(scene).expect("not shared");
+        let ray = Ray { origin: DVec3::ZERO, dir: DVec3::Z };
+        scene.sensor = Sensor::Vertex(Vertex { ray, paths: 1 });
+        let scene = Arc::new(scene);
+        let plain = SneePreset::Guided.options();
+        let walk = WalkDraw::Guided { share: 0.9, nodes: 8, least_depth: 0.0 };
+        let guided = SneeOptions { walk, ..plain.clone() };
+        let refusal = TwoBounce::new(Arc::clone(&scene), guided).expect_err("refused").to_string();
+        assert!(refusal.contains("no walk to guide"), "{refusal}");
+        assert!(TwoBounce::new(scene, plain).is_ok());
+    }
+}
