@@ -31,7 +31,7 @@
 //! ends in the medium, and one that reaches the boundary, have the ratios
 //!   (1 - q) + q (1 - c) (f / N) (1 - p) e^{p sigma_t t},
 //!   (1 - q) + q (1 - c) (f / N) e^{p sigma_t t} + q c / (W HG) e^{sigma_t t},
-//! whose parts [`Heading`] keeps when the direction is known and the flight is not.
+//! whose parts `Heading` keeps when the direction is known and the flight is not.
 
 use std::f64::consts::TAU;
 
