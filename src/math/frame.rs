@@ -38,6 +38,12 @@ impl Frame {
     }
 }
 
+/// A vector whose length is nearly 1 at length 1, by one Newton step: an error e of the length becomes 1.5 e^2.
+#[inline]
+pub fn renormalized(v: DVec3) -> DVec3 {
+    v * (1.5 - 0.5 * v.length_squared())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -50,6 +56,8 @@ mod tests {
             assert!(f.s.dot(f.t).abs() < 1e-16 && (f.s.length() - 1.0).abs() < 1e-15);
             let v = DVec3::new(0.1, 2.0, -0.7);
             assert!((f.to_world(f.to_local(v)) - v).length() < 1e-15);
+            let rounded = n.as_vec3().as_dvec3();
+            assert!((renormalized(rounded).length() - 1.0).abs() < 1e-14, "{rounded}");
         }
     }
 }

@@ -42,14 +42,12 @@ pub fn fma(x: f64, y: f64, z: f64) -> f64 {
     libm::fma(x, y, z)
 }
 
-mod exponential;
 mod frame;
 mod inverse;
 mod quadrature;
 mod turns;
 
-pub use exponential::{EXP_LIMIT, exp_within};
-pub use frame::Frame;
+pub use frame::{Frame, renormalized};
 pub use inverse::{bracketed_root, erf_inv, increasing_root, lambert_excess};
 pub use quadrature::{Integral, gauss_kronrod, integrate};
 pub use turns::sin_cos_turns;

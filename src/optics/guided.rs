@@ -36,9 +36,7 @@
 use std::f64::consts::TAU;
 
 use super::phase::HenyeyGreenstein;
-use crate::math::{
-    DVec3, EXP_LIMIT, Frame, exp_m1, exp_within, increasing_root, ln, ln_1p, sin_cos_turns,
-};
+use crate::math::{DVec3, Frame, exp, exp_m1, increasing_root, ln, ln_1p, renormalized, sin_cos_turns};
 use crate::sampling::discrete::choose;
 use crate::sampling::distance::sample_exponential;
 
@@ -56,6 +54,9 @@ const MOST_BEND: f64 = 0.95;
 
 /// The most coefficients that f has.
 const TERMS: usize = 8;
+
+/// The largest exponent of a ratio.
+const MOST_EXPONENT: f64 = 700.0;
 
 /// A direction in which importance grows, and how fast.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,8 +120,8 @@ impl Escape {
         let below = (1.0 - self.least_cosine) * u;
         let (sin_phi, cos_phi) = sin_cos_turns(v);
         let r = (below * (2.0 - below)).sqrt();
-        let dir = Frame::about(self.normal).to_world(DVec3::new(r * cos_phi, r * sin_phi, 1.0 - below));
-        dir * (1.5 - 0.5 * dir.length_squared())
+        let local = DVec3::new(r * cos_phi, r * sin_phi, 1.0 - below);
+        renormalized(Frame::about(self.normal).to_world(local))
     }
 }
 
@@ -292,12 +293,11 @@ impl GuidedTurns {
             Levels::Isotropic(levels) => {
                 let IsotropicLevel { spread, reach, .. } = levels[pull.level];
                 let [u, v] = [draw(), draw()];
-                let above = reach * (1.0 - exp_within(-spread * u));
+                let above = reach * (1.0 - exp(-spread * u));
                 let (sin_phi, cos_phi) = sin_cos_turns(v);
                 let r = (above * (2.0 - above)).max(0.0).sqrt();
                 let local = DVec3::new(r * cos_phi, r * sin_phi, above - 1.0);
-                let dir = Frame::about(pull.axis).to_world(local);
-                dir * (1.5 - 0.5 * dir.length_squared())
+                renormalized(Frame::about(pull.axis).to_world(local))
             }
             Levels::Product(levels) => {
                 let Level { factor, linear, even, .. } = &levels[pull.level];
@@ -316,8 +316,7 @@ impl GuidedTurns {
                         break opposite;
                     }
                 };
-                let dir = frame.to_world(local);
-                dir * (1.5 - 0.5 * dir.length_squared())
+                renormalized(frame.to_world(local))
             }
         }
     }
@@ -391,15 +390,16 @@ impl Heading {
     }
 }
 
-/// e^{p sigma_t t}. Where it is out of range, the plain flight's probability is 0 in double precision.
+/// e^{p sigma_t t}; finite, also where the plain flight's probability is 0 in double precision.
 #[inline]
 fn growth(pull: f64, sigma_t: f64, t: f64) -> f64 {
-    exp_within((pull * sigma_t * t).clamp(-EXP_LIMIT, EXP_LIMIT))
+    exp((pull * sigma_t * t).min(MOST_EXPONENT))
 }
 
 impl Level {
     /// From the coefficients of f in Legendre polynomials.
     fn new(factor: &[f64], g: f64) -> Level {
+        assert!(factor.len() <= TERMS, "{} coefficients: the least growth has but a few", factor.len());
         let mut power = 1.0;
         let convolved: Vec<f64> = factor
             .iter()
@@ -523,7 +523,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::math::{cos, exp, integrate, sin};
+    use crate::math::{cos, integrate, sin};
     use crate::sampling::stream::{Purpose, StreamKey};
 
     const GS: [f64; 6] = [-0.5, 0.0, 0.3, 0.8, 0.95, 0.999];

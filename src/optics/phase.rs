@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::math::{DVec3, Frame, sin_cos_turns};
+use crate::math::{DVec3, Frame, renormalized, sin_cos_turns};
 
 /// Henyey & Greenstein 1941, for every |g| < 1; g = 0 is isotropic.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -59,9 +59,8 @@ impl HenyeyGreenstein {
         if self.g == 0.0 {
             return local;
         }
-        // One Newton step towards unit length, so that rounding does not add up along a walk.
-        let next = Frame::about(dir).to_world(local);
-        next * (1.5 - 0.5 * next.length_squared())
+        // So that rounding does not add up along a walk.
+        renormalized(Frame::about(dir).to_world(local))
     }
 
     /// The same in a frame about the direction of travel, which is its z axis.

@@ -11,7 +11,7 @@
 //! whatever it is, and larger ones make them grow from step to step.
 //! e^{-tau / mu} is written as the square of a square, which ends.
 
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Vec3, renormalized};
 use crate::optics::boundary::Boundary;
 use crate::optics::guided::Escape;
 use crate::scene::Scene;
@@ -30,11 +30,10 @@ pub(super) struct ExitPlane {
     chance: f32,
 }
 
-/// A unit vector out of single precision, to 1e-14: one Newton step.
+/// A unit vector out of single precision, to 1e-14.
 #[inline]
 pub(super) fn unit(vector: Vec3) -> DVec3 {
-    let vector = vector.as_dvec3();
-    vector * (1.5 - 0.5 * vector.length_squared())
+    renormalized(vector.as_dvec3())
 }
 
 /// What exits of one band have in common.

@@ -9,8 +9,8 @@ use crate::scene::Scene;
 /// Directions per light of finite size.
 const DIRECTIONS: u32 = 128;
 
-/// Solid angle from which on light that leaves the body finds a light in whatever direction, sr.
-const WIDE: f64 = 3.0;
+/// Concentration up to which light that leaves the body finds a light in nearly whatever direction: that of a quarter of a sky.
+const WIDE: f64 = 4.0;
 
 /// A direction of a light, and its solid angle; 1 of parallel light, whose strength is irradiance.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,6 @@ struct LightDirection {
     light: usize,
     wi: DVec3,
     solid_angle: f64,
-    is_wide: bool,
 }
 
 /// Irradiance that goes in at a point, W/mm^2.
@@ -51,13 +50,8 @@ impl TransmittedLight<'_> {
                     Some(_) => 0.0,
                     None => 1.0,
                 };
-                let wi = sample.wi;
-                directions.push(LightDirection { light, wi, solid_angle, is_wide: false });
+                directions.push(LightDirection { light, wi: sample.wi, solid_angle });
             }
-            let own = directions.len() - count as usize..;
-            let whole: f64 = directions[own.clone()].iter().map(|one| one.solid_angle).sum();
-            let is_wide = !source.is_directional() && whole > WIDE;
-            directions[own].iter_mut().for_each(|one| one.is_wide = is_wide);
         }
         TransmittedLight { scene, directions }
     }
@@ -67,7 +61,7 @@ impl TransmittedLight<'_> {
     pub(super) fn irradiance(&self, at: &Hit) -> Vec<LetIn> {
         let TransmittedLight { scene, directions } = self;
         let mut sums = vec![LetIn::default(); scene.bands()];
-        for LightDirection { light, wi, solid_angle, is_wide } in directions {
+        for LightDirection { light, wi, solid_angle } in directions {
             let cosine = wi.dot(at.normal);
             let shadow = Ray { origin: at.point, dir: *wi };
             if cosine <= 0.0 || *solid_angle == 0.0 || scene.shape.occluded(&shadow, Some(at.face)) {
@@ -81,7 +75,7 @@ impl TransmittedLight<'_> {
                 let radiance = scene.lights[*light].sampled_radiance(band, *wi);
                 let let_in = radiance * solid_angle * cosine * through;
                 sum.all += let_in;
-                if *is_wide {
+                if scene.lights[*light].concentration() <= WIDE {
                     sum.wide += let_in;
                 }
             }
