@@ -67,10 +67,11 @@ fn tell(
     let free = available().map_or("unknown".into(), readable);
     writeln!(
         out,
-        "memory: {} (shapes {}, making them {}, results {}, working {}); available: {free}",
+        "memory: {} (shapes {}, making them {}, guides {}, results {}, working {}); available: {free}",
         readable(memory.total()),
         readable(memory.shapes),
         readable(memory.building),
+        readable(memory.guides),
         readable(memory.results),
         readable(memory.working)
     )
@@ -107,17 +108,23 @@ fn tell_passes(
         counted(cells, "cell"),
         counted(measurements, "measurement")
     )?;
-    let mut table = Table::new(&["cell", "estimator", "observables", "passes", "CPU time"]);
+    let mut table =
+        Table::new(&["cell", "estimator", "observables", "passes", "set-up", "CPU time", "memory"]);
     let mut total = 0.0;
     for job in jobs {
         let estimate = budget.filter(|_| !dry).and_then(|budget| estimate_seconds(job, budget));
-        total += estimate.map_or(0.0, |(_, seconds)| seconds);
+        // After the estimate, which has prepared the estimator.
+        let set_up = estimate.map(|_| job.set_up.seconds());
+        total += estimate.map_or(0.0, |(_, seconds)| seconds) + set_up.unwrap_or(0.0);
+        let time = |seconds: Option<f64>| seconds.map_or("-".into(), |s| format!("{s:.1} s"));
         table.push(vec![
             experiment.cells[job.cell].label.clone(),
             job.arm.name.clone(),
             job.layout.observables().len().to_string(),
             estimate.map_or("-".into(), |(passes, _)| passes.to_string()),
-            estimate.map_or("-".into(), |(_, seconds)| format!("{seconds:.1} s")),
+            time(set_up),
+            time(estimate.map(|(_, seconds)| seconds)),
+            readable(job.estimator.held_bytes() + job.estimator.working_bytes()),
         ]);
     }
     write!(out, "{}", table.to_text())?;

@@ -372,7 +372,7 @@ fn next_step(group: &Undecided, subjects: &[Judged], reading: &Reading) -> Strin
             .iter()
             .flat_map(|timing| timing.cells.values())
             .flat_map(|cell| cell.values())
-            .map(|spent| spent.cpu_seconds)
+            .map(|spent| spent.all_seconds())
             .sum();
         Some(format!(
             "about {} CPU s decide them: scatterproof verify {}{} --set {key}={}",

@@ -1,10 +1,14 @@
 //! The trait of estimators, the one open trait.
 
-use super::{Scores, TransportClass};
+use super::{GuideSlice, Scores, TransportClass};
 use crate::sampling::stream::PassKey;
 
 /// Turns random numbers into scores.
 pub trait Estimator: Send + Sync {
+    /// Makes what all passes need and takes longer than a moment, such as what walks learn from a warm-up. Called once before
+    /// the first pass; ratios of efficiency count its CPU time.
+    fn prepare(&self) {}
+
     /// Runs one independent realisation of every observable for these bands and adds it to the
     /// zeroed scores.
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores);
@@ -32,9 +36,19 @@ pub trait Estimator: Send + Sync {
         Vec::new()
     }
 
+    /// Memory that it holds for all passes, beside the scene, bytes.
+    fn held_bytes(&self) -> usize {
+        0
+    }
+
     /// Memory that a pass takes for itself, bytes.
     fn working_bytes(&self) -> usize {
         0
+    }
+
+    /// What guides its walks, band by band, for pictures; empty where nothing does.
+    fn guides(&self) -> Vec<Option<GuideSlice>> {
+        Vec::new()
     }
 
     /// Notes for the reader of its results, such as transport that it cannot sample.

@@ -45,10 +45,25 @@ impl Field {
         self.guidance.get(band)?.as_ref()
     }
 
+    /// The same with walks that are guided like this, band by band.
+    pub(super) fn with_guidance(&self, guidance: Vec<Option<Guidance>>) -> Field {
+        let Field { scene, choice, roulette, bounds, .. } = self;
+        let (scene, choice) = (scene.clone(), choice.clone());
+        Field { scene, choice, roulette: *roulette, bounds: *bounds, guidance }
+    }
+
+    /// The same with plain walks in some bands.
+    pub(super) fn plain_in(mut self, is_plain: impl Fn(usize, &Guidance) -> bool) -> Field {
+        for (band, guidance) in self.guidance.iter_mut().enumerate() {
+            guidance.take_if(|guidance| is_plain(band, guidance));
+        }
+        self
+    }
+
     /// With walks of every band guided like this.
     #[cfg(test)]
     pub(super) fn guided_by(self, guidance: &Guidance) -> Field {
-        Field { guidance: vec![Some(guidance.clone()); self.scene.bands()], ..self }
+        self.with_guidance(vec![Some(guidance.clone()); self.scene.bands()])
     }
 
     /// Memory on the heap, bytes.

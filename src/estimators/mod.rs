@@ -30,9 +30,10 @@ pub mod snee;
 mod vertices;
 mod visibility;
 mod walk;
+mod warm_up;
 
 pub use estimator::{BandUse, Bias, Estimator, HeavyTail};
-pub use guidance::WalkDraw;
+pub use guidance::{GuideSlice, WalkDraw};
 pub use history::{History, TransportClass};
 pub use kind::{BuildEstimator, EstimatorKind, read_options};
 pub use roulette::Roulette;

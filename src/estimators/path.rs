@@ -23,11 +23,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::bands::OneBand;
-use super::field::{Field, Path};
+use super::field::Path;
 use super::guidance::{GuidedBand, WalkDraw};
 use super::illumination::unscattered_notes;
 use super::walk::{CameraWalk, Unrivalled};
-use super::{Estimator, EstimatorKind, Scores, Serves, read_options};
+use super::warm_up::TaughtField;
+use super::{Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::Result;
 use crate::optics::boundary::Boundary;
 use crate::sampling::stream::PassKey;
@@ -53,7 +54,7 @@ pub struct PathOptions {
 /// The estimator, for one scene.
 #[derive(Debug)]
 pub struct PathTracer {
-    field: Field,
+    walks: TaughtField,
 }
 
 impl PathTracer {
@@ -80,20 +81,25 @@ impl PathTracer {
     /// A scene that it does not serve.
     pub fn with_options(scene: Arc<Scene>, options: &PathOptions) -> Result<PathTracer> {
         PathTracer::KIND.check(&scene)?;
-        let field = Field::with_walks(scene, options.roulette, options.walk);
+        let walks = TaughtField::new(scene, options.roulette, options.walk);
         let samples_even = options.sample_even_lights.unwrap_or(!options.walk.is_guided());
-        Ok(PathTracer { field: if samples_even { field } else { field.finding_even_lights() } })
+        Ok(PathTracer { walks: if samples_even { walks } else { walks.finding_even_lights() } })
     }
 }
 
 impl Estimator for PathTracer {
+    fn prepare(&self) {
+        self.walks.field();
+    }
+
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        let field = self.walks.field();
         for &band in bands {
-            for index in 0..self.field.scene.sensor.rays_per_pass() {
-                let path = Path { field: &self.field, band, index, key };
-                match self.field.guidance(band) {
+            for index in 0..field.scene.sensor.rays_per_pass() {
+                let path = Path { field, band, index, key };
+                match field.guidance(band) {
                     Some(guidance) => {
-                        let medium = &self.field.scene.medium[band];
+                        let medium = &field.scene.medium[band];
                         let guided = GuidedBand::new(guidance, medium);
                         CameraWalk::trace(path, scores, Unrivalled, guided)
                     }
@@ -103,12 +109,16 @@ impl Estimator for PathTracer {
         }
     }
 
-    fn working_bytes(&self) -> usize {
-        self.field.heap_bytes()
+    fn guides(&self) -> Vec<Option<GuideSlice>> {
+        self.walks.guides()
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.walks.heap_bytes()
     }
 
     fn notes(&self) -> Vec<String> {
-        let scene = &self.field.scene;
+        let scene = self.walks.scene();
         let smooth = scene.boundary.iter().any(|b| matches!(b, Boundary::Smooth { .. }));
         let parallel = scene.lights.iter().filter(|light| light.is_directional());
         let missing = parallel.filter(|_| smooth).map(|light| {

@@ -206,7 +206,7 @@ fn draws_per_event() {
     let (mut absorbed, mut escaped) = (0, 0);
     for index in 0..1000 {
         let mut scores = Scores::new(layout.clone());
-        let path = Path { field: &tracer.field, band: 0, index, key: &key };
+        let path = Path { field: tracer.walks.field(), band: 0, index, key: &key };
         let draws = CameraWalk::trace(path, &mut scores, Unrivalled, OneBand);
         let [_, rays, _, medium_events, boundary_events, ..] = scores.cost;
         let out = u64::from(scores.observables[0] > 0.0); // it flew to the sky, and scored

@@ -169,7 +169,13 @@ mod tests {
         timing.add(
             "smooth",
             "mis",
-            TimeSpent { cpu_seconds: 2.0, wall_seconds: 1.0, passes: 256, paths: 1000 },
+            TimeSpent {
+                cpu_seconds: 2.0,
+                set_up_seconds: 0.0,
+                wall_seconds: 1.0,
+                passes: 256,
+                paths: 1000,
+            },
         );
         folder.write_timing(&timing).expect("a timing");
         folder.write_provenance(&Provenance::collect(2)).expect("a provenance");

@@ -250,7 +250,7 @@ fn cost(data: &ReportData) -> Vec<PageBlock> {
     for (cell, run) in runs {
         let cost = data.stored.timing.as_ref().and_then(|timing| timing.of(&cell.label, &run.estimator));
         let seconds = |pick: fn(f64, f64) -> f64| {
-            cost.map_or(String::new(), |c| significant(pick(c.cpu_seconds, c.wall_seconds), 3))
+            cost.map_or(String::new(), |c| significant(pick(c.all_seconds(), c.wall_seconds), 3))
         };
         let rate = cost.and_then(|c| c.paths_per_second());
         let work: Vec<String> = run

@@ -381,7 +381,7 @@ impl<'a> Half<'a> {
         Half {
             run,
             picture: run.and_then(|run| Picture::of(stored, run)),
-            seconds: whole.map_or(f64::NAN, |(_, cost)| cost.cpu_seconds),
+            seconds: whole.map_or(f64::NAN, |(_, cost)| cost.all_seconds()),
         }
     }
 

@@ -37,7 +37,13 @@ fn grid(brightness: fn(usize) -> f64, seconds: [f64; 2]) -> Stored {
             let path = pixels_path(index, number);
             stored.arrays.insert(path.clone(), Array::new(vec![2, 2, 3, 2], data));
             run.image.as_mut().expect("an image").pixels = path;
-            let cost = TimeSpent { cpu_seconds: time, wall_seconds: time, passes: run.passes, paths: 1 };
+            let cost = TimeSpent {
+                cpu_seconds: time,
+                set_up_seconds: 0.0,
+                wall_seconds: time,
+                passes: run.passes,
+                paths: 1,
+            };
             timing.add(&cell.label, &run.estimator, cost);
         }
         cells.push(cell);

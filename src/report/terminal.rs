@@ -28,7 +28,7 @@ pub(crate) fn run_table(data: &ReportData) -> Table {
             let cost = data.stored.timing.as_ref().and_then(|t| t.of(&cell.label, &run.estimator));
             let rate = cost.and_then(|c| c.paths_per_second());
             row.push(run.passes.to_string());
-            row.push(cost.map_or(String::new(), |c| significant(c.cpu_seconds, 3)));
+            row.push(cost.map_or(String::new(), |c| significant(c.all_seconds(), 3)));
             row.push(rate.map_or(String::new(), |rate| significant(rate, 3)));
             table.push(row);
         }
@@ -61,7 +61,7 @@ pub(crate) fn sampler_table(data: &ReportData) -> Table {
             own().count().to_string(),
             green.to_string(),
             coarse.and_then(|v| v.detectable).map_or_else(String::new, per_cent),
-            cost.map_or(String::new(), |c| significant(c.cpu_seconds, 3)),
+            cost.map_or(String::new(), |c| significant(c.all_seconds(), 3)),
             rate.map_or(String::new(), |rate| significant(rate, 3)),
         ]);
     }

@@ -87,7 +87,9 @@ impl Manifest {
 fn arrays(record: &Record, run: &EstimatorRun) -> BTreeMap<String, String> {
     let image =
         run.image.iter().flat_map(|image| [("pixels", &image.pixels), ("spread", &image.spread)]);
-    let paths = [("observables", &run.moments), ("costs", &run.costs)].into_iter().chain(image);
+    let guide = run.guide.iter().map(|plane| ("guide", &plane.array));
+    let paths =
+        [("observables", &run.moments), ("costs", &run.costs)].into_iter().chain(image).chain(guide);
     let sums =
         paths.filter_map(|(what, path)| Some((what.to_string(), record.checksums.get(path)?.clone())));
     sums.collect()

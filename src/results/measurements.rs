@@ -97,7 +97,13 @@ mod tests {
         timing.add(
             "smooth",
             "mis",
-            TimeSpent { cpu_seconds: 64.0, wall_seconds: 64.0, passes: 256, paths: 1 },
+            TimeSpent {
+                cpu_seconds: 64.0,
+                set_up_seconds: 0.0,
+                wall_seconds: 64.0,
+                passes: 256,
+                paths: 1,
+            },
         );
         let rows = measurements(&stored, Some(&timing));
         assert_eq!(rows.len(), 2 * 2 * 2);

@@ -171,6 +171,9 @@ pub struct EstimatorRun {
     pub costs: String,
     /// The image, where the sensor has pixels.
     pub image: Option<Image>,
+    /// What guides its walks, where something does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub guide: Option<GuidePlane>,
     /// Deterministic counts of work done, summed over bands and passes.
     pub cost: BTreeMap<String, u64>,
     /// Counts of anomalies, by name (`nonfinite`, `lost_ray`, `wrong_side`).
@@ -227,6 +230,19 @@ impl Observable {
     pub fn is_pixels(&self) -> bool {
         self.name == PIXELS
     }
+}
+
+/// What guides the walks of a run, in the plane of x and z through the middle of the body.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GuidePlane {
+    /// The x that it reaches from and to, mm.
+    pub x_mm: [f64; 2],
+    /// The z that it reaches from and to, mm.
+    pub z_mm: [f64; 2],
+    /// Path of the `[band][row][column][3]` f64 array, rows from the largest z down: importance over its largest (0 outside,
+    /// where nothing is known, and in bands without a guide), and its growth per mean free path along x and z.
+    pub array: String,
 }
 
 /// The pixel arrays of one run.

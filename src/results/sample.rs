@@ -121,6 +121,7 @@ fn run(e: usize, name: &str, noise: f64, arrays: &mut Arrays) -> EstimatorRun {
         observables: vec![observable("all"), observable("single")],
         moments: observables_path(0, e),
         costs: costs_path(0, e),
+        guide: None,
         image: Some(Image { width: 3, height: 2, pixels: pixels_path(0, e), spread: spread_path(0, e) }),
         cost: BTreeMap::from([("rays".into(), 1024)]),
         anomalies: BTreeMap::new(),

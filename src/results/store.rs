@@ -3,7 +3,7 @@
 //! ```text
 //! record/record.json              everything except the arrays (see results::record)
 //! record/record.json.b3           its hash, as b3sum writes and checks it
-//! record/cells/<CELL>/<RUN>.observables.npy, .costs.npy, .pixels.npy, .spread.npy
+//! record/cells/<CELL>/<RUN>.observables.npy, .costs.npy, .pixels.npy, .spread.npy, .guide.npy
 //! record/samplers/<NNN>.coarse.npy, .fine.npy, .serial.npy
 //! timing.json, provenance.json    beside the record, never byte-identical
 //! pictures.json                   what pictures are wanted beside those of every run
@@ -70,6 +70,11 @@ pub fn costs_path(cell: usize, run: usize) -> String {
 /// Path of a run's pixels.
 pub fn pixels_path(cell: usize, run: usize) -> String {
     array_path(cell, run, "pixels")
+}
+
+/// Path of what guides a run's walks.
+pub fn guide_path(cell: usize, run: usize) -> String {
+    array_path(cell, run, "guide")
 }
 
 /// Path of the spread of a run's pixels.
@@ -142,6 +147,12 @@ impl Stored {
             let shape = self.arrays.get(&run.costs).map(|a| &a.shape[..]);
             if !matches!(shape, Some(&[b, c]) if Some(b) == batches && c == run.cost.len()) {
                 return Some(format!("costs of {} have shape {shape:?}", run.estimator));
+            }
+            if let Some(plane) = &run.guide {
+                let shape = self.arrays.get(&plane.array).map(|a| &a.shape[..]);
+                if !matches!(shape, Some(&[b, rows, columns, 3]) if b == bands && rows * columns > 0) {
+                    return Some(format!("what guides {} has shape {shape:?}", run.estimator));
+                }
             }
             let Some(image) = &run.image else { continue };
             let shape = self.arrays.get(&image.pixels).map(|a| &a.shape[..]);

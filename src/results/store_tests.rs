@@ -170,7 +170,11 @@ fn timing_and_provenance() {
     let (_temp, folder, _) = written();
     assert_eq!(folder.read_timing().expect("no timing"), None);
     let mut timing = Timing::default();
-    timing.add("smooth", "mis", TimeSpent { cpu_seconds: 0.1, wall_seconds: 0.1, passes: 1, paths: 6 });
+    timing.add(
+        "smooth",
+        "mis",
+        TimeSpent { cpu_seconds: 0.1, set_up_seconds: 0.0, wall_seconds: 0.1, passes: 1, paths: 6 },
+    );
     folder.write_timing(&timing).expect("a write");
     assert_eq!(folder.read_timing().expect("a timing"), Some(timing));
     let provenance = Provenance::collect(1);

@@ -37,8 +37,11 @@ pub struct Batches {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeSpent {
-    /// CPU seconds, summed over threads.
+    /// CPU seconds of the passes, summed over threads.
     pub cpu_seconds: f64,
+    /// CPU seconds before the first pass: building the estimator, and what its walks had to learn.
+    #[serde(default)]
+    pub set_up_seconds: f64,
     /// Wall-clock seconds of its blocks, summed; with several threads they overlap.
     pub wall_seconds: f64,
     /// Passes that took that time; fewer than the record's where a resumed run lost its timing.
@@ -52,6 +55,7 @@ impl Timing {
     pub fn add(&mut self, cell: &str, estimator: &str, cost: TimeSpent) {
         let sum = self.cells.entry(cell.into()).or_default().entry(estimator.into()).or_default();
         sum.cpu_seconds += cost.cpu_seconds;
+        sum.set_up_seconds += cost.set_up_seconds;
         sum.wall_seconds += cost.wall_seconds;
         sum.passes += cost.passes;
         sum.paths += cost.paths;
@@ -74,9 +78,14 @@ impl Timing {
 }
 
 impl TimeSpent {
-    /// CPU seconds per pass; nothing where no pass was timed.
+    /// CPU seconds of everything.
+    pub fn all_seconds(&self) -> f64 {
+        self.cpu_seconds + self.set_up_seconds
+    }
+
+    /// CPU seconds per pass, each with its part of the set-up; nothing where no pass was timed.
     pub fn cpu_seconds_per_pass(&self) -> Option<f64> {
-        (self.passes > 0).then(|| self.cpu_seconds / self.passes as f64)
+        (self.passes > 0).then(|| self.all_seconds() / self.passes as f64)
     }
 
     /// Paths per CPU second.
@@ -92,11 +101,17 @@ mod tests {
     #[test]
     fn blocks_add_up() {
         let mut timing = Timing::default();
-        let block = TimeSpent { cpu_seconds: 0.5, wall_seconds: 0.75, passes: 4, paths: 100 };
+        let block = TimeSpent {
+            cpu_seconds: 0.5,
+            set_up_seconds: 0.25,
+            wall_seconds: 0.75,
+            passes: 4,
+            paths: 100,
+        };
         timing.add("a", "mis", block);
         timing.add("a", "mis", block);
         let cost = timing.of("a", "mis").expect("a cost");
-        assert_eq!((cost.cpu_seconds_per_pass(), cost.paths_per_second()), (Some(0.125), Some(200.0)));
+        assert_eq!((cost.cpu_seconds_per_pass(), cost.paths_per_second()), (Some(0.1875), Some(200.0)));
         assert!(timing.of("a", "snee").is_none());
         assert!(TimeSpent::default().cpu_seconds_per_pass().is_none());
     }

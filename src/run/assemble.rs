@@ -9,17 +9,19 @@ use super::job::{Finished, Job, Passes, Task};
 use super::jobs::{Plan, named};
 use super::workers::{Completed, Output};
 use crate::error::Result;
-use crate::estimators::{self, Anomaly, Cost};
+use crate::estimators::{self, Anomaly, Cost, GuideSlice};
 use crate::experiment::Experiment;
 use crate::experiment::build::inputs;
 use crate::results::json::hash_json;
 use crate::results::npy::Array;
 use crate::results::provenance::fingerprint;
 use crate::results::record::{
-    Cell, EstimatorRun, Image, ObservedRegion, Record, Replay, SCHEMA_VERSION, StatedBias, StatedTail,
-    Tile,
+    Cell, EstimatorRun, GuidePlane, Image, ObservedRegion, Record, Replay, SCHEMA_VERSION, StatedBias,
+    StatedTail, Tile,
 };
-use crate::results::store::{Arrays, costs_path, observables_path, pixels_path, spread_path};
+use crate::results::store::{
+    Arrays, costs_path, guide_path, observables_path, pixels_path, spread_path,
+};
 use crate::results::timing::{self, Timing};
 use crate::scene::sensor::{PixelRectangle, SensorRegion};
 
@@ -73,7 +75,7 @@ pub(super) fn assemble(
         match (&job.task, output) {
             (Task::Estimate(passes), Output::Passes(finished)) => {
                 let cell = &mut cells[passes.cell];
-                timing.add(&cell.label, &passes.arm.name, cost(&finished));
+                timing.add(&cell.label, &passes.arm.name, cost(passes, &finished));
                 timing.set_batches(&cell.label, &passes.arm.name, batches(&finished));
                 let run = estimator_run(experiment, passes, cell.runs.len(), *finished, &mut arrays);
                 cell.runs.push(run);
@@ -121,10 +123,11 @@ fn regions(job: &Passes) -> Vec<ObservedRegion> {
     job.layout.regions().iter().map(region).collect()
 }
 
-fn cost(finished: &Finished) -> timing::TimeSpent {
+fn cost(job: &Passes, finished: &Finished) -> timing::TimeSpent {
     let total = finished.total();
     timing::TimeSpent {
         cpu_seconds: total.cpu_seconds,
+        set_up_seconds: job.set_up.seconds(),
         wall_seconds: finished.tally.wall_seconds,
         passes: finished.passes,
         paths: total.cost[Cost::Paths as usize],
@@ -177,6 +180,7 @@ fn estimator_run(
         arrays.insert(spread.clone(), Array::new(vec![finished.spread.len(), bands, 5], pairs));
         Image { width, height, pixels, spread }
     });
+    let guide = guide_plane(job, run, arrays);
     let counts = |names: Vec<&str>, values: &[u64]| {
         names.into_iter().map(str::to_string).zip(values.iter().copied()).collect()
     };
@@ -197,9 +201,26 @@ fn estimator_run(
         moments,
         costs,
         image,
+        guide,
         cost: counts(Cost::ALL.map(Cost::name).into(), &total.cost),
         anomalies: counts(Anomaly::ALL.map(Anomaly::name).into(), &finished.tally.anomalies),
     }
+}
+
+/// What guides a job's walks, and its array.
+fn guide_plane(job: &Passes, run: usize, arrays: &mut Arrays) -> Option<GuidePlane> {
+    let slices = if job.arm.is_control { Vec::new() } else { job.estimator.guides() };
+    let first = slices.iter().flatten().next()?;
+    let GuideSlice { columns, rows, x_mm, z_mm, .. } = *first;
+    let nothing = vec![[0.0; 3]; rows * columns];
+    let nodes = |slice: &Option<GuideSlice>| match slice {
+        Some(slice) => slice.nodes.clone(),
+        None => nothing.clone(),
+    };
+    let data = slices.iter().flat_map(nodes).flatten().collect();
+    let array = guide_path(job.cell, run);
+    arrays.insert(array.clone(), Array::new(vec![slices.len(), rows, columns, 3], data));
+    Some(GuidePlane { x_mm, z_mm, array })
 }
 
 fn heavy_tail(tail: estimators::HeavyTail) -> StatedTail {

@@ -1,7 +1,8 @@
 //! Units of work: an estimator in a cell, or a sampler; and the passes of an estimator with their
 //! results.
 
-use std::time::Instant;
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
@@ -73,12 +74,44 @@ pub(crate) struct Passes {
     pub count: Option<u64>,
     /// Estimator that runs the passes.
     pub estimator: Box<dyn Estimator>,
+    /// What building and preparing it took.
+    pub set_up: SetUp,
     /// Observables and bands of the scores.
     pub layout: Layout,
     /// Bands that one call runs together, with their streams.
     pub groups: Vec<Group>,
     /// What the budget means for this run.
     pub terms: BudgetTerms,
+}
+
+/// CPU time that an estimator takes before its first pass.
+#[derive(Debug, Default)]
+pub(crate) struct SetUp {
+    /// Of building it.
+    built: Duration,
+    /// Of preparing it.
+    prepared: OnceLock<Duration>,
+}
+
+impl SetUp {
+    /// Of an estimator that took this long to build.
+    pub(crate) fn built(built: Duration) -> SetUp {
+        SetUp { built, ..SetUp::default() }
+    }
+
+    /// Prepares the estimator, if no other thread has.
+    fn prepare(&self, estimator: &dyn Estimator) {
+        self.prepared.get_or_init(|| {
+            let before = thread_cpu_time();
+            estimator.prepare();
+            thread_cpu_time().saturating_sub(before)
+        });
+    }
+
+    /// All of it, seconds.
+    pub(crate) fn seconds(&self) -> f64 {
+        (self.built + self.prepared.get().copied().unwrap_or_default()).as_secs_f64()
+    }
 }
 
 /// What a budget means for one run.
@@ -317,6 +350,7 @@ impl Passes {
         keep_level: u32,
         stop: &dyn Fn() -> bool,
     ) -> Option<Block> {
+        self.set_up.prepare(&*self.estimator);
         let mut block = Block { bands: self.layout.bands(), ..Block::empty(start, keep_level) };
         let mut scores = Scores::new(self.layout.clone());
         let wall = Instant::now();

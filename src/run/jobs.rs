@@ -7,8 +7,9 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::chi_square::Draws;
+use super::clock::thread_cpu_time;
 use super::comparisons;
-use super::job::{Arm, BudgetTerms, Group, Job, Passes, Task, band_groups};
+use super::job::{Arm, BudgetTerms, Group, Job, Passes, SetUp, Task, band_groups};
 use super::keys::{KEY_VERSION, Stage, StreamName};
 use super::memory::MemoryEstimate;
 use crate::error::{Error, Result};
@@ -165,7 +166,9 @@ impl Planner<'_> {
         let (kind, options) = words.choice().ok_or_else(no_kind)?;
         let unknown = || Error::input(format!("estimator `{}`: unknown kind `{kind}`", words.name));
         let registered = self.registry.get(kind).ok_or_else(unknown)?;
+        let before = thread_cpu_time();
         let estimator = (registered.build)(options, Arc::clone(&cell.scene))?;
+        let set_up = SetUp::built(thread_cpu_time().saturating_sub(before));
         let groups = band_groups(estimator.band_use(), self.bands.len()).into_iter();
         let groups = groups.map(|group| self.group(cell.spec, &arm.name, group)).collect();
         let label = match cell.spec.label.as_str() {
@@ -187,8 +190,18 @@ impl Planner<'_> {
             "control": arm.is_control,
         });
         let (stage, layout) = (self.stage, cell.layout.clone());
-        let passes =
-            Passes { cell: index, entry, arm, stage, count: None, estimator, layout, groups, terms };
+        let passes = Passes {
+            cell: index,
+            entry,
+            arm,
+            stage,
+            count: None,
+            estimator,
+            set_up,
+            layout,
+            groups,
+            terms,
+        };
         Ok(Job { label, identity: hash_json(&identity), task: Task::Estimate(Box::new(passes)) })
     }
 

@@ -8,6 +8,8 @@ use crate::error::{Error, Result};
 pub(crate) struct MemoryEstimate {
     /// Meshes and maps, bytes.
     pub shapes: usize,
+    /// What estimators hold for all their passes, such as what guides walks, bytes.
+    pub guides: usize,
     /// Additional memory while the largest mesh is made, before anything runs, bytes.
     pub building: usize,
     /// Moments of observables and images of everything measured, kept until the record is written.
@@ -45,6 +47,7 @@ impl MemoryEstimate {
         let bits = passes.map_or(20, |passes| passes.max(1).ilog2() as usize + 1);
         MemoryEstimate {
             shapes,
+            guides: jobs.iter().map(|job| job.estimator.held_bytes()).sum(),
             building,
             results: jobs.iter().map(|job| 2 * (image(job) + moments(job))).sum(),
             working: (2 * bits * arms + (3 + 2 * arms) * threads) * largest + threads * own,
@@ -53,7 +56,7 @@ impl MemoryEstimate {
 
     /// Total, bytes.
     pub(crate) fn total(&self) -> usize {
-        self.shapes + self.building.max(self.results + self.working)
+        self.shapes + self.building.max(self.guides + self.results + self.working)
     }
 
     /// Whether it fits into nine tenths of the memory that the system has to give.
@@ -112,8 +115,9 @@ mod tests {
         assert!(estimate.check(Some(2000)).is_ok());
         assert!(estimate.check(None).is_ok());
         // What makes a mesh is gone when passes run: the larger of the two counts.
-        let mesh = MemoryEstimate { shapes: 300, building: 500, results: 200, working: 100 };
+        let mesh = MemoryEstimate { shapes: 300, guides: 0, building: 500, results: 200, working: 100 };
         assert_eq!(mesh.total(), 800);
+        assert_eq!(MemoryEstimate { guides: 300, ..mesh }.total(), 900);
         assert_eq!(MemoryEstimate { building: 250, ..mesh }.total(), 600);
     }
 

@@ -115,8 +115,15 @@ thread_local! {
 
 /// Every purpose.
 #[cfg(test)]
-pub(crate) const PURPOSES: [Purpose; 6] =
-    [Purpose::Sensor, Purpose::Walk, Purpose::Light, Purpose::Connection, Purpose::Hero, Purpose::Cloud];
+pub(crate) const PURPOSES: [Purpose; 7] = [
+    Purpose::Sensor,
+    Purpose::Walk,
+    Purpose::Light,
+    Purpose::Connection,
+    Purpose::Hero,
+    Purpose::Cloud,
+    Purpose::View,
+];
 
 /// The streams that the calling thread opens in `work`.
 #[cfg(test)]
@@ -211,8 +218,8 @@ mod tests {
             ("passes", |j| StreamKey::named("passes").pass(j).stream(9, Purpose::Walk)),
             ("high pixels", |j| StreamKey::named("high pixels").pass(0).stream(j << 24, Purpose::Light)),
             ("purposes", |j| {
-                let purpose = PURPOSES[(j % 6) as usize];
-                StreamKey::named("purposes").pass(j / 12).stream(j % 12 / 6, purpose)
+                let purpose = PURPOSES[(j % 7) as usize];
+                StreamKey::named("purposes").pass(j / 14).stream(j % 14 / 7, purpose)
             }),
         ];
         let mut tests = 0;
@@ -261,8 +268,8 @@ mod tests {
     fn no_two_streams_of_a_run_start_alike() {
         let mut starts: Vec<(u64, u64)> = (0..300_000u64)
             .map(|j| {
-                let purpose = PURPOSES[(j % 6) as usize];
-                let mut stream = StreamKey::named("pixels").pass(j / 6144).stream(j % 6144 / 6, purpose);
+                let purpose = PURPOSES[(j % 7) as usize];
+                let mut stream = StreamKey::named("pixels").pass(j / 7168).stream(j % 7168 / 7, purpose);
                 (stream.draw().to_bits(), stream.draw().to_bits())
             })
             .collect();

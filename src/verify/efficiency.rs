@@ -183,9 +183,17 @@ impl CostedBatches {
             }
             CostMeasure::Cpu => {
                 let cell = stored.record.cells.get(quantity.cell).map_or("", |cell| &cell.label);
-                let timed = stored.timing.as_ref().and_then(|timing| timing.batches_of(cell, name));
+                let timing = stored.timing.as_ref();
+                let timed = timing.and_then(|timing| timing.batches_of(cell, name));
                 let timed = timed.ok_or_else(|| format!("no CPU time of {name} was kept"))?;
-                (timed.cpu_seconds.clone(), timed.settled.clone())
+                // Every pass has its part of the set-up.
+                let spent = timing.and_then(|timing| timing.of(cell, name));
+                let set_up = spent.map_or(0.0, |spent| spent.set_up_seconds);
+                let passes: u64 = batches.iter().map(|batch| batch.n).sum();
+                let part = |batch: &Moments| set_up * batch.n as f64 / passes as f64;
+                let costs = timed.cpu_seconds.iter().enumerate();
+                let costs = costs.map(|(i, cost)| cost + batches.get(i).map_or(0.0, part)).collect();
+                (costs, timed.settled.clone())
             }
         };
         if costs.len() != batches.len() || settled.len() != batches.len() {

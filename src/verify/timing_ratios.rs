@@ -88,7 +88,13 @@ mod tests {
             let seconds = |i: u64| factor * 0.01 * (1.0 + 0.05 * sample::uniform(seed + i));
             let cpu_seconds: Vec<f64> = (0..batches).map(seconds).collect();
             let all: f64 = cpu_seconds.iter().sum();
-            let cost = TimeSpent { cpu_seconds: all, wall_seconds: all, passes: PASSES, paths: 1 };
+            let cost = TimeSpent {
+                cpu_seconds: all,
+                set_up_seconds: 0.0,
+                wall_seconds: all,
+                passes: PASSES,
+                paths: 1,
+            };
             timing.add("smooth", name, cost);
             let settled = vec![true; cpu_seconds.len()];
             timing.set_batches(

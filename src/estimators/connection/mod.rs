@@ -215,7 +215,7 @@ impl Estimator for SpecularConnection {
         }
     }
 
-    fn working_bytes(&self) -> usize {
+    fn held_bytes(&self) -> usize {
         self.setup.solver.heap_bytes()
     }
 

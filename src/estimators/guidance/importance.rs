@@ -215,6 +215,18 @@ impl Importance {
         }
     }
 
+    /// The largest phi.
+    pub(super) fn largest(&self) -> f64 {
+        match self {
+            Importance::HalfSpace { .. } => 1.0,
+            Importance::Slab { kappa, thickness, a, b, .. } => {
+                let e = exp(-kappa * thickness);
+                (a + b * e).max(a * e + b)
+            }
+            Importance::Grid(_) => LARGEST,
+        }
+    }
+
     /// Memory on the heap, bytes.
     pub(super) fn heap_bytes(&self) -> usize {
         match self {
@@ -556,7 +568,7 @@ fn relax(
 }
 
 /// The least box that holds a finite body.
-fn extent(shape: &Shape) -> Option<[DVec3; 2]> {
+pub(super) fn extent(shape: &Shape) -> Option<[DVec3; 2]> {
     match *shape {
         Shape::Box { half } => Some([-half, half]),
         Shape::Mesh(ref mesh) => {

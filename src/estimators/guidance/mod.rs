@@ -4,20 +4,25 @@
 //! ([`crate::optics::guided`]): the second with the share q, and both weighted by the balance heuristic over direction and
 //! distance together, so that no event has a weight above albedo / (1 - q). Importance comes from a diffusion solution in
 //! the body ([`importance`]), or grows along the normal where the walk came in (Dwivedi's sampling as production has it:
-//! Krivanek & d'Eon 2014). Whatever it is, results are unbiased; only their variance changes.
+//! Krivanek & d'Eon 2014), or is what earlier walks have found ([`learned`]). Whatever it is, results are unbiased; only their
+//! variance changes.
 //!
 //! ```text
 //! lights, boundary, medium, body -> Importance -> Guidance (one per band) -> GuidedBand (state of a walk)
+//! walks of a warm-up -> LearnedPulls ----^
 //! ```
 
 mod exit;
 mod importance;
 mod incidence;
+mod learned;
+mod slice;
 mod steered;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::geometry::Side;
 use crate::math::DVec3;
 use crate::optics::guided::{GuidedTurns, Pull, StepGuide, diffuse_growth};
 use crate::optics::medium::Medium;
@@ -25,6 +30,8 @@ use crate::scene::Scene;
 
 use importance::Importance;
 
+pub(super) use learned::{FoundLight, LearnedPulls, LearningCells, Lessons};
+pub use slice::GuideSlice;
 pub(super) use steered::GuidedBand;
 
 /// How a walk is drawn inside the body; all ways are unbiased.
@@ -56,6 +63,26 @@ pub enum WalkDraw {
         #[serde(default = "least_depth")]
         #[schemars(range(min = 0.0))]
         least_depth: f64,
+        /// Whether walks are guided even where subdivision connects to every light and these shine where walks come in:
+        /// there the connections find the light, and a plain step costs less.
+        #[serde(default)]
+        near_lights: bool,
+    },
+    /// Towards where earlier walks have found light, per cell of the body (path guiding; with products and distances, as Herholz
+    /// et al. 2019). Learned before the first pass, and timed with the passes.
+    Learned {
+        /// Share of turns and flights that are guided.
+        #[serde(default = "half")]
+        #[schemars(range(min = 0.0, max = 0.99))]
+        share: f64,
+        /// Cells along the longest side of a finite body.
+        #[serde(default = "cells")]
+        #[schemars(range(min = 1, max = 64))]
+        cells: u32,
+        /// Paths to learn from, per band.
+        #[serde(default = "paths")]
+        #[schemars(range(min = 16, max = 16777216))]
+        paths: u64,
     },
 }
 
@@ -69,6 +96,11 @@ impl WalkDraw {
     /// By a solution in the body.
     pub(super) fn is_guided(&self) -> bool {
         matches!(self, WalkDraw::Guided { .. })
+    }
+
+    /// Whether walks are guided even where connections find all light near where walks come in.
+    pub(super) fn is_near_lights(&self) -> bool {
+        matches!(self, WalkDraw::Guided { near_lights: true, .. })
     }
 }
 
@@ -88,6 +120,17 @@ fn nodes() -> u32 {
     24
 }
 
+fn cells() -> u32 {
+    8
+}
+
+fn paths() -> u64 {
+    32768
+}
+
+/// Rays of the sensor that tell where walks come in.
+const RAYS: usize = 64;
+
 /// Where importance grows.
 #[derive(Clone, Debug)]
 enum Aim {
@@ -95,6 +138,8 @@ enum Aim {
     Normal(f64),
     /// By a solution in the body.
     Solution(Importance),
+    /// As walks have learned.
+    Learned(LearnedPulls),
 }
 
 /// What guides the walks of one band.
@@ -107,10 +152,10 @@ pub(super) struct Guidance {
 }
 
 impl Guidance {
-    /// Per band; `None` where walks are plain: nothing scatters, or no light comes in.
+    /// Per band; `None` where walks are plain: nothing scatters, no light comes in, or nothing has been learned yet.
     pub(super) fn of_bands(scene: &Scene, draw: WalkDraw) -> Vec<Option<Guidance>> {
         let (share, aims) = match draw {
-            WalkDraw::Plain {} => return vec![None; scene.bands()],
+            WalkDraw::Plain {} | WalkDraw::Learned { .. } => return vec![None; scene.bands()],
             WalkDraw::Dwivedi { share } => {
                 let aim = |Medium { sigma_t, albedo, phase, .. }: &Medium| {
                     let scatters = *sigma_t > 0.0 && *albedo > 0.0;
@@ -118,7 +163,7 @@ impl Guidance {
                 };
                 (share, scene.medium.iter().map(aim).collect::<Vec<_>>())
             }
-            WalkDraw::Guided { share, nodes, least_depth } => {
+            WalkDraw::Guided { share, nodes, least_depth, .. } => {
                 let solutions = Importance::of_bands(scene, nodes, least_depth);
                 (share, solutions.into_iter().map(|solved| solved.map(Aim::Solution)).collect())
             }
@@ -127,6 +172,12 @@ impl Guidance {
             Some(Guidance { share, turns: GuidedTurns::new(medium.phase, medium.albedo), aim: aim? })
         };
         aims.into_iter().zip(&scene.medium).map(of_band).collect()
+    }
+
+    /// By what walks have learned.
+    pub(super) fn learned(share: f64, medium: &Medium, learned: LearnedPulls) -> Guidance {
+        let turns = GuidedTurns::new(medium.phase, medium.albedo);
+        Guidance { share, turns, aim: Aim::Learned(learned) }
     }
 
     /// What guides a step from a point, and phi (0 where nothing is known), of a walk that last came in at a boundary point with
@@ -139,7 +190,25 @@ impl Guidance {
                 0.0
             }
             Aim::Solution(importance) => importance.at(x, guide),
+            Aim::Learned(learned) => {
+                *guide = StepGuide::inner(learned.at(x));
+                0.0
+            }
         }
+    }
+
+    /// Importance where rays of the sensor first meet the body, over its largest in the body; 1 where none is known.
+    pub(super) fn at_first_hits(&self, scene: &Scene) -> f64 {
+        let Aim::Solution(importance) = &self.aim else { return 1.0 };
+        let rays = scene.sensor.rays_per_pass();
+        let at_hit = |i: usize| {
+            let start = scene.sensor.ray(i * rays / RAYS.min(rays), [0.5; 4]);
+            let hit = scene.shape.intersect(&start.ray, Side::Outside, None, f64::INFINITY)?;
+            Some(importance.at(hit.point, &mut StepGuide::NONE.clone()))
+        };
+        let found: Vec<f64> = (0..RAYS.min(rays)).filter_map(at_hit).collect();
+        let mean = found.iter().sum::<f64>() / found.len() as f64;
+        if found.is_empty() { 1.0 } else { mean / importance.largest() }
     }
 
     /// Memory on the heap, bytes.
@@ -147,6 +216,7 @@ impl Guidance {
         let aim = match &self.aim {
             Aim::Normal(_) => 0,
             Aim::Solution(importance) => importance.heap_bytes(),
+            Aim::Learned(learned) => learned.heap_bytes(),
         };
         self.turns.heap_bytes() + aim
     }

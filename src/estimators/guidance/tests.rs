@@ -158,7 +158,7 @@ fn where_nothing_guides() {
     let dark = scene(SPHERE, SMOOTH, medium(5.0, 0.9, 0.0), vec![cap(DVec3::Z, 1e-3, 0.0)]);
     assert!(first(Importance::of_bands(&dark, 16, 0.0)).is_none());
     let still = scene(SPHERE, SMOOTH, medium(5.0, 0.0, 0.0), vec![sky()]);
-    let guided = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0 };
+    let guided = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0, near_lights: true };
     assert!(first(Guidance::of_bands(&still, guided)).is_none());
     let shallow = |depth| scene(SPHERE, SMOOTH, medium(depth, 0.9, 0.0), vec![sky()]);
     assert!(first(Importance::of_bands(&shallow(4.0), 16, 5.0)).is_none());

@@ -52,8 +52,8 @@ impl Draw<'_> {
     /// With a walk that stands at the vertex.
     fn with<T>(&self, numbers: &[f64], go: impl FnOnce(&mut Walk<'_>) -> T) -> T {
         let key = StreamKey::named("draws").pass(0);
-        let mut scores = Scores::new(Layout::new(&self.snee.field.scene));
-        let on = Path { field: &self.snee.field, band: 0, index: 0, key: &key };
+        let mut scores = Scores::new(Layout::new(&self.snee.walks.field().scene));
+        let on = Path { field: self.snee.walks.field(), band: 0, index: 0, key: &key };
         let connections = Connections::new(&self.snee.setups[0], Stream::scripted(numbers));
         let mut walk = CameraWalk::led(on, &mut scores, connections, OneBand, self.at.point);
         walk.ray.dir = self.at.arrival;
@@ -320,7 +320,7 @@ fn densities_are_those_of_the_draws() {
 /// light.
 fn measure(draw: &Draw<'_>, places: &Places, numbers: &[f64], light: usize) -> Option<(f64, f64)> {
     let drawn = draw.of(numbers).filter(|drawn| drawn.light == light)?;
-    let emitter = &draw.snee.field.scene.lights[light];
+    let emitter = &draw.snee.walks.field().scene.lights[light];
     if !emitter.is_directional() && emitter.eval(0, drawn.w_l).1 == 0.0 {
         return None; // refracted past the light
     }
@@ -347,7 +347,7 @@ fn measure(draw: &Draw<'_>, places: &Places, numbers: &[f64], light: usize) -> O
     }
     if places.freedom == Freedom::Distance {
         // A delta in w_kj, written in w_L; and the distance, per volume.
-        let eta = draw.snee.field.scene.boundary[0].eta();
+        let eta = draw.snee.walks.field().scene.boundary[0].eta();
         let cos = drawn.exit.frame.to_local(drawn.w_l).z;
         let length = (drawn.x_j.expect("subdivided") - drawn.exit.hit.point).length();
         sum *= eta * eta * (drawn.exit.wo.z / cos).abs() / (length * length);
@@ -378,7 +378,7 @@ fn mixtures_are_linear() {
 fn linear(mixed: &Snee, lobes: &[Snee], shares: &[f64], technique: Technique, stream: &mut Stream) {
     let mut done = 0;
     while done < 20 {
-        let Some(path) = FixedPath::draw(&mixed.field.scene, 1, stream, false) else { continue };
+        let Some(path) = FixedPath::draw(&mixed.walks.field().scene, 1, stream, false) else { continue };
         let (from, point) =
             if technique == GuidedVertex { (path.x_i, path.x_j) } else { (path.start, path.x_i) };
         let at = WalkVertex { point, arrival: (point - from).normalize(), walks: 1.0 };

@@ -67,6 +67,11 @@ impl Guide {
         }
     }
 
+    /// Whether it is all of its light.
+    pub(super) fn is_whole(&self) -> bool {
+        self.bright.is_none()
+    }
+
     /// A direction towards the guide's part of its light.
     pub(super) fn sample(&self, light: &Light, band: usize, u: [f64; 2]) -> LightSample {
         match (&self.bright, &light.emission) {

@@ -31,16 +31,17 @@ use std::sync::Arc;
 
 use super::bands::{MAX_SHARED, OneBand, SharedBands};
 use super::connection::{self, Conic};
-use super::field::{Field, Path};
+use super::field::Path;
 use super::guidance::GuidedBand;
 use super::illumination::unscattered_notes;
 use super::walk::{CameraWalk, Unrivalled};
-use super::{BandUse, Estimator, EstimatorKind, Scores, Serves, read_options};
+use super::warm_up::TaughtField;
+use super::{BandUse, Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::{Error, Result};
 use crate::optics::boundary::Boundary;
 use crate::optics::joint::{JointDirections, JointTable};
 use crate::sampling::stream::{PassKey, Purpose};
-use crate::scene::Scene;
+use crate::scene::{Light, Scene};
 
 use guide::Guide;
 use specular::Specular;
@@ -53,6 +54,10 @@ pub use options::{EdgeTechnique, JointKind, SneeChoices, SneeOptions, SneePreset
 pub use probe::ProbeShares;
 pub use specular::ConnectionCall;
 pub use two_bounce::TwoBounce;
+
+/// Importance where walks come in, over its largest in the body, from which on they stay plain under lights that are all
+/// connected to.
+const NEAR: f64 = 0.1;
 
 /// Data of connections, for one band.
 #[derive(Debug)]
@@ -67,10 +72,20 @@ struct BandSetup {
     views: u32,
 }
 
+impl BandSetup {
+    /// Whether every light that shines in the band is connected to as a whole.
+    fn connects_to_all(&self, lights: &[Light], band: usize) -> bool {
+        lights.iter().enumerate().all(|(index, light)| {
+            let is_whole = |guide: &Guide| guide.light == index && guide.is_whole();
+            light.strength(band) == 0.0 || self.guides.iter().any(is_whole)
+        })
+    }
+}
+
 /// The estimator, for one scene.
 #[derive(Debug)]
 pub struct Snee {
-    field: Field,
+    walks: TaughtField,
     options: Arc<SneeOptions>,
     /// Per band; one for all where they share walks.
     setups: Vec<BandSetup>,
@@ -137,19 +152,25 @@ impl Snee {
             BandSetup { options: options.clone(), guides, sigma, joint, specular, views }
         };
         let count = if options.share_bands { 1 } else { scene.bands() };
-        let setups = (0..count).map(setup).collect();
-        let mut field = Field::with_walks(scene, options.roulette, options.walk);
-        if options.walk.is_guided() && options.strategies.bsdf {
-            field = field.finding_even_lights();
+        let setups: Vec<BandSetup> = (0..count).map(setup).collect();
+        let mut walks = TaughtField::new(scene.clone(), options.roulette, options.walk);
+        if !options.walk.is_near_lights() {
+            walks = walks.plain_in(|band, guidance| {
+                setups[band].connects_to_all(&scene.lights, band)
+                    && guidance.at_first_hits(&scene) > NEAR
+            });
         }
-        Ok(Snee { field, options, setups })
+        if options.walk.is_guided() && options.strategies.bsdf {
+            walks = walks.finding_even_lights();
+        }
+        Ok(Snee { walks, options, setups })
     }
 }
 
 /// Properties that must be equal in all bands if they share walks.
 fn check_shared(scene: &Scene) -> Result<()> {
     let same_boundary = scene.boundary.windows(2).all(|pair| pair[0] == pair[1]);
-    let grey = |light: &crate::scene::Light| (1..scene.bands()).all(|band| light.is_same_in(0, band));
+    let grey = |light: &Light| (1..scene.bands()).all(|band| light.is_same_in(0, band));
     let trouble = if scene.bands() > MAX_SHARED {
         format!("there are {} bands, and at most {MAX_SHARED} can share a walk", scene.bands())
     } else if !same_boundary {
@@ -165,23 +186,28 @@ fn check_shared(scene: &Scene) -> Result<()> {
 }
 
 impl Estimator for Snee {
+    fn prepare(&self) {
+        self.walks.field();
+    }
+
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
-        let rays = self.field.scene.sensor.rays_per_pass();
+        let field = self.walks.field();
+        let rays = field.scene.sensor.rays_per_pass();
         if self.options.share_bands {
-            let media = &self.field.scene.medium;
+            let media = &field.scene.medium;
             for index in 0..rays {
                 let u = key.stream(index as u64, Purpose::Hero).draw();
                 let hero = ((u * media.len() as f64) as usize).min(media.len() - 1);
-                let path = Path { field: &self.field, band: hero, index, key };
+                let path = Path { field, band: hero, index, key };
                 self.trace(0, path, scores, SharedBands::new(media, hero));
             }
         } else {
             for &band in bands {
                 for index in 0..rays {
-                    let path = Path { field: &self.field, band, index, key };
-                    match self.field.guidance(band) {
+                    let path = Path { field, band, index, key };
+                    match field.guidance(band) {
                         Some(guidance) => {
-                            let medium = &self.field.scene.medium[band];
+                            let medium = &field.scene.medium[band];
                             self.trace(band, path, scores, GuidedBand::new(guidance, medium));
                         }
                         None => self.trace(band, path, scores, OneBand),
@@ -195,14 +221,18 @@ impl Estimator for Snee {
         if self.options.share_bands { BandUse::Shared } else { BandUse::EachAlone }
     }
 
-    fn working_bytes(&self) -> usize {
+    fn guides(&self) -> Vec<Option<GuideSlice>> {
+        self.walks.guides()
+    }
+
+    fn held_bytes(&self) -> usize {
         let technique = self.setups.iter().find_map(|setup| setup.specular.as_ref());
-        self.field.heap_bytes() + technique.map_or(0, |technique| technique.solver.heap_bytes())
+        self.walks.heap_bytes() + technique.map_or(0, |technique| technique.solver.heap_bytes())
     }
 
     fn notes(&self) -> Vec<String> {
         let Strategies { bsdf, light, .. } = self.options.strategies;
-        let scene = &self.field.scene;
+        let scene = self.walks.scene();
         let mut notes = if self.setups.iter().any(|setup| setup.specular.is_some()) {
             connection::missing_notes(scene)
         } else {

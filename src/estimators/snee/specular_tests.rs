@@ -80,7 +80,7 @@ fn led<'a, B: WalkBands>(
     before: Before,
     mut stop: impl FnMut(&mut Walk<'a, B>),
 ) -> Walk<'a, B> {
-    let on = Path { field: &snee.field, band: hero, index: 0, key };
+    let on = Path { field: snee.walks.field(), band: hero, index: 0, key };
     let start = if before == Before::Nothing { path.x_i } else { path.start };
     let connections = Connections::new(&snee.setups[0], key.stream(0, Purpose::Connection));
     let mut walk = CameraWalk::led(on, scores, connections, bands, start);
@@ -119,7 +119,7 @@ fn alone(snee: &[Snee; 2], path: &FixedPath, before: Before, end: &GuidedEnd<'_>
     let key = StreamKey::named("alone").pass(0);
     let mut densities = [0.0; 5];
     for (from_above, snee) in [(true, &snee[0]), (false, &snee[1])] {
-        let mut scores = Scores::new(Layout::new(&snee.field.scene));
+        let mut scores = Scores::new(Layout::new(&snee.walks.field().scene));
         let mut walk = led((snee, &key, 0, OneBand), &mut scores, path, before, |_| {});
         let GuidedEnd { exit, leg, w_l, .. } = end;
         let guide = &walk.rivals.setup.guides[0];
@@ -273,7 +273,7 @@ fn drawn(
     numbers: &[f64],
 ) -> Option<(usize, DVec3, Vec<Root>)> {
     let key = StreamKey::named("drawn").pass(0);
-    let mut scores = Scores::new(Layout::new(&snee.field.scene));
+    let mut scores = Scores::new(Layout::new(&snee.walks.field().scene));
     let mut walk = led((snee, &key, 0, OneBand), &mut scores, at, before, |_| {});
     walk.rivals.stream = Stream::scripted(numbers);
     let technique = walk.rivals.setup.specular.as_ref().expect("takes part");
@@ -522,7 +522,7 @@ fn roots_behind_another_part_of_the_body_do_not_count() {
     let mut counts = [0u32; 2];
     for _ in 0..400 {
         let Some(x) = point_inside(&scene, &mut stream) else { continue };
-        let on = Path { field: &snee.field, band: 0, index: 0, key: &key };
+        let on = Path { field: snee.walks.field(), band: 0, index: 0, key: &key };
         let mut scores = Scores::new(Layout::new(&scene));
         // The first number decides that the technique is called, whatever the distance to the boundary.
         let connections = Connections::new(&snee.setups[0], Stream::scripted(&[1e-9, 0.5, 0.5, 0.5]));

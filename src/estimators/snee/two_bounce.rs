@@ -56,10 +56,11 @@ impl TwoBounce {
 impl Estimator for TwoBounce {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         let TwoBounce(snee) = self;
+        let field = snee.walks.field();
         for &band in bands {
             let setup = &snee.setups[band];
-            for index in 0..snee.field.scene.sensor.rays_per_pass() {
-                let path = Path { field: &snee.field, band, index, key };
+            for index in 0..field.scene.sensor.rays_per_pass() {
+                let path = Path { field, band, index, key };
                 if setup.guides.is_empty() {
                     CameraWalk::trace_two_bounces(path, scores, Unrivalled, OneBand);
                 } else {
@@ -92,7 +93,7 @@ mod tests {
         scene.sensor = Sensor::Vertex(Vertex { ray, paths: 1 });
         let scene = Arc::new(scene);
         let plain = SneePreset::Guided.options();
-        let walk = WalkDraw::Guided { share: 0.9, nodes: 8, least_depth: 0.0 };
+        let walk = WalkDraw::Guided { share: 0.9, nodes: 8, least_depth: 0.0, near_lights: true };
         let guided = SneeOptions { walk, ..plain.clone() };
         let refusal = TwoBounce::new(Arc::clone(&scene), guided).expect_err("refused").to_string();
         assert!(refusal.contains("no walk to guide"), "{refusal}");

@@ -147,8 +147,8 @@ fn alone(snee: &[Snee; 2], path: &FixedPath, course: Course) -> [f64; 5] {
     let key = StreamKey::named("alone").pass(0);
     let mut densities = [0.0; 5];
     for (from_above, snee) in [(true, &snee[0]), (false, &snee[1])] {
-        let mut scores = Scores::new(Layout::new(&snee.field.scene));
-        let on = Path { field: &snee.field, band: 0, index: 0, key: &key };
+        let mut scores = Scores::new(Layout::new(&snee.walks.field().scene));
+        let on = Path { field: snee.walks.field(), band: 0, index: 0, key: &key };
         let start = if course.vertices == 1 { path.x_i } else { path.start };
         let connections = Connections::new(&snee.setups[0], key.stream(0, Purpose::Connection));
         let mut walk = CameraWalk::led(on, &mut scores, connections, OneBand, start);
@@ -294,7 +294,7 @@ fn start<'a, B: super::super::bands::WalkBands>(
     course: Course,
     bands: B,
 ) -> Walk<'a, B> {
-    let on = Path { field: &snee.field, band, index: 0, key };
+    let on = Path { field: snee.walks.field(), band, index: 0, key };
     let start = if course.vertices == 1 { path.x_i } else { path.start };
     let connections = Connections::new(&snee.setups[0], key.stream(0, Purpose::Connection));
     CameraWalk::led(on, scores, connections, bands, start)
@@ -347,8 +347,8 @@ fn shared_walks_score_alike() {
 /// Of a guided walk, per technique the density of the walk up to where the technique takes over, over that of a plain
 /// walk: at the end of the path, at x_i for subdivision, at x_j for the last vertex. From the steps' own densities.
 fn guided_over_plain(snee: &Snee, path: &FixedPath, course: Course) -> [f64; 5] {
-    let guidance = snee.field.guidance(0).expect("guided");
-    let sigma_t = snee.field.scene.medium[0].sigma_t;
+    let guidance = snee.walks.field().guidance(0).expect("guided");
+    let sigma_t = snee.walks.field().scene.medium[0].sigma_t;
     let start = if course.vertices == 1 { path.x_i } else { path.start };
     let between = (1..course.vertices).map(|vertex| path.vertex_before_last(course.vertices - vertex));
     let points: Vec<DVec3> =
@@ -381,13 +381,13 @@ fn weights_with_guided_walks_sum_to_one() {
         let media = [medium(4.0, 0.9, g)];
         for boundary in [ROUGH, SMOOTH] {
             let [.., (_, options), _] = presets();
-            let walk = WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: 0.0 };
+            let walk = WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: 0.0, near_lights: true };
             let guided = SneeOptions { walk, ..options.clone() };
             for lamp in [Lamp::WideDisc, Lamp::Sun] {
                 let reference = one_end(&shape, boundary, &media, lamp, &options);
                 let scene = body(&shape, boundary, &media, &[lamp]);
                 let snee = Snee::new(scene.clone(), guided.clone()).expect("a scene for it");
-                let guidance = snee.field.guidance(0).expect("light comes in");
+                let guidance = snee.walks.field().guidance(0).expect("light comes in");
                 let mut done = 0;
                 while done < 10 {
                     let Some(path) = FixedPath::draw(&scene, 0, &mut stream, done == 9) else {
@@ -432,17 +432,17 @@ fn weights_at_a_matched_boundary_sum_to_one() {
     let lamps = [Lamp::Disc, Lamp::WideDisc, Lamp::Sky];
     let media = [medium(2.0, 0.9, 0.3)];
     let scene = body(&sphere(), Boundary::Matched, &media, &lamps);
-    let walk = WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: 0.0 };
+    let walk = WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: 0.0, near_lights: true };
     let options = SneeOptions { walk, ..SneePreset::Guided.options() };
     let snee = Snee::new(scene.clone(), options).expect("a scene for it");
     assert!(snee.setups[0].guides.is_empty());
-    let guidance = snee.field.guidance(0).expect("light comes in");
+    let guidance = snee.walks.field().guidance(0).expect("light comes in");
     let mut done = 0;
     while done < 30 {
         let light = done % 3;
         let Some(path) = FixedPath::draw(&scene, light, &mut stream, false) else { continue };
         done += 1;
-        let on = Path { field: &snee.field, band: 0, index: 0, key: &pass };
+        let on = Path { field: snee.walks.field(), band: 0, index: 0, key: &pass };
         let ray = Ray { origin: path.x_i, dir: path.w_l };
         let hit = scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY).expect("a finite body");
         let mut guide = StepGuide::NONE;

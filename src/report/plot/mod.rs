@@ -10,6 +10,8 @@ use scale::Scale;
 pub(crate) use scale::PlotAxis;
 
 mod scale;
+/// Importance in a plane.
+pub(crate) mod slice;
 /// Colours with their names.
 pub(crate) mod swatches;
 

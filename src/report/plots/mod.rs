@@ -12,6 +12,8 @@ pub(crate) use section::Section;
 mod convergence;
 /// Observed and expected counts of samplers.
 mod goodness;
+/// What guides walks.
+mod guides;
 /// Exitance by distance.
 mod profiles;
 /// Efficiency along the axes of a sweep.
@@ -31,6 +33,7 @@ pub(crate) fn sections(stored: &Stored, rows: &[EfficiencyRow], wanted: &[Wanted
         profiles::section(stored),
         spectra::section(stored),
         convergence::section(stored),
+        guides::section(stored),
         goodness::section(stored),
     ];
     let mut sections: Vec<Section> =

@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::report::document::{FigureBlock, PageBlock, PictureFile};
 use crate::report::pictures::few_bands;
+use crate::report::plot::slice::SlicePlot;
 use crate::report::plot::{Plot, panels, swatches};
 use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::{RecordFolder, Stored};
@@ -27,6 +28,8 @@ pub(crate) enum Content {
     Plots(Vec<Plot>),
     /// Names with their 8-bit sRGB colours.
     Swatches(Vec<(String, [u8; 3])>),
+    /// A plane through a body.
+    Slice(SlicePlot),
 }
 
 /// Plots under one heading.
@@ -50,11 +53,10 @@ impl Section {
     pub(crate) fn write(&self, folder: &RecordFolder) -> Result<()> {
         for drawn in &self.drawn {
             folder.write_view(&drawn.path(), drawn.to_svg().as_bytes())?;
-            let Content::Plots(plots) = &drawn.content else { continue };
-            for (number, plot) in plots.iter().enumerate() {
+            for (number, numbers) in drawn.numbers().iter().enumerate() {
                 let part = if number == 0 { String::new() } else { format!("-{}", number + 1) };
                 let path = format!("plots/{}{part}.csv", drawn.name);
-                folder.write_view(&path, plot.to_csv().as_bytes())?;
+                folder.write_view(&path, numbers.as_bytes())?;
             }
         }
         Ok(())
@@ -92,8 +94,18 @@ impl PlotFigure {
         format!("plots/{}.svg", self.name)
     }
 
+    /// As CSV, a file for each plot.
+    fn numbers(&self) -> Vec<String> {
+        match &self.content {
+            Content::Plots(plots) => plots.iter().map(Plot::to_csv).collect(),
+            Content::Swatches(_) => Vec::new(),
+            Content::Slice(slice) => vec![slice.to_csv()],
+        }
+    }
+
     fn to_svg(&self) -> String {
         match &self.content {
+            Content::Slice(slice) => slice.to_svg(),
             Content::Plots(plots) => panels(plots),
             Content::Swatches(colours) => swatches::to_svg(colours),
         }

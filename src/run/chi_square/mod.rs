@@ -118,6 +118,7 @@ impl Draws {
                 .record(&counting, contrasts, &quadrature, exhausted);
         let cost = TimeSpent {
             cpu_seconds,
+            set_up_seconds: 0.0,
             wall_seconds: wall.elapsed().as_secs_f64(),
             passes: self.samples,
             paths: self.samples,

@@ -86,6 +86,7 @@ fn stored(seed: u64, noise: f64) -> Stored {
         observables: names.into_iter().map(|name| Observable { name, class: "all".into() }).collect(),
         moments: observables_path(0, 0),
         costs: costs_path(0, 0),
+        guide: None,
         image: Some(Image {
             width: SIDE,
             height: SIDE,
