@@ -1,5 +1,6 @@
 //! Importance in a plane as colours, its growth as arrows, as SVG.
 
+use crate::math::{DVec2, log10};
 use crate::results::csv_text;
 
 /// A plane of x and z through a body.
@@ -41,7 +42,7 @@ impl SlicePlot {
     /// Whole decades from the largest importance down to the least, up to `DECADES`.
     fn decades(&self) -> f64 {
         let known = self.nodes.iter().map(|node| node[0]).filter(|phi| *phi > 0.0);
-        (-known.fold(1.0, f64::min).log10()).ceil().clamp(1.0, DECADES)
+        (-log10(known.fold(1.0, f64::min))).ceil().clamp(1.0, DECADES)
     }
 
     /// The plane with its legend.
@@ -94,7 +95,7 @@ impl SlicePlot {
         for row in (first..self.rows()).step_by(STRIDE) {
             for column in (first..self.columns).step_by(STRIDE) {
                 let [phi, along_x, along_z] = self.nodes[row * self.columns + column];
-                let strength = along_x.hypot(along_z);
+                let strength = DVec2::new(along_x, along_z).length();
                 if phi <= 0.0 || strength < 0.01 {
                     continue;
                 }
@@ -136,7 +137,7 @@ impl SlicePlot {
 
 /// The shade of an importance: 0 at the least of the decades.
 fn shade_of(phi: f64, decades: f64) -> usize {
-    let part = (1.0 + phi.log10() / decades).clamp(0.0, 1.0);
+    let part = (1.0 + log10(phi) / decades).clamp(0.0, 1.0);
     (part * (SHADES - 1) as f64).round() as usize
 }
 
