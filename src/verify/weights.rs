@@ -27,11 +27,11 @@ use crate::results::store::Stored;
 ///
 /// prints them.
 pub const WEIGHTS: [(&str, f64); 10] = [
-    ("paths", 0.0),
+    ("paths", 36.0),
     ("rays", 50.0),
-    ("shadow_rays", 240.0),
+    ("shadow_rays", 290.0),
     ("medium_events", 0.0),
-    ("boundary_events", 5.0),
+    ("boundary_events", 0.0),
     ("cloud_points", 500.0),
     ("cloud_nodes", 30.0),
     ("cloud_candidates", 30.0),
