@@ -2,7 +2,7 @@
 
 use super::clearance::Clearance;
 use super::normals::Normals;
-use super::tree::{BoxTree, MeshFrame};
+use super::tree::{BoxTree, MeshFrame, Visit};
 use super::triangle::{self, Crossing, Sheared};
 use super::{BoundingSphere, FaceId, Hit, Ray, Side, topology};
 use crate::error::Result;
@@ -71,10 +71,50 @@ struct Nearest {
 }
 
 impl Nearest {
+    fn within(t_max: f64) -> Nearest {
+        // The index after all triangles: a crossing at t_max itself comes before it.
+        Nearest { t: t_max, triangle: u32::MAX, found: None }
+    }
+
+    #[inline(always)]
     fn offer(&mut self, crossing: Crossing, triangle: u32, slot: usize) {
         if (crossing.t, triangle) < (self.t, self.triangle) {
             *self = Nearest { t: crossing.t, triangle, found: Some((crossing, slot)) };
         }
+    }
+}
+
+/// Looks for the nearest crossing.
+struct Closest<'a> {
+    mesh: &'a Mesh,
+    sheared: Sheared,
+    from: Option<FaceId>,
+    nearest: Nearest,
+}
+
+impl Visit for Closest<'_> {
+    #[inline(always)]
+    fn visit(&mut self, slot: usize) -> f64 {
+        if let Some((crossing, triangle)) = self.mesh.meet(&self.sheared, slot, self.from) {
+            self.nearest.offer(crossing, triangle, slot);
+        }
+        self.nearest.t
+    }
+}
+
+/// Looks for any crossing.
+struct Any<'a> {
+    mesh: &'a Mesh,
+    sheared: Sheared,
+    from: Option<FaceId>,
+    is_met: bool,
+}
+
+impl Visit for Any<'_> {
+    #[inline(always)]
+    fn visit(&mut self, slot: usize) -> f64 {
+        self.is_met = self.mesh.meet(&self.sheared, slot, self.from).is_some();
+        if self.is_met { f64::NEG_INFINITY } else { f64::INFINITY }
     }
 }
 
@@ -166,15 +206,9 @@ impl Mesh {
             return Some(hit);
         }
         let sheared = Sheared::new(ray, side);
-        // The index after all triangles: a crossing at t_max itself comes before it.
-        let mut nearest = Nearest { t: t_max, triangle: u32::MAX, found: None };
-        self.tree.closest(ray, t_max, |slot| {
-            if let Some((crossing, triangle)) = self.meet(&sheared, slot, from) {
-                nearest.offer(crossing, triangle, slot);
-            }
-            nearest.t
-        });
-        nearest.found.map(|(crossing, slot)| self.hit_leaf(crossing, slot))
+        let mut visitor = Closest { mesh: self, sheared, from, nearest: Nearest::within(t_max) };
+        self.tree.search(ray, t_max, &mut visitor);
+        visitor.nearest.found.map(|(crossing, slot)| self.hit_leaf(crossing, slot))
     }
 
     /// See [`super::Shape::occluded`].
@@ -183,7 +217,9 @@ impl Mesh {
             return true;
         }
         let sheared = Sheared::new(ray, Side::Outside);
-        self.tree.any(ray, |slot| self.meet(&sheared, slot, from).is_some())
+        let mut visitor = Any { mesh: self, sheared, from, is_met: false };
+        self.tree.search(ray, f64::INFINITY, &mut visitor);
+        visitor.is_met
     }
 
     /// Whether the nearest crossing of a ray from the point leaves the body. A ray through an edge
@@ -253,13 +289,12 @@ impl Mesh {
         self.triangles[face as usize].map(|i| self.vertices[i as usize])
     }
 
-    #[inline]
+    #[inline(always)]
     fn meet(&self, ray: &Sheared, slot: usize, from: Option<FaceId>) -> Option<(Crossing, u32)> {
         let Leaf { corners, triangle } = &self.leaves[slot];
-        if from == Some(FaceId(*triangle)) {
-            return None;
-        }
-        ray.meet(corners, self.slack).map(|crossing| (crossing, *triangle))
+        // Few are met at all: whether it is the ray's own is asked last.
+        let crossing = ray.meet(corners, self.slack)?;
+        (from != Some(FaceId(*triangle))).then_some((crossing, *triangle))
     }
 
     fn hit_leaf(&self, crossing: Crossing, slot: usize) -> Hit {
@@ -300,7 +335,7 @@ mod tests {
                 return Some(hit);
             }
             let sheared = Sheared::new(ray, side);
-            let mut nearest = Nearest { t: t_max, triangle: u32::MAX, found: None };
+            let mut nearest = Nearest::within(t_max);
             for slot in 0..self.leaves.len() {
                 if let Some((crossing, triangle)) = self.meet(&sheared, slot, from) {
                     nearest.offer(crossing, triangle, slot);

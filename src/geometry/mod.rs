@@ -10,6 +10,7 @@ mod clearance;
 mod lines;
 mod measure;
 mod mesh;
+mod node;
 mod normals;
 mod obj;
 pub mod procedural;

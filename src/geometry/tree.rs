@@ -10,9 +10,9 @@
 //!
 //! # Behind the origin
 //!
-//! obvhs 0.4.0 rejects boxes that a ray leaves before t = 1e-4. The f32 ray starts [`BEHIND`] = 2^-6
-//! before the true one, and `tau = scale t - skip` counts from there, so a hit has `tau >= 2^-6`.
-//! A ray from afar skips to the bounding sphere, so all f32 coordinates stay below 2^11.
+//! The f32 ray starts [`BEHIND`] = 2^-6 before the true one, so that rounding of the start puts no hit before it, and
+//! `tau = scale t - skip` counts from there. A ray from afar skips to the bounding sphere, so all f32 coordinates stay
+//! below 2^11.
 //!
 //! # Padding
 //!
@@ -35,11 +35,13 @@ use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::builder::build_cwbvh;
-use obvhs::ray::{Ray as CullRay, RayHit};
+use obvhs::ray::Ray as CullRay;
+use pulp::{Arch, NullaryFnOnce};
 
 use super::Ray;
+use super::node::Slabs;
 use crate::error::{Error, Result};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, UVec2, Vec3};
 
 /// Start of the f32 ray before the true origin, units of the frame.
 const BEHIND: f64 = 0.015625;
@@ -155,25 +157,52 @@ impl BoxTree {
         &self.bvh.primitive_indices
     }
 
-    /// Calls `visit` for every slot whose box the ray may meet within `t_max`, nearer nodes first.
-    /// It returns the `t` beyond which nothing is of interest any more.
-    pub(super) fn closest(&self, ray: &Ray, t_max: f64, mut visit: impl FnMut(usize) -> f64) {
-        let Some((cull_ray, skip)) = self.frame.cull_ray(ray, t_max) else { return };
-        self.bvh.ray_traverse(cull_ray, &mut RayHit::none(), |_, slot| {
-            round_up(self.frame.scale * visit(slot) - skip)
-        });
-    }
-
-    /// Whether `visit` returns true for any slot whose box the ray may meet; it is not asked again.
-    pub(super) fn any(&self, ray: &Ray, mut visit: impl FnMut(usize) -> bool) -> bool {
-        let Some((cull_ray, _)) = self.frame.cull_ray(ray, f64::INFINITY) else { return false };
-        // Not `ray_traverse_anyhit`, which visits all boxes on the ray.
-        !self.bvh.ray_traverse_miss(cull_ray, |_, slot| if visit(slot) { 0.0 } else { f32::INFINITY })
+    /// Visits every slot whose box the ray may meet within `t_max`, nearer nodes first, until the visitor has enough.
+    pub(super) fn search(&self, ray: &Ray, t_max: f64, visitor: &mut impl Visit) {
+        let Some((ray, skip)) = self.frame.cull_ray(ray, t_max) else { return };
+        Arch::new().dispatch(Search { tree: self, ray, skip, visitor });
     }
 
     /// Memory behind the tree, bytes.
     pub(super) fn heap_bytes(&self) -> usize {
         size_of_val(&*self.bvh.nodes) + size_of_val(&*self.bvh.primitive_indices)
+    }
+}
+
+/// What a search does with the slots that it comes by. Implementations are `inline(always)`, or they are not compiled for the
+/// vector instructions that the search is compiled for.
+pub(super) trait Visit {
+    /// Looks at a slot. Returns the `t` beyond which nothing is of interest any more; minus infinity ends the search.
+    fn visit(&mut self, slot: usize) -> f64;
+}
+
+/// A search, for the vector instructions of the machine: `Arch` chooses them when the program runs.
+struct Search<'a, V> {
+    tree: &'a BoxTree,
+    ray: CullRay,
+    skip: f64,
+    visitor: &'a mut V,
+}
+
+impl<V: Visit> NullaryFnOnce for Search<'_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Search { tree: BoxTree { frame, bvh }, ray, skip, visitor } = self;
+        let slabs = Slabs::new(&ray);
+        let mut tau = ray.tmax;
+        let mut state = bvh.new_traversal(ray.direction);
+        let mut node;
+        'search: {
+            obvhs::traverse!(bvh, node, state, slabs.meet(node, state.oct_inv4, tau), {
+                let t = visitor.visit(state.primitive_id as usize);
+                if t == f64::NEG_INFINITY {
+                    break 'search;
+                }
+                tau = tau.min(round_up(frame.scale * t - skip));
+            });
+        }
     }
 }
 

@@ -61,13 +61,16 @@ impl Sheared {
 
     /// The crossing with t > 0, if the orientation is the wanted one; at the smallest t > 0 where the
     /// origin lies beyond the triangle's plane by `slack` or less.
-    #[inline]
+    #[inline(always)]
     pub(super) fn meet(&self, triangle: &[DVec3; 3], slack: f64) -> Option<Crossing> {
-        let [a, b, c] = triangle.map(|vertex| self.project(vertex));
+        // Not `map`, which is not inlined.
+        let [a, b, c] = triangle;
+        let (a, b, c) = (self.project(a), self.project(b), self.project(c));
         let u = edge(b, c) * self.orientation;
         let v = edge(c, a) * self.orientation;
         let w = edge(a, b) * self.orientation;
-        if u < 0.0 || v < 0.0 || w < 0.0 {
+        // One branch: which of the three it is cannot be foreseen.
+        if (u < 0.0) | (v < 0.0) | (w < 0.0) {
             return None;
         }
         let sum = u + v + w;
@@ -89,10 +92,10 @@ impl Sheared {
         beyond <= slack
     }
 
-    #[inline]
-    fn project(&self, vertex: DVec3) -> [f64; 3] {
+    #[inline(always)]
+    fn project(&self, vertex: &DVec3) -> [f64; 3] {
         let [x, y, z] = self.axes;
-        let v = (vertex - self.origin).to_array();
+        let v = (*vertex - self.origin).to_array();
         [v[x] - self.shear[0] * v[z], v[y] - self.shear[1] * v[z], v[z]]
     }
 }

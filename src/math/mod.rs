@@ -1,7 +1,7 @@
 //! Vectors, frames, and every transcendental function that results use.
 //! Doors for `glam` and `libm`: the C library chooses its sine by CPU, libm's is the same everywhere.
 
-pub use glam::{DVec2, DVec3, Vec3};
+pub use glam::{DVec2, DVec3, UVec2, Vec3};
 
 macro_rules! portable {
     ($($name:ident $(, $second:ident)? = $libm:ident : $doc:literal;)*) => { $(

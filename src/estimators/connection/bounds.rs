@@ -10,7 +10,7 @@
 //!   2 eta sin(theta / 2) at most.
 
 use super::throughput::Query;
-use crate::math::{DVec2, DVec3};
+use crate::math::DVec3;
 
 /// Bounds of points and normals.
 #[derive(Clone, Copy, Debug)]
@@ -19,18 +19,23 @@ pub(super) struct Bounds {
     pub radius: f64,
     pub axis: DVec3,
     /// Cosine of the cone's half angle; -1 where the normals fill more than a hemisphere.
-    cos: f64,
+    pub cos: f64,
 }
 
 /// Slack of comparisons between cosines, against rounding.
-const SLACK: f64 = 1e-9;
+pub(super) const SLACK: f64 = 1e-9;
 
-/// cos(a + b) of angles in [0, pi] from their cosines; -1 where the sum exceeds pi.
-fn cos_sum(a: f64, b: f64) -> f64 {
-    if a + b <= 0.0 {
-        return -1.0; // a + b >= pi
-    }
-    a * b - ((1.0 - a * a).max(0.0) * (1.0 - b * b).max(0.0)).sqrt()
+/// cos(a + b) of angles in [0, pi] from their cosines; -1 where the sum is pi or more. Without a branch.
+#[inline(always)]
+pub(super) fn cos_sum(a: f64, b: f64) -> f64 {
+    let cos = a * b - (at_least_0(1.0 - a * a) * at_least_0(1.0 - b * b)).sqrt();
+    if a + b <= 0.0 { -1.0 } else { cos }
+}
+
+/// The number, or 0 where it is below. One instruction, which `f64::max` is not.
+#[inline(always)]
+pub(super) fn at_least_0(x: f64) -> f64 {
+    if x > 0.0 { x } else { 0.0 }
 }
 
 impl Bounds {
@@ -49,12 +54,6 @@ impl Bounds {
         Bounds { center, radius, axis, cos }
     }
 
-    /// The cone of microfacet normals that are tilted by these slopes.
-    fn tilted(&self, slopes: DVec2) -> f64 {
-        let cos = cos_sum(self.cos, 1.0 / (1.0 + slopes.length_squared()).sqrt());
-        if self.cos > 0.0 && cos > 0.0 { cos - SLACK } else { -1.0 }
-    }
-
     /// Whether a root may be there.
     pub(super) fn may_hold(&self, query: &Query) -> bool {
         self.may_hold_near(query, 0.0)
@@ -63,42 +62,80 @@ impl Bounds {
     /// Whether a root may be there for the query's point or any other within `reach` of it: seen from the
     /// one, the part is as much wider.
     pub(super) fn may_hold_near(&self, query: &Query, reach: f64) -> bool {
+        let Bounds { center, radius, axis, cos } = *self;
+        Asked::new(query).may_hold(center.to_array(), radius + reach, axis.to_array(), cos)
+    }
+}
+
+/// What the test of bounds needs of a query.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asked {
+    x: [f64; 3],
+    w_l: [f64; 3],
+    eta: f64,
+    /// Cosine of the largest angle by which refraction turns light.
+    turn: f64,
+    /// The sign of eta - 1.
+    sign: f64,
+    /// Cosine of the angle by which microfacets are tilted; 1 at a smooth boundary.
+    tilt: f64,
+}
+
+impl Asked {
+    #[inline(always)]
+    pub(super) fn new(query: &Query) -> Asked {
         let Query { x, w_l, eta, slopes } = *query;
-        let to = self.center - x;
-        let distance = to.length();
-        let radius = self.radius + reach;
-        let cos = if slopes == DVec2::ZERO { self.cos } else { self.tilted(slopes) };
+        Asked {
+            x: x.to_array(),
+            w_l: w_l.to_array(),
+            eta,
+            turn: eta.min(1.0 / eta),
+            sign: (eta - 1.0).signum(),
+            tilt: 1.0 / (1.0 + slopes.length_squared()).sqrt(),
+        }
+    }
+
+    /// Whether a part with these bounds may hold a root. Without a branch, so that many are tested at once: whatever is
+    /// computed for a part that an earlier reason rules out is not looked at.
+    #[inline(always)]
+    pub(super) fn may_hold(&self, center: [f64; 3], radius: f64, axis: [f64; 3], cos: f64) -> bool {
+        let Asked { x, w_l, eta, turn, sign, tilt } = *self;
+        let tilted = cos_sum(cos, tilt);
+        let is_tilted = tilt < 1.0;
+        let narrowed = if (cos > 0.0) & (tilted > 0.0) { tilted - SLACK } else { -1.0 };
+        let cos = if is_tilted { narrowed } else { cos };
         let is_narrow = cos > -1.0;
-        let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        if is_narrow && self.axis.dot(w_l) < -sin - SLACK {
-            return false;
-        }
-        if distance <= radius * (1.0 + SLACK) {
-            return true;
-        }
-        let w = to / distance;
-        let sin_theta = radius / distance;
-        let cos_theta = (1.0 - sin_theta * sin_theta).max(0.0).sqrt();
-        let turn = eta.min(1.0 / eta);
-        if w.dot(w_l) < cos_sum(turn, cos_theta) - SLACK {
-            return false;
-        }
-        if !is_narrow {
-            return true;
-        }
+        let sin = at_least_0(1.0 - cos * cos).sqrt();
+        let faces_away = is_narrow & (dot(axis, w_l) < -sin - SLACK);
+
+        let to = [center[0] - x[0], center[1] - x[1], center[2] - x[2]];
+        let distance = dot(to, to).sqrt();
+        let is_inside = distance <= radius * (1.0 + SLACK);
+        let inverse = 1.0 / distance;
+        let w = [to[0] * inverse, to[1] * inverse, to[2] * inverse];
+        let sin_theta = radius * inverse;
+        let cos_theta = at_least_0(1.0 - sin_theta * sin_theta).sqrt();
+        let is_turned = dot(w, w_l) < cos_sum(turn, cos_theta) - SLACK;
+
         // The angle between the axis and w has to be below pi / 2 + alpha + theta.
         let both = cos_sum(cos, cos_theta);
-        if both > 0.0 && self.axis.dot(w) < -(1.0 - both * both).max(0.0).sqrt() - SLACK {
-            return false;
-        }
-        let h = (w * eta - w_l) * (eta - 1.0).signum();
-        let length = h.length();
+        let is_behind = (both > 0.0) & (dot(axis, w) < -at_least_0(1.0 - both * both).sqrt() - SLACK);
+
+        let h =
+            [(w[0] * eta - w_l[0]) * sign, (w[1] * eta - w_l[1]) * sign, (w[2] * eta - w_l[2]) * sign];
+        let length = dot(h, h).sqrt();
         // 2 sin(theta / 2) = sqrt(2 (1 - cos theta)), without the difference.
         let change = eta * sin_theta * (2.0 / (1.0 + cos_theta)).sqrt();
-        if change >= length {
-            return true;
-        }
-        let cos_change = (1.0 - (change / length) * (change / length)).sqrt();
-        h.dot(self.axis) >= length * (cos_sum(cos, cos_change) - SLACK)
+        let part = change / length;
+        let cos_change = at_least_0(1.0 - part * part).sqrt();
+        let is_near = dot(h, axis) >= length * (cos_sum(cos, cos_change) - SLACK);
+        let is_beside = !((change >= length) | is_near);
+
+        !faces_away & (is_inside | !(is_turned | (is_narrow & (is_behind | is_beside))))
     }
+}
+
+#[inline(always)]
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

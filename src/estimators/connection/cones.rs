@@ -1,7 +1,10 @@
 //! A hierarchy over the triangles of a mesh, with the bounds of their points and normals: which of them
 //! may refract the light of a query.
 
-use super::bounds::Bounds;
+use pulp::{Arch, NullaryFnOnce};
+
+use super::bounds::{Asked, Bounds};
+use super::eight::EightBounds;
 use super::patch::Facet;
 use super::throughput::Query;
 use crate::geometry::Mesh;
@@ -16,10 +19,27 @@ struct Node {
     count: u32,
 }
 
+/// Up to eight parts of the boundary, tested at once: facets, or further nodes.
+#[derive(Clone, Debug)]
+struct WideNode {
+    bounds: EightBounds,
+    /// The first facet's index, or of every part the node's.
+    parts: WideParts,
+}
+
+#[derive(Clone, Debug)]
+enum WideParts {
+    Facets(u32),
+    Nodes([u32; 8]),
+}
+
 /// The hierarchy.
 #[derive(Clone, Debug)]
 pub(super) struct ConeTree {
+    /// Two by two, for lines.
     nodes: Vec<Node>,
+    /// The same eight by eight, for points; the root is the last.
+    wide: Vec<WideNode>,
     facets: Vec<(Bounds, Facet)>,
 }
 
@@ -38,7 +58,29 @@ impl ConeTree {
         let mut nodes = Vec::with_capacity(facets.len());
         let size = mesh.bounds().radius;
         ConeTree::build(&mut nodes, &mut facets, 0, size);
-        ConeTree { nodes, facets }
+        let mut wide = Vec::with_capacity(facets.len() / 4);
+        ConeTree::widen(&mut wide, &facets, 0);
+        ConeTree { nodes, wide, facets }
+    }
+
+    /// Adds the node of these facets, the first of which has this index, and returns its index.
+    fn widen(wide: &mut Vec<WideNode>, facets: &[(Bounds, Facet)], first: u32) -> u32 {
+        let node = if facets.len() <= 8 {
+            let bounds: Vec<Bounds> = facets.iter().map(|(bounds, _)| *bounds).collect();
+            WideNode { bounds: EightBounds::new(&bounds), parts: WideParts::Facets(first) }
+        } else {
+            let slices = eighths(facets);
+            let of = |slice: &[(Bounds, Facet)]| ConeTree::bounds(slice.iter().map(|(_, facet)| facet));
+            let bounds: Vec<Bounds> = slices.iter().map(|slice| of(slice)).collect();
+            let (mut nodes, mut first) = ([0; 8], first);
+            for (node, slice) in nodes.iter_mut().zip(slices) {
+                *node = ConeTree::widen(wide, slice, first);
+                first += slice.len() as u32;
+            }
+            WideNode { bounds: EightBounds::new(&bounds), parts: WideParts::Nodes(nodes) }
+        };
+        wide.push(node);
+        wide.len() as u32 - 1
     }
 
     fn bounds<'a>(facets: impl Iterator<Item = &'a Facet> + Clone) -> Bounds {
@@ -81,28 +123,9 @@ impl ConeTree {
         ConeTree::build(nodes, right, first + middle as u32, size);
     }
 
-    /// Calls `visit` for every facet that may hold a root; returns how many nodes it looked at.
-    pub(super) fn visit(&self, query: &Query, mut visit: impl FnMut(&Facet)) -> u64 {
-        let mut looked = 0;
-        let mut open = Vec::with_capacity(64);
-        open.push(0u32);
-        while let Some(at) = open.pop() {
-            let node = &self.nodes[at as usize];
-            looked += 1;
-            if !node.bounds.may_hold(query) {
-                continue;
-            }
-            if node.count == 0 {
-                open.extend([node.first, at + 1]);
-                continue;
-            }
-            for (bounds, facet) in &self.facets[node.first as usize..][..node.count as usize] {
-                if bounds.may_hold(query) {
-                    visit(facet);
-                }
-            }
-        }
-        looked
+    /// Calls `visit` for every facet that may hold a root, in their order; returns how many nodes of eight it looked at.
+    pub(super) fn visit(&self, query: &Query, visit: impl FnMut(&Facet)) -> u64 {
+        Arch::new().dispatch(Visit { tree: self, query, visit })
     }
 
     /// The same for all points of a line, `query.x` + t `dir` with t in `range`: calls `visit` for facets and
@@ -160,12 +183,71 @@ impl ConeTree {
 
     /// Memory behind it, bytes.
     pub(super) fn heap_bytes(&self) -> usize {
-        size_of_val(&*self.nodes) + size_of_val(&*self.facets)
+        size_of_val(&*self.nodes) + size_of_val(&*self.wide) + size_of_val(&*self.facets)
     }
 
     /// All facets, in its order.
     #[cfg(test)]
     pub(super) fn facets(&self) -> impl Iterator<Item = &Facet> {
         self.facets.iter().map(|(_, facet)| facet)
+    }
+}
+
+/// Facets, halved as in [`ConeTree::build`], three times or until a part fits into a node.
+fn eighths(facets: &[(Bounds, Facet)]) -> Vec<&[(Bounds, Facet)]> {
+    let mut parts = vec![facets];
+    for _ in 0..3 {
+        let mut halves = Vec::with_capacity(8);
+        for part in parts {
+            if part.len() <= 8 {
+                halves.push(part);
+            } else {
+                let (left, right) = part.split_at(part.len() / 2);
+                halves.extend([left, right]);
+            }
+        }
+        parts = halves;
+    }
+    parts
+}
+
+/// [`ConeTree::visit`], for the vector instructions of the machine.
+struct Visit<'a, V> {
+    tree: &'a ConeTree,
+    query: &'a Query,
+    visit: V,
+}
+
+impl<V: FnMut(&Facet)> NullaryFnOnce for Visit<'_, V> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn call(self) -> u64 {
+        let Visit { tree: ConeTree { wide, facets, .. }, query, mut visit } = self;
+        let asked = Asked::new(query);
+        let mut looked = 0;
+        let mut open = Vec::with_capacity(64);
+        open.push(wide.len() as u32 - 1);
+        while let Some(at) = open.pop() {
+            let WideNode { bounds, parts } = &wide[at as usize];
+            looked += 1;
+            let mut holds = bounds.may_hold(&asked);
+            while holds != 0 {
+                match parts {
+                    WideParts::Facets(first) => {
+                        let lane = holds.trailing_zeros();
+                        holds &= holds - 1;
+                        visit(&facets[(first + lane) as usize].1);
+                    }
+                    // From the last to the first: the one that is pushed last is looked at first.
+                    WideParts::Nodes(nodes) => {
+                        let lane = 7 - holds.leading_zeros();
+                        holds ^= 1 << lane;
+                        open.push(nodes[lane as usize]);
+                    }
+                }
+            }
+        }
+        looked
     }
 }

@@ -41,6 +41,7 @@ mod bounds;
 mod cones;
 mod conic;
 mod connected;
+mod eight;
 mod facet;
 mod manifold;
 mod method;

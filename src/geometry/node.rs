@@ -1,0 +1,71 @@
+//! A ray against the eight boxes of a node of obvhs's tree, all at once.
+//!
+//! The arithmetic is that of `CwBvhNode::intersect_ray_basic`, product and sum rounded each, without its least time: eight
+//! lanes of plain loops, which the compiler turns into vectors of whatever width the caller's target features allow. No lane
+//! depends on the width, so that neither does the answer.
+
+use obvhs::cwbvh::node::CwBvhNode;
+use obvhs::ray::Ray as CullRay;
+
+/// What the test needs of a ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slabs {
+    origin: [f32; 3],
+    inverse: [f32; 3],
+    is_backward: [bool; 3],
+}
+
+impl Slabs {
+    #[inline(always)]
+    pub(super) fn new(ray: &CullRay) -> Slabs {
+        let direction = ray.direction.to_array();
+        Slabs {
+            origin: ray.origin.to_array(),
+            inverse: ray.inv_direction.to_array(),
+            is_backward: direction.map(|d| d < 0.0),
+        }
+    }
+
+    /// The boxes that the ray is in at some time from 0 to `tau`, as obvhs's traversal wants them: a bit of the upper
+    /// eight for an inner child in the order of visits, up to three of the lower 24 for the primitives of a leaf.
+    #[inline(always)]
+    pub(super) fn meet(&self, node: &CwBvhNode, octant: u32, tau: f32) -> u32 {
+        let corner = node.p.to_array();
+        let planes = [
+            (&node.child_min_x, &node.child_max_x),
+            (&node.child_min_y, &node.child_max_y),
+            (&node.child_min_z, &node.child_max_z),
+        ];
+        let (mut enter, mut leave) = ([0.0; 8], [tau; 8]);
+        for axis in 0..3 {
+            let step = f32::from_bits(u32::from(node.e[axis]) << 23) * self.inverse[axis];
+            let start = (corner[axis] - self.origin[axis]) * self.inverse[axis];
+            let (low, high) = planes[axis];
+            let (near, far) = if self.is_backward[axis] { (high, low) } else { (low, high) };
+            for lane in 0..8 {
+                enter[lane] = later(f32::from(near[lane]) * step + start, enter[lane]);
+                leave[lane] = earlier(f32::from(far[lane]) * step + start, leave[lane]);
+            }
+        }
+        let (bits, shifts) = node.get_child_and_index_bits(octant);
+        let (bits, shifts) = (bits.to_le_bytes(), shifts.to_le_bytes());
+        let mut met = [0; 8];
+        for lane in 0..8 {
+            let bits = u32::from(bits[lane]) << (shifts[lane] & 31);
+            met[lane] = if enter[lane] <= leave[lane] { bits } else { 0 };
+        }
+        met.into_iter().fold(0, |all, bits| all | bits)
+    }
+}
+
+/// The later of two times; of equal ones the second. One instruction, which `f32::max` is not.
+#[inline(always)]
+fn later(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The earlier of two times; of equal ones the second.
+#[inline(always)]
+fn earlier(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
