@@ -75,7 +75,8 @@ def light(name):
     }
 
 
-def scene(cell, roulette, distribution):
+def scene(cell, roulette, distribution, body=None):
+    """The scene of a cell; `body` is the shape, by default the unit sphere."""
     medium_name, boundary_name, light_name = cell.split(",")
     albedo, g = MEDIA[medium_name]
     phase = {"type": "hg", "g": g} if g else {"type": "isotropic"}
@@ -106,7 +107,7 @@ def scene(cell, roulette, distribution):
         },
         "light": light(light_name),
         "body": {
-            "type": "sphere",
+            **(body or {"type": "sphere"}),
             "bsdf": boundary(boundary_name, distribution),
             "interior": {
                 "type": "homogeneous",
