@@ -25,7 +25,7 @@ const LESS: [(&str, &str); 9] = [
 ];
 
 /// The modules that may name a crate. Options are deserialised, and described, where they are used.
-const DOORS: [(&str, &str); 21] = [
+const DOORS: [(&str, &str); 22] = [
     ("annotate_snippets", "error"),
     ("glam", "math"),
     ("libm", "math"),
@@ -36,6 +36,7 @@ const DOORS: [(&str, &str); 21] = [
     ("blake3", "results"),
     ("exr", "results"),
     ("png", "results"),
+    ("pulp", "math"),
     ("csv", "results experiment"),
     ("schemars", "sampling optics geometry samplers estimators results experiment"),
     ("strsim", "experiment"),

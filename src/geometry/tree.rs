@@ -36,12 +36,11 @@ use obvhs::aabb::Aabb;
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::ray::Ray as CullRay;
-use pulp::{Arch, NullaryFnOnce};
 
 use super::Ray;
 use super::node::Slabs;
 use crate::error::{Error, Result};
-use crate::math::{DVec3, UVec2, Vec3};
+use crate::math::{DVec3, UVec2, Vec3, Vectorized, vectorized};
 
 /// Start of the f32 ray before the true origin, units of the frame.
 const BEHIND: f64 = 0.015625;
@@ -160,7 +159,7 @@ impl BoxTree {
     /// Visits every slot whose box the ray may meet within `t_max`, nearer nodes first, until the visitor has enough.
     pub(super) fn search(&self, ray: &Ray, t_max: f64, visitor: &mut impl Visit) {
         let Some((ray, skip)) = self.frame.cull_ray(ray, t_max) else { return };
-        Arch::new().dispatch(Search { tree: self, ray, skip, visitor });
+        vectorized(BoxSearch { tree: self, ray, skip, visitor });
     }
 
     /// Memory behind the tree, bytes.
@@ -176,20 +175,20 @@ pub(super) trait Visit {
     fn visit(&mut self, slot: usize) -> f64;
 }
 
-/// A search, for the vector instructions of the machine: `Arch` chooses them when the program runs.
-struct Search<'a, V> {
+/// A search, for the vector instructions of the machine.
+struct BoxSearch<'a, V> {
     tree: &'a BoxTree,
     ray: CullRay,
     skip: f64,
     visitor: &'a mut V,
 }
 
-impl<V: Visit> NullaryFnOnce for Search<'_, V> {
+impl<V: Visit> Vectorized for BoxSearch<'_, V> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let Search { tree: BoxTree { frame, bvh }, ray, skip, visitor } = self;
+        let BoxSearch { tree: BoxTree { frame, bvh }, ray, skip, visitor } = self;
         let slabs = Slabs::new(&ray);
         let mut tau = ray.tmax;
         let mut state = bvh.new_traversal(ray.direction);

@@ -46,8 +46,10 @@ mod frame;
 mod inverse;
 mod quadrature;
 mod turns;
+mod vectors;
 
 pub use frame::{Frame, renormalized};
 pub use inverse::{bracketed_root, erf_inv, increasing_root, lambert_excess};
 pub use quadrature::{Integral, gauss_kronrod, integrate};
 pub use turns::sin_cos_turns;
+pub(crate) use vectors::{Vectorized, vectorized};

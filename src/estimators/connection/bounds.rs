@@ -63,13 +63,13 @@ impl Bounds {
     /// one, the part is as much wider.
     pub(super) fn may_hold_near(&self, query: &Query, reach: f64) -> bool {
         let Bounds { center, radius, axis, cos } = *self;
-        Asked::new(query).may_hold(center.to_array(), radius + reach, axis.to_array(), cos)
+        PreparedQuery::new(query).may_hold(center.to_array(), radius + reach, axis.to_array(), cos)
     }
 }
 
 /// What the test of bounds needs of a query.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
+pub(super) struct PreparedQuery {
     x: [f64; 3],
     w_l: [f64; 3],
     eta: f64,
@@ -81,11 +81,11 @@ pub(super) struct Asked {
     tilt: f64,
 }
 
-impl Asked {
+impl PreparedQuery {
     #[inline(always)]
-    pub(super) fn new(query: &Query) -> Asked {
+    pub(super) fn new(query: &Query) -> PreparedQuery {
         let Query { x, w_l, eta, slopes } = *query;
-        Asked {
+        PreparedQuery {
             x: x.to_array(),
             w_l: w_l.to_array(),
             eta,
@@ -99,7 +99,7 @@ impl Asked {
     /// computed for a part that an earlier reason rules out is not looked at.
     #[inline(always)]
     pub(super) fn may_hold(&self, center: [f64; 3], radius: f64, axis: [f64; 3], cos: f64) -> bool {
-        let Asked { x, w_l, eta, turn, sign, tilt } = *self;
+        let PreparedQuery { x, w_l, eta, turn, sign, tilt } = *self;
         let tilted = cos_sum(cos, tilt);
         let is_tilted = tilt < 1.0;
         let narrowed = if (cos > 0.0) & (tilted > 0.0) { tilted - SLACK } else { -1.0 };

@@ -1,14 +1,12 @@
 //! A hierarchy over the triangles of a mesh, with the bounds of their points and normals: which of them
 //! may refract the light of a query.
 
-use pulp::{Arch, NullaryFnOnce};
-
-use super::bounds::{Asked, Bounds};
+use super::bounds::{Bounds, PreparedQuery};
 use super::eight::EightBounds;
 use super::patch::Facet;
 use super::throughput::Query;
 use crate::geometry::Mesh;
-use crate::math::DVec3;
+use crate::math::{DVec3, Vectorized, vectorized};
 
 /// A node: its bounds, and its facets or its second child (the first follows it).
 #[derive(Clone, Debug)]
@@ -125,7 +123,7 @@ impl ConeTree {
 
     /// Calls `visit` for every facet that may hold a root, in their order; returns how many nodes of eight it looked at.
     pub(super) fn visit(&self, query: &Query, visit: impl FnMut(&Facet)) -> u64 {
-        Arch::new().dispatch(Visit { tree: self, query, visit })
+        vectorized(FacetSearch { tree: self, query, visit })
     }
 
     /// The same for all points of a line, `query.x` + t `dir` with t in `range`: calls `visit` for facets and
@@ -212,19 +210,19 @@ fn eighths(facets: &[(Bounds, Facet)]) -> Vec<&[(Bounds, Facet)]> {
 }
 
 /// [`ConeTree::visit`], for the vector instructions of the machine.
-struct Visit<'a, V> {
+struct FacetSearch<'a, V> {
     tree: &'a ConeTree,
     query: &'a Query,
     visit: V,
 }
 
-impl<V: FnMut(&Facet)> NullaryFnOnce for Visit<'_, V> {
+impl<V: FnMut(&Facet)> Vectorized for FacetSearch<'_, V> {
     type Output = u64;
 
     #[inline(always)]
     fn call(self) -> u64 {
-        let Visit { tree: ConeTree { wide, facets, .. }, query, mut visit } = self;
-        let asked = Asked::new(query);
+        let FacetSearch { tree: ConeTree { wide, facets, .. }, query, mut visit } = self;
+        let asked = PreparedQuery::new(query);
         let mut looked = 0;
         let mut open = Vec::with_capacity(64);
         open.push(wide.len() as u32 - 1);

@@ -1,7 +1,7 @@
 //! [`Bounds`] of eight parts, tested all at once: the compiler makes vectors of the loop, of whatever width the caller's target
 //! features allow.
 
-use super::bounds::{Asked, Bounds};
+use super::bounds::{Bounds, PreparedQuery};
 
 type Lanes = [f64; 8];
 
@@ -40,7 +40,7 @@ impl EightBounds {
 
     /// A bit for every part that may hold a root.
     #[inline(always)]
-    pub(super) fn may_hold(&self, asked: &Asked) -> u8 {
+    pub(super) fn may_hold(&self, asked: &PreparedQuery) -> u8 {
         let EightBounds { center: [x, y, z], radius, axis: [u, v, w], cos, .. } = self;
         let mut holds = [0; 8];
         // A length that the compiler does not know: of eight it would make eight copies first.
@@ -86,7 +86,7 @@ mod tests {
             let x = direction(&mut stream) * stream.draw();
             let eta = [1.4, 0.7][round / 7 % 2];
             let query = Query { x, w_l: direction(&mut stream), eta, slopes };
-            let eight = EightBounds::new(&bounds).may_hold(&Asked::new(&query));
+            let eight = EightBounds::new(&bounds).may_hold(&PreparedQuery::new(&query));
             for (lane, bounds) in bounds.iter().enumerate() {
                 let one = bounds.may_hold(&query);
                 assert_eq!(eight >> lane & 1 == 1, one, "{round} {lane}");
