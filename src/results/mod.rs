@@ -17,6 +17,8 @@ pub mod image;
 pub mod json;
 /// The arrays of a record, and the names of their axes.
 pub mod layout;
+/// Letters for labels in pictures.
+mod letters;
 /// The summary of a result that is kept without its arrays.
 pub mod manifest;
 /// The table of everything that was measured.
