@@ -13,7 +13,7 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 23] = [
+const PAGES: [&str; 24] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
@@ -22,6 +22,7 @@ const PAGES: [&str; 23] = [
     "docs/SUMMARY.md",
     "docs/experiment-file.md",
     "docs/first-report.md",
+    "docs/gallery.md",
     "docs/index.md",
     "docs/results.md",
     "docs/judging-other-renderers.md",
