@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(ticks(false, [-0.013, 0.021]), "-0.01 0 0.01 0.02");
         assert_eq!(ticks(true, [0.9, 1.2e6]), "1 1e1 1e2 1e3 1e4 1e5 1e6");
         assert_eq!(ticks(true, [2e-5, 0.4]), "1e-4 1e-3 1e-2 1e-1");
-        assert_eq!(ticks(true, [1e-4, 3e-3]), "1e-4 3e-4 1e-3 3e-3");
+        assert_eq!(ticks(true, [1e-4, 3e-3]), "1e-4 2e-4 3e-4 5e-4 1e-3 2e-3 3e-3");
         assert_eq!(ticks(true, [1e-3, 0.5]), "0.001 0.01 0.1");
         assert_eq!(
             ticks(true, [0.8, 30.0]),
