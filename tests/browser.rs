@@ -185,7 +185,10 @@ fn expected(root: &Path) -> Value {
         limits.push([0.01, 0.03, 0.1, 0.3].into_iter().find(|limit| most <= *limit).unwrap_or(1.0));
     }
     let names: Vec<&str> = stored.record.bands.iter().map(|band| band.name.as_str()).collect();
-    json!({ "width": size.0, "height": size.1, "cells": cells, "limits": limits, "bands": names })
+    let passes = stored.record.cells[0].runs[0].passes;
+    json!({
+        "width": size.0, "height": size.1, "cells": cells, "limits": limits, "bands": names, "passes": passes,
+    })
 }
 
 /// A pixel each of the split picture of two tiles of 12 x 12 pixels: they are shown as squares of 16 x

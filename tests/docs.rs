@@ -5,6 +5,7 @@ use std::path::Path;
 
 use scatterproof::results::exr_file::write_exr;
 use scatterproof::results::image::Picture;
+use scatterproof::results::layout::{BIN_ROWS, GUIDE, LAYOUT, MOMENTS, STATISTICS};
 use scatterproof::results::npy::Array;
 use scatterproof::results::record::Band;
 use toml::Table;
@@ -12,7 +13,7 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 21] = [
+const PAGES: [&str; 24] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
@@ -21,12 +22,15 @@ const PAGES: [&str; 21] = [
     "docs/SUMMARY.md",
     "docs/experiment-file.md",
     "docs/first-report.md",
+    "docs/gallery.md",
     "docs/index.md",
     "docs/results.md",
     "docs/judging-other-renderers.md",
     "docs/limits.md",
     "docs/live-view.md",
     "docs/own-estimator.md",
+    "docs/python.md",
+    "docs/record-layout.md",
     "docs/subdivision.md",
     "docs/verification.md",
     "docs/walks.md",
@@ -409,4 +413,47 @@ fn the_book_lists_every_page() {
             "docs/{name} is not among the pages tested"
         );
     }
+}
+
+/// What a page's table of arrays states: what a file's name ends in, and its axes.
+fn documented_arrays(page: &str) -> Vec<(String, Vec<String>)> {
+    let row = |line: &str| {
+        let (file, rest) = line.strip_prefix("| `")?.split_once(".npy` | `[")?;
+        let (axes, _) = rest.split_once("]`")?;
+        let what = file.rsplit('.').next()?;
+        Some((what.to_string(), axes.split(", ").map(String::from).collect()))
+    };
+    page.lines().filter_map(row).collect()
+}
+
+/// The keys of a published `record.json`, its runs and images, that a page does not name.
+fn unnamed_keys(page: &str) -> Vec<String> {
+    let path = "results/published/short/snee-detail/record/record.json";
+    let record: serde_json::Value = serde_json::from_str(&text(path)).expect("JSON");
+    let run = &record["cells"][0]["runs"][0];
+    let parts = [&record, &record["cells"][0], run, &run["image"], &record["bands"][0]];
+    let keys = parts.iter().flat_map(|part| part.as_object().expect("an object").keys());
+    keys.filter(|key| !page.contains(&format!("`{key}`"))).cloned().collect()
+}
+
+#[test]
+fn the_layout_of_records_is_documented_as_it_is() {
+    let page = text("docs/record-layout.md");
+    let is_layout = |page: &str| {
+        let told = documented_arrays(page);
+        let known =
+            LAYOUT.map(|of| (of.what.to_string(), of.axes.iter().map(|a| a.to_string()).collect()));
+        told == known
+    };
+    assert!(is_layout(&page), "{:?}", documented_arrays(&page));
+    let axes = LAYOUT.iter().flat_map(|of| of.axes.iter());
+    let places = MOMENTS.iter().chain(&STATISTICS).chain(&GUIDE).chain(&BIN_ROWS);
+    for name in axes.chain(places) {
+        assert!(page.contains(&format!("`{name}`")), "{name} is not explained");
+    }
+    assert_eq!(unnamed_keys(&page), [""; 0], "keys of record.json that the page does not name");
+
+    assert!(!is_layout(&page.replace("`[batch, counter]`", "`[counter, batch]`")));
+    let without = page.replace("`anomalies`", "");
+    assert_eq!(unnamed_keys(&without), ["anomalies"]);
 }

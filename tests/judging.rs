@@ -81,7 +81,7 @@ fn images_of_other_seeds_agree_and_planted_biases_are_found() {
     let (work, names) = rendered(4);
     let ran = judged(&work, &format!("{names} --independent-pixels --out out --junit j.xml --verbose"));
     ran.exits(0).says("54 of 54 verdicts are green").says("t of pixels").says("squared bias");
-    for file in ["judge.exr", "z-R.png", "relative-B.png", "verdicts.csv"] {
+    for file in ["judge.exr", "judge.html", "z-R.png", "relative-B.png", "verdicts.csv"] {
         assert!(work.path("out").join(file).is_file(), "{file}");
     }
     assert_eq!(work.read("out/verdicts.csv").lines().count(), 55);
@@ -254,7 +254,9 @@ fn records_are_compared() {
 
     let seed = blake3_of("records_are_compared");
     run("seed", &format!("--set seed={seed}"));
-    let ran = work.run("compare a/x seed/x -v --junit c.xml");
+    let ran = work.run("compare a/x seed/x -v --junit c.xml --html c.html");
+    let page = std::fs::read_to_string(work.path("c.html")).expect("a page");
+    assert!(page.contains("comparisons hold") && page.contains("not byte-identical"), "{page}");
     ran.exits(0).says(&format!("seed: 7, then {seed}")).says("welch t").says("99 % power");
     assert!(work.read("c.xml").contains("failures=\"0\""));
     work.run("compare a/x seed/x --detect 1e-4").exits(3).says("underpowered").says("could have missed");

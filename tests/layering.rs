@@ -25,7 +25,7 @@ const LESS: [(&str, &str); 9] = [
 ];
 
 /// The modules that may name a crate. Options are deserialised, and described, where they are used.
-const DOORS: [(&str, &str); 22] = [
+const DOORS: &[(&str, &str)] = &[
     ("annotate_snippets", "error"),
     ("glam", "math"),
     ("libm", "math"),
@@ -44,6 +44,8 @@ const DOORS: [(&str, &str); 22] = [
     ("indicatif", "run"),
     ("rustix", "run"),
     ("signal_hook", "run"),
+    ("pdf_writer", "report"),
+    ("roxmltree", "report"),
     ("clap", "cli"),
     ("clap_complete", "cli"),
     ("serde", "sampling optics geometry samplers estimators stats results verify report experiment run"),

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::output::unwritable;
 use crate::error::{Error, Result};
 use crate::report::number::significant;
+use crate::report::outcome;
 use crate::report::table::Table;
 use crate::report::tables::verdict_table;
 use crate::results::store::RecordFolder;
@@ -48,6 +49,9 @@ pub(super) struct Args {
     /// Write the verdicts as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
+    /// Write what was found as a page.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
     /// Print every verdict; default: only those that are not green.
     #[arg(long, short)]
     verbose: bool,
@@ -68,6 +72,28 @@ pub(super) fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
     if let Some(path) = &args.junit {
         let xml = junit::to_junit(&compared.verdicts);
         crate::results::atomic::write(path, xml.as_bytes(), "write the JUnit file")?;
+    }
+    if let Some(path) = &args.html {
+        let mut text = Vec::new();
+        tell_timing(&timing_ratios(&before, &after), &mut text).map_err(unwritable)?;
+        let timing = String::from_utf8_lossy(&text).into_owned();
+        let identical = match before.record == after.record {
+            true => "The records are byte-identical.",
+            false => "The records are not byte-identical.",
+        };
+        let mut sentences = vec![identical.to_string()];
+        sentences.extend(compared.changes.iter().map(|change| format!("Changed: {change}")));
+        if let Some(worst) = coarsest(&compared) {
+            sentences.push(format!(
+                "A change of {} % of any first observable would have been found with 99 % probability.",
+                significant(100.0 * worst, 2)
+            ));
+        }
+        sentences
+            .extend(timing.lines().map(|line| line.trim().to_string()).filter(|line| !line.is_empty()));
+        let title = format!("{} against {}", args.after.display(), args.before.display());
+        let page = outcome::page(&title, sentences, Vec::new(), &compared.verdicts);
+        crate::results::atomic::write(path, page.as_bytes(), "write the page")?;
     }
     tell(&compared, args, out)
         .and_then(|()| match before.record == after.record {

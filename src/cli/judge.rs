@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::output::unwritable;
 use crate::error::{Error, Result};
+use crate::report::document::{FigureBlock, PictureFile};
 use crate::report::number::{per_cent, significant};
+use crate::report::outcome;
 use crate::report::tables::verdict_table;
 use crate::results::exr_file::{Part, read_exr, write_parts};
 use crate::results::image::write_diverging_png;
@@ -72,7 +74,8 @@ pub(super) struct Args {
     /// The bias of an image mean that must not go unseen, as a fraction of the mean.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = super::positive)]
     detect: f64,
-    /// Write verdicts.csv, z-scores and relative differences (judge.exr, *.png) into this folder.
+    /// Write a page (judge.html), verdicts.csv, z-scores and relative differences (judge.exr, *.png) into this
+    /// folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Write the verdicts as JUnit XML.
@@ -110,7 +113,10 @@ pub(super) fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
         None => None,
     };
     if let Some(path) = &args.out {
-        write_views(path, &answer, &planes)?;
+        let figures = write_views(path, &answer, &planes)?;
+        let title = format!("{} images against {}", planes.seeds.len(), run.estimator);
+        let page = outcome::page(&title, sentences(args, &answer), figures, &answer.verdicts);
+        atomic::write(&path.join("judge.html"), page.as_bytes(), "write the page")?;
     }
     if let Some(path) = &args.junit {
         atomic::write(path, junit::to_junit(&answer.verdicts).as_bytes(), "write the JUnit file")?;
@@ -221,12 +227,13 @@ fn cost(
 }
 
 /// Writes the pictures and the table.
-fn write_views(folder: &Path, answer: &Answer, planes: &Planes) -> Result<()> {
+fn write_views(folder: &Path, answer: &Answer, planes: &Planes) -> Result<Vec<FigureBlock>> {
+    let mut figures = Vec::new();
     atomic::create_folder(folder, "create the folder")?;
     let csv = verdict::to_csv(&answer.verdicts);
     atomic::write(&folder.join("verdicts.csv"), csv.as_bytes(), "write the verdicts")?;
     if answer.maps.is_empty() {
-        return Ok(());
+        return Ok(figures);
     }
     let single = |values: &[f64]| values.iter().map(|x| *x as f32).collect::<Vec<f32>>();
     let part = |map: &PixelMap| -> Part {
@@ -245,11 +252,34 @@ fn write_views(folder: &Path, answer: &Answer, planes: &Planes) -> Result<()> {
         let band: String = map.band.chars().map(plain).collect();
         let pictures = [("z", &map.z, Z_LIMIT), ("relative", &map.relative, RELATIVE_LIMIT)];
         for (name, values, limit) in pictures {
-            let path = folder.join(format!("{name}-{band}.png"));
+            let file = format!("{name}-{band}.png");
+            let path = folder.join(&file);
             write_diverging_png(&path, planes.width, values, limit)?;
+            let picture = std::fs::read(&path).map_err(Error::io(&path, "read the picture"))?;
+            let what = if name == "z" { "z-score of the images' mean" } else { "relative difference" };
+            figures.push(FigureBlock {
+                path: file,
+                picture: PictureFile::Png(picture),
+                title: format!("{name}, band {}", map.band),
+                caption: format!("{what}, blue to red from -{limit} to {limit}; grey: no value."),
+            });
         }
     }
-    Ok(())
+    Ok(figures)
+}
+
+/// What the tests found, in sentences.
+fn sentences(args: &Args, answer: &Answer) -> Vec<String> {
+    let means = answer.verdicts.iter().filter(|v| v.observable == "mean").filter_map(|v| v.detectable);
+    let worst = means.filter(|d| d.is_finite()).max_by(f64::total_cmp);
+    let power = worst.map(|worst| {
+        format!(
+            "A bias of an image mean of {} would have been found with 99 % probability; the family-wise level is {:e}.",
+            per_cent(worst),
+            args.level
+        )
+    });
+    power.into_iter().chain(answer.notes.iter().cloned()).collect()
 }
 
 fn tell(

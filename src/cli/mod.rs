@@ -119,6 +119,11 @@ pub fn main(registry: &Registry) -> ExitCode {
 
 /// [`main`] with the given arguments; the first is the name of the program.
 pub fn main_with(registry: &Registry, arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    ExitCode::from(exit_code_of(registry, arguments))
+}
+
+/// [`main_with`] for callers that end the process themselves. Usage errors, `--help` and `--version` end it here.
+pub fn exit_code_of(registry: &Registry, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let program = arguments.first().and_then(|path| Path::new(path).file_stem()?.to_str());
     let program = program.unwrap_or("scatterproof").to_string();
@@ -140,10 +145,10 @@ pub fn main_with(registry: &Registry, arguments: impl IntoIterator<Item = OsStri
         }
     };
     match outcome {
-        Ok(code) => ExitCode::from(code),
+        Ok(code) => code,
         Err(error) => {
             say(&error);
-            ExitCode::from(error.exit_code())
+            error.exit_code()
         }
     }
 }

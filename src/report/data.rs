@@ -1,6 +1,6 @@
 //! Input of the views of a record.
 
-use super::document::ViewerBlock;
+use super::document::{FigureBlock, ViewerBlock};
 use super::plots::Section;
 use super::split::SplitFigure;
 use crate::results::measurements::Measurement;
@@ -26,6 +26,8 @@ pub(crate) struct ReportData {
     pub model_errors: Vec<ModelError>,
     /// The pictures by cell, in viewers that compare them.
     pub viewers: Vec<ViewerBlock>,
+    /// The split picture at the head of the page, where there are pictures.
+    pub lead: Option<FigureBlock>,
     /// Grids of split pictures.
     pub splits: Vec<SplitFigure>,
     /// Sections of plots, in the report's order.

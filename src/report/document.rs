@@ -24,14 +24,42 @@ pub(crate) enum PageBlock {
     Code(String),
     /// A table with its name and caption.
     Table(TableBlock),
+    /// Short outcomes at the head of the page.
+    Badges(Vec<(BadgeKind, String)>),
+    /// The picture at the head of the page.
+    Lead(FigureBlock),
     /// Pictures side by side.
     Figures(Vec<FigureBlock>),
     /// One picture as wide as the page.
     Wide(FigureBlock),
     /// A viewer that compares the pictures of a cell.
     Viewer(ViewerBlock),
+    /// Such viewers of several cells, of which one is shown at a time.
+    Cells(Vec<ViewerBlock>),
     /// Folded blocks under a title.
     Folded(String, Vec<PageBlock>),
+}
+
+/// What a badge says, for its colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum BadgeKind {
+    /// As claimed.
+    Good,
+    /// A claim fails.
+    Bad,
+    /// Not decided.
+    Open,
+}
+
+impl BadgeKind {
+    /// The style of the outcome that it stands for.
+    pub(crate) fn class(self) -> &'static str {
+        match self {
+            BadgeKind::Good => "pass",
+            BadgeKind::Bad => "fail",
+            BadgeKind::Open => "underpowered",
+        }
+    }
 }
 
 /// A table that can be used outside the page.
@@ -125,8 +153,17 @@ fn markdown(block: &PageBlock) -> String {
         PageBlock::Table(t) if t.caption.is_empty() => t.table.to_markdown(),
         PageBlock::Table(t) => format!("{}\n\n{}", t.caption, t.table.to_markdown()),
         PageBlock::Figures(figures) => each(figures),
-        PageBlock::Wide(f) => figure(f),
+        PageBlock::Wide(f) | PageBlock::Lead(f) => figure(f),
+        PageBlock::Badges(badges) => {
+            let badges: Vec<String> = badges.iter().map(|(_, text)| format!("**{text}**")).collect();
+            format!("{}\n", badges.join(", "))
+        }
         PageBlock::Viewer(viewer) => each(&viewer.figures),
+        PageBlock::Cells(viewers) => {
+            let cell =
+                |viewer: &ViewerBlock| format!("### {}\n\n{}", viewer.cell, each(&viewer.figures));
+            viewers.iter().map(cell).collect::<Vec<_>>().join("\n")
+        }
         PageBlock::Folded(title, blocks) => {
             let blocks: Vec<String> = blocks.iter().map(markdown).collect();
             format!("**{title}**\n\n{}", blocks.join("\n"))

@@ -1,7 +1,7 @@
 //! The page as one HTML file: no network, pictures as data URIs, light and dark, readable on a phone.
 
 use super::base64;
-use super::document::{Document, FigureBlock, PageBlock, PictureFile, TableBlock, slug};
+use super::document::{BadgeKind, Document, FigureBlock, PageBlock, PictureFile, TableBlock, slug};
 use super::latex::to_latex;
 use super::markup::escape;
 use super::viewer;
@@ -59,6 +59,14 @@ fn block(of: &PageBlock) -> String {
             let inner: String = blocks.iter().map(block).collect();
             format!("<details>\n<summary>{}</summary>\n{inner}</details>\n", escape(title))
         }
+        PageBlock::Badges(badges) => {
+            let badge = |(kind, text): &(BadgeKind, String)| {
+                format!("<span class=\"badge {}\">{}</span>\n", kind.class(), escape(text))
+            };
+            format!("<p class=\"badges\">\n{}</p>\n", badges.iter().map(badge).collect::<String>())
+        }
+        PageBlock::Lead(f) => format!("<div class=\"lead\">\n{}</div>\n", figure(f)),
+        PageBlock::Cells(viewers) => viewer::cells(viewers),
         PageBlock::Wide(f) => format!("<div class=\"wide\">\n{}</div>\n", figure(f)),
         PageBlock::Figures(f) => figures(f),
     }

@@ -1,11 +1,10 @@
 //! Tables for papers: LaTeX with booktabs, and longtable where a page may not hold them.
 
-use super::document::{Document, FigureBlock, PageBlock, PictureFile};
+use super::document::{Document, FigureBlock, PageBlock, PictureFile, ViewerBlock};
 use super::table::Table;
 
 const PREAMBLE: &str =
-    "% pdflatex report.tex, in its own folder. Plots are SVG, and what the page folds away is long: \
-                        both are in files.
+    "% pdflatex report.tex, in its own folder. What the page folds away is long: it is in files.
 \\documentclass[a4paper,landscape]{article}
 \\usepackage[utf8]{inputenc}
 \\usepackage[T1]{fontenc}
@@ -34,8 +33,20 @@ fn block(of: &PageBlock) -> String {
         PageBlock::Code(code) => format!("\\begin{{verbatim}}\n{code}\n\\end{{verbatim}}\n"),
         PageBlock::Table(t) => format!("{{\\scriptsize\n{}}}\n", long(&t.table, &t.name, &t.caption)),
         PageBlock::Figures(figures) => figures.iter().map(figure).collect(),
-        PageBlock::Wide(f) => figure(f),
+        PageBlock::Wide(f) | PageBlock::Lead(f) => figure(f),
+        PageBlock::Badges(badges) => {
+            let badges: Vec<String> =
+                badges.iter().map(|(_, text)| format!("\\textbf{{{}}}", escaped(text))).collect();
+            format!("{}\n\n", badges.join(", "))
+        }
         PageBlock::Viewer(viewer) => viewer.figures.iter().map(figure).collect(),
+        PageBlock::Cells(viewers) => {
+            let cell = |viewer: &ViewerBlock| {
+                let figures: String = viewer.figures.iter().map(figure).collect();
+                format!("\n\\subsection*{{{}}}\n{figures}", escaped(&viewer.cell))
+            };
+            viewers.iter().map(cell).collect()
+        }
         PageBlock::Folded(title, _) => format!("{} is not printed here.\n\n", escaped(title)),
     }
 }
@@ -49,7 +60,15 @@ fn figure(f: &FigureBlock) -> String {
                 "\\begin{{minipage}}{{.3\\linewidth}}\\small\n{picture}\\\\\n{words}\n\\end{{minipage}}\\hfill\n"
             )
         }
-        PictureFile::Svg(_) => String::new(),
+        PictureFile::Svg(_) => {
+            // The same plot as PDF is beside it.
+            let path =
+                f.path.strip_suffix("svg").map_or_else(|| f.path.clone(), |stem| format!("{stem}pdf"));
+            format!(
+                "\\begin{{minipage}}{{.48\\linewidth}}\\small\n\\includegraphics[width=\\linewidth]{{{path}}}\\\\\n{words}\n\
+                 \\end{{minipage}}\\hfill\n"
+            )
+        }
     }
 }
 

@@ -13,6 +13,8 @@ use crate::verify::judge::{Case, Looks, judge};
 use crate::verify::model_errors::{self, model_errors};
 use crate::verify::verdict::{self, Verdict};
 
+/// The head of a page: what the record says in a few words.
+mod answer;
 /// Base64, for data URIs.
 mod base64;
 /// Input of the views.
@@ -27,6 +29,8 @@ pub(crate) mod latex;
 mod markup;
 /// Numbers with their uncertainty.
 pub(crate) mod number;
+/// A page for verdicts without a record of their own.
+pub(crate) mod outcome;
 /// The content of the page.
 mod page;
 /// The pictures of runs.
@@ -81,8 +85,10 @@ pub(crate) fn write_judged(
     let model_errors = model_errors(&stored);
     let plots = plots::sections(&stored, &comparisons, &wanted);
     plots.iter().try_for_each(|section| section.write(folder))?;
+    let lead = answer::lead(folder, &stored, &comparisons)?;
     let data = ReportData {
         stored,
+        lead,
         provenance,
         verdicts,
         rows,
@@ -193,6 +199,21 @@ mod tests {
         ];
         wanted.iter().for_each(|w| assert!(html.contains(w), "{w}"));
         assert!(!html.contains("http"), "nothing is fetched");
+        // The answer is at the top: badges, sentences and the split picture come before the first section.
+        let head = html.split("<h2").next().expect("a head");
+        for wanted in [
+            "badge pass\">1 of 2 comparisons holds",
+            "badge fail\">1 fails",
+            "class=\"lead\"",
+            "as efficient as",
+        ] {
+            assert!(head.contains(wanted), "{wanted}: {head}");
+        }
+        assert!(folder.root().join("images/lead.png").exists());
+        let pdf = std::fs::read_dir(folder.root().join("plots")).expect("plots").flatten();
+        let pdf: Vec<_> =
+            pdf.filter(|file| file.path().extension().is_some_and(|e| e == "pdf")).collect();
+        assert!(!pdf.is_empty() && read("report.tex").contains(".pdf}"), "plots are PDF, too");
         assert!(markdown.contains("](images/000-mis.png)"), "{markdown}");
         assert!(markdown.contains(" 500 |"), "{markdown}");
         let summary: Value = serde_json::from_str(&read("summary.json")).expect("JSON");
@@ -201,6 +222,26 @@ mod tests {
 
         write(&folder).expect("a report");
         assert_eq!((read("report.md"), read("report.html")), (markdown, html));
+    }
+
+    /// What has nothing to say has no heading.
+    #[test]
+    fn no_section_is_empty() {
+        let temp = tempfile::tempdir().expect("a folder");
+        let folder = RecordFolder::new(temp.path().join("sample"));
+        let stored = sample::stored(0.5);
+        folder.write(stored.record, stored.arrays).expect("a record");
+        write(&folder).expect("a report");
+        let html = std::fs::read_to_string(folder.root().join("report.html")).expect("a page");
+        assert!(
+            !html.contains(">Claims<") && !html.contains("badges\">") && !html.contains(">Anomalies"),
+            "{html}"
+        );
+        let headings: Vec<&str> = html.split("<h2").skip(1).collect();
+        for section in headings {
+            let (_, body) = section.split_once("</h2>").expect("its end");
+            assert!(body.trim().len() > 40, "{section}");
+        }
     }
 
     #[test]
@@ -220,6 +261,6 @@ mod tests {
         names.sort();
         let runs = ["000-000.mean-as-published.exr", "000-000.mean-as-published.png"];
         assert_eq!(names[..2], runs);
-        assert_eq!(names[2..], ["000-snee.exr", "000-snee.png", "of-mine.png"]);
+        assert_eq!(names[2..], ["000-snee.exr", "000-snee.png", "lead.png", "of-mine.png"]);
     }
 }

@@ -1,6 +1,7 @@
 //! The content of the page: the experiment, claims and verdicts, then efficiency, pictures and plots,
 //! measurements, cost, and how to reproduce it.
 
+use super::answer;
 use super::data::ReportData;
 use super::document::{Document, PageBlock, TableBlock};
 use super::number::significant;
@@ -10,13 +11,16 @@ use super::table::Table;
 use super::tables::{
     claim_table, comparison_table, measurement_table, model_error_table, verdict_table,
 };
+use super::undecided::{Undecided, two_digits_up, undecided};
 use crate::results::json::canonical;
 use crate::results::measurements::Measurement;
-use crate::results::record::CostMeasure;
+use crate::results::record::{CostMeasure, EstimatorRun};
 use crate::verify::levels::FAMILY_LEVEL;
 use crate::verify::verdict::Outcome;
 use crate::verify::weights::{self, DRIFT_LIMIT};
 
+/// With more verdicts that are undecided their table is folded: what they have in common is above it.
+const MOST_OPEN_VERDICTS: usize = 12;
 /// Tables with more rows are folded.
 const OPEN_ROWS: usize = 40;
 /// With more cells their measurements are folded.
@@ -25,6 +29,9 @@ const OPEN_CELLS: usize = 4;
 /// The page of one record.
 pub(super) fn page(data: &ReportData) -> Document {
     let mut blocks = asked(data);
+    if data.stored.record.samplers.is_empty() {
+        blocks.extend(answer::blocks(data));
+    }
     blocks.extend(claims(data));
     if data.stored.record.samplers.is_empty() {
         blocks.extend(efficiency(data));
@@ -100,7 +107,7 @@ fn folded_if(is_long: bool, title: &str, blocks: Vec<PageBlock>) -> Vec<PageBloc
 fn claims(data: &ReportData) -> Vec<PageBlock> {
     let verdicts = &data.verdicts;
     if verdicts.is_empty() {
-        return vec![heading("Claims"), PageBlock::Text("This experiment makes no claim.".into())];
+        return Vec::new();
     }
     let green = verdicts.iter().filter(|v| v.is_green()).count();
     let failed = verdicts.iter().filter(|v| v.outcome == Outcome::Fail).count();
@@ -118,7 +125,13 @@ fn claims(data: &ReportData) -> Vec<PageBlock> {
         vec![heading("Claims"), PageBlock::Text(text), named("claims", claim_table(verdicts))];
     if !others.is_empty() {
         blocks.push(PageBlock::Heading(3, "Verdicts that are not green".into()));
-        blocks.push(named("verdicts-not-green", verdict_table(&others)));
+        let groups = undecided(verdicts);
+        if !groups.is_empty() {
+            blocks.push(PageBlock::List(groups.iter().map(|group| cause(data, group)).collect()));
+        }
+        let table = named("verdicts-not-green", verdict_table(&others));
+        let title = format!("All {} verdicts that are not green", others.len());
+        blocks.extend(folded_if(failed == 0 && others.len() > MOST_OPEN_VERDICTS, &title, vec![table]));
     }
     if !green_ones.is_empty() {
         let title = format!(
@@ -128,6 +141,34 @@ fn claims(data: &ReportData) -> Vec<PageBlock> {
         blocks.push(PageBlock::Folded(title, vec![named("verdicts-green", verdict_table(&green_ones))]));
     }
     blocks
+}
+
+/// Why verdicts are undecided, and the passes that would decide them.
+fn cause(data: &ReportData, group: &Undecided) -> String {
+    let Some(factor) = group.factor() else {
+        return format!("{}; no number of passes is known to decide all of them.", group.sentence());
+    };
+    let cpu: f64 = data
+        .stored
+        .timing
+        .iter()
+        .flat_map(|timing| timing.cells.values().flat_map(|cell| cell.values()))
+        .map(|spent| spent.all_seconds())
+        .sum();
+    let seconds =
+        if cpu > 0.0 { format!(", about {} CPU s", two_digits_up(factor * cpu)) } else { String::new() };
+    let runs = || data.stored.record.cells.iter().flat_map(|cell| &cell.runs).map(|run| run.passes);
+    match (runs().min(), runs().max()) {
+        (Some(least), Some(most)) if least == most => format!(
+            "{}; `--set budget.passes={}`{seconds}, would probably decide them.",
+            group.sentence(),
+            two_digits_up(factor * most as f64)
+        ),
+        _ => format!(
+            "{}; {factor:.1} times the passes{seconds}, would probably decide them.",
+            group.sentence()
+        ),
+    }
 }
 
 /// The tests of samplers, and the precision of their expected masses.
@@ -160,17 +201,11 @@ fn samplers(data: &ReportData) -> Vec<PageBlock> {
 
 /// The pictures of every cell.
 fn pictures(data: &ReportData) -> Vec<PageBlock> {
-    let mut blocks = Vec::new();
-    for viewer in &data.viewers {
-        if data.viewers.len() > 1 {
-            blocks.push(PageBlock::Heading(3, viewer.cell.clone()));
-        }
-        blocks.push(PageBlock::Viewer(viewer.clone()));
+    match &data.viewers[..] {
+        [] => Vec::new(),
+        [one] => vec![heading("Pictures"), PageBlock::Viewer(one.clone())],
+        many => vec![heading("Pictures"), PageBlock::Cells(many.to_vec())],
     }
-    if !blocks.is_empty() {
-        blocks.insert(0, heading("Pictures"));
-    }
-    blocks
 }
 
 fn measured(data: &ReportData) -> Vec<PageBlock> {
@@ -280,14 +315,26 @@ fn notes(data: &ReportData) -> Vec<PageBlock> {
         for run in &cell.runs {
             let place = format!("{} {}", cell.label, run.estimator);
             let counted = run.anomalies.iter().filter(|(_, count)| **count > 0);
-            items.extend(counted.map(|(name, count)| format!("{}: {count} of `{name}`", place.trim())));
+            items.extend(counted.map(|(name, count)| {
+                format!("{}: {count} of `{name}`{}", place.trim(), of_paths(run, *count))
+            }));
             items.extend(run.notes.iter().map(|note| format!("{}: {note}", place.trim())));
         }
     }
     if items.is_empty() {
-        items.push("No anomalies were counted, and no estimator has a note.".into());
+        return Vec::new();
     }
     vec![heading("Anomalies and notes"), PageBlock::List(items)]
+}
+
+/// The part of the paths that a count is, where paths are counted.
+fn of_paths(run: &EstimatorRun, count: u64) -> String {
+    match run.cost.get("paths") {
+        Some(paths) if *paths > 0 => {
+            format!(" in {paths} paths ({} %)", significant(100.0 * count as f64 / *paths as f64, 2))
+        }
+        _ => String::new(),
+    }
 }
 
 fn origin(data: &ReportData) -> Vec<PageBlock> {

@@ -106,6 +106,73 @@ impl SplitFigure {
     }
 }
 
+/// The width that a lead picture has at least, in pixels.
+const LEAD_WIDE: usize = 640;
+
+/// Writes one picture with the names of both estimators, their CPU seconds, and what is known of the ratio in it.
+///
+/// # Errors
+/// I/O.
+pub(super) fn lead(
+    folder: &RecordFolder,
+    stored: &Stored,
+    cell: (usize, &Cell),
+    [left, right]: [&str; 2],
+    ratio: &str,
+) -> Result<FigureBlock> {
+    let [left, right] = [left, right].map(String::from);
+    let split = Split { left, right, rows: None, columns: None, exposure_stops: None };
+    let mut grid = Grid::new(stored, &split, &[cell]);
+    let (single, pair) = (split.left == split.right, &grid.pairs[0]);
+    let label = |half: &Half, name: &str| match half.seconds {
+        seconds if seconds.is_finite() => format!("{name}, {} CPU s", significant(seconds, 2)),
+        _ => name.to_string(),
+    };
+    let names = [label(&pair.halves[0], &split.left), label(&pair.halves[1], &split.right)];
+    let result = if ratio.is_empty() { String::new() } else { format!("{}: {ratio}", split.right) };
+    let needed = names.iter().map(|name| Canvas::label_width(name)).sum::<usize>() + GAP;
+    let needed = needed.max(Canvas::label_width(&result));
+    grid.zoom = LEAD_WIDE.max(needed).div_ceil(grid.size.0).max(1);
+    let (width, height) = (grid.size.0 * grid.zoom + SEAM, grid.size.1 * grid.zoom);
+    let mut canvas = Canvas::new(width, height);
+    grid.paint(&mut canvas, &grid.pairs[0], (0, 0));
+    canvas.label(&names[0], (0, 0), false);
+    if !single {
+        canvas.label(&names[1], (width, 0), true);
+    }
+    if !result.is_empty() {
+        let left = (width - Canvas::label_width(&result).min(width)) / 2;
+        canvas.label(&result, (left, height.saturating_sub(Canvas::LABEL_HEIGHT)), false);
+    }
+    let png = canvas.to_png()?;
+    let path = "images/lead.png".to_string();
+    folder.write_view(&path, &png)?;
+    let title = if single { split.left.clone() } else { format!("{} | {}", split.left, split.right) };
+    let mut caption = match single {
+        true => String::new(),
+        false => {
+            format!("Left half: `{}`; right half: `{}`, at the same exposure.", split.left, split.right)
+        }
+    };
+    let ratio = grid.pairs[0].time_ratio();
+    let factor = ratio.max(1.0 / ratio);
+    if !single && factor.is_finite() {
+        caption += &match factor > EQUAL {
+            true => format!(
+                " Their CPU times differ by a factor of {}: their noise alone is no comparison.",
+                significant(factor, 2)
+            ),
+            false => " Equal CPU time.".to_string(),
+        };
+    }
+    if grid.zoom > 1 {
+        caption += &format!(" A pixel is shown as {0} x {0}.", grid.zoom);
+    }
+    let place =
+        if stored.record.cells.len() > 1 { format!("Cell {}. ", cell.1.label) } else { String::new() };
+    Ok(FigureBlock { path, picture: PictureFile::Png(png), title, caption: place + &caption })
+}
+
 /// Cells by their labels on the axes that are neither rows nor columns, each with those labels in words.
 fn groups<'a>(cells: &'a [Cell], split: &Split) -> Vec<(String, Vec<(usize, &'a Cell)>)> {
     let mut groups: Vec<(String, Vec<(usize, &Cell)>)> = Vec::new();

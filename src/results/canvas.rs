@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::image::{Picture, encoded, show};
+use super::letters;
 use crate::error::Result;
 
 /// White paper, row by row from the top.
@@ -21,6 +22,12 @@ pub struct Unshown {
     /// Outside the sRGB gamut or not finite.
     pub out_of_gamut: usize,
 }
+
+/// Columns beside the text of a label; above and below it half as many rows.
+const LABEL_MARGIN: usize = 8;
+
+/// How much of the picture the ground of a label hides.
+const LABEL_GROUND: f64 = 0.6;
 
 impl Canvas {
     /// A white canvas, width by height in pixels.
@@ -59,6 +66,40 @@ impl Canvas {
         unshown
     }
 
+    /// Writes a line of white text on a dark ground, its box with one corner at `(x, y)`: the top left one, or with
+    /// `from_right` the top right one.
+    pub fn label(&mut self, text: &str, (x, y): (usize, usize), from_right: bool) {
+        let (wide, high) = (letters::width(text) + 2 * LABEL_MARGIN, Canvas::LABEL_HEIGHT);
+        let left = if from_right { x.saturating_sub(wide) } else { x };
+        for v in y..(y + high).min(self.height) {
+            for u in left..(left + wide).min(self.width) {
+                self.mix((u, v), 0.0, LABEL_GROUND);
+            }
+        }
+        letters::each_pixel(text, |u, v, coverage| {
+            self.mix((left + LABEL_MARGIN + u, y + LABEL_MARGIN / 2 + v), 255.0, coverage);
+        });
+    }
+
+    /// Mixes a grey value into a pixel.
+    fn mix(&mut self, (u, v): (usize, usize), grey: f64, part: f64) {
+        if u >= self.width || v >= self.height {
+            return;
+        }
+        let at = 3 * (v * self.width + u);
+        for value in &mut self.data[at..at + 3] {
+            *value = (f64::from(*value) + part * (grey - f64::from(*value))).round() as u8;
+        }
+    }
+
+    /// Rows of a label.
+    pub const LABEL_HEIGHT: usize = letters::HEIGHT + LABEL_MARGIN;
+
+    /// Columns of a label.
+    pub fn label_width(text: &str) -> usize {
+        letters::width(text) + 2 * LABEL_MARGIN
+    }
+
     /// The file.
     ///
     /// # Errors
@@ -72,6 +113,23 @@ impl Canvas {
 mod tests {
     use super::super::sample;
     use super::*;
+
+    #[test]
+    fn labels_stay_on_the_canvas_and_are_white_on_dark() {
+        let mut canvas = Canvas::new(80, 40);
+        canvas.label("mis", (0, 0), false);
+        let at = |canvas: &Canvas, u: usize, v: usize| canvas.data[3 * (80 * v + u)];
+        assert_eq!(at(&canvas, 0, 0), 102, "the ground hides 60 % of white paper");
+        assert_eq!(at(&canvas, Canvas::label_width("mis"), 0), 255, "beside it is paper");
+        assert_eq!(at(&canvas, 0, Canvas::LABEL_HEIGHT), 255, "and below it");
+        assert!(
+            (0..40).any(|v| (0..60).any(|u| at(&canvas, u, v) == 255 && v < 30)),
+            "the text is white"
+        );
+        canvas.label("a text that is far too long", (79, 39), false);
+        canvas.label("another that begins before the left edge", (40, 20), true);
+        assert_eq!(canvas.data.len(), 3 * 80 * 40);
+    }
 
     // The sample's red and green are 0.2 i and 0.2 i + 0.1 in pixel i = 3 row + column.
     #[test]

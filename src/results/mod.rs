@@ -15,6 +15,10 @@ pub mod exr_file;
 pub mod image;
 /// Canonical JSON and content hashes.
 pub mod json;
+/// The arrays of a record, and the names of their axes.
+pub mod layout;
+/// Letters for labels in pictures.
+mod letters;
 /// The summary of a result that is kept without its arrays.
 pub mod manifest;
 /// The table of everything that was measured.

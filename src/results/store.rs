@@ -347,7 +347,7 @@ impl RecordFolder {
     }
 
     /// Removes the pictures of an earlier record from `images/`: what begins with the number of a cell
-    /// or `split-`, as every picture of a report does.
+    /// or `split-`, as every picture of a report does, and its lead picture.
     fn clear_pictures(&self) -> Result<()> {
         let folder = self.root.join("images");
         let Ok(entries) = fs::read_dir(&folder) else { return Ok(()) };
@@ -356,7 +356,7 @@ impl RecordFolder {
             let name = name.to_string_lossy();
             let number = name.split_once('-').map_or("", |(number, _)| number);
             let is_cell = number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit());
-            if is_cell || number == "split" {
+            if is_cell || number == "split" || name == "lead.png" {
                 let path = entry.path();
                 fs::remove_file(&path)
                     .map_err(Error::io(&path, "remove a picture of an earlier record"))?;

@@ -55,14 +55,14 @@ use super::tree::Merge;
 use crate::math::{exp, ln};
 
 /// The fewest blocks of an arm: below, Student's interval is too wide to be of use.
-pub(crate) const FEWEST_BLOCKS: usize = 8;
+pub const FEWEST_BLOCKS: usize = 8;
 
 /// The largest share of an arm's sum of squares that one pass may hold.
-pub(crate) const LARGEST_SHARE: f64 = 0.05;
+pub const LARGEST_SHARE: f64 = 0.05;
 
 /// Meaning of a block's values, and so of V.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Values {
+pub enum Values {
     /// Scores of passes: V is their variance.
     Scores,
     /// Unbiased estimates of V: their mean is.
@@ -92,7 +92,7 @@ impl Values {
 
 /// Passes that ran together.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct JackknifeBlock {
+pub struct JackknifeBlock {
     /// Moments of the passes' values.
     pub moments: Moments,
     /// Their total cost, in any unit that both arms share: CPU seconds, rays.
@@ -101,7 +101,7 @@ pub(crate) struct JackknifeBlock {
 
 /// Why there is no ratio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum NoRatio {
+pub enum NoRatio {
     /// Fewer than [`FEWEST_BLOCKS`] blocks in an arm, or an empty block.
     TooFewBlocks,
     /// A moment or a cost is not finite, or a cost is not positive.
@@ -122,42 +122,42 @@ impl fmt::Display for NoRatio {
 
 /// A ratio, A over B, by its logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct LogRatio {
+pub struct LogRatio {
     /// The logarithm, with its jackknife error and the error's degrees of freedom.
     pub log: Estimate,
 }
 
 impl LogRatio {
     /// Estimate of the ratio.
-    pub(crate) fn ratio(&self) -> f64 {
+    pub fn ratio(&self) -> f64 {
         exp(self.log.value)
     }
 
     /// The ratio with the error that controls show of the machine, as [`machine`] has it.
-    pub(crate) fn with_control(&self, machine: &Estimate) -> LogRatio {
+    pub fn with_control(&self, machine: &Estimate) -> LogRatio {
         LogRatio { log: self.log.minus(machine) }
     }
 
     /// Half the width of the two-sided Student interval of `log`.
-    pub(crate) fn half_width(&self, confidence: f64) -> f64 {
+    pub fn half_width(&self, confidence: f64) -> f64 {
         critical_value(1.0 - confidence, self.log.dof) * self.log.std_error
     }
 
     /// The interval of the ratio.
-    pub(crate) fn interval(&self, confidence: f64) -> (f64, f64) {
+    pub fn interval(&self, confidence: f64) -> (f64, f64) {
         let half_width = self.half_width(confidence);
         (exp(self.log.value - half_width), exp(self.log.value + half_width))
     }
 
     /// The two-sided test that the true ratio is `ratio`.
-    pub(crate) fn test(&self, ratio: f64) -> Test {
+    pub fn test(&self, ratio: f64) -> Test {
         self.log.minus(&Estimate::known(ln(ratio), 0.0)).test_zero()
     }
 }
 
 /// Summary of one arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ArmSummary {
+pub struct ArmSummary {
     /// Moments of all its passes.
     pub moments: Moments,
     /// Cost of a pass.
@@ -175,7 +175,7 @@ pub(crate) struct ArmSummary {
 
 /// Two estimators at equal cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Efficiency {
+pub struct Efficiency {
     /// V_A c_A / (V_B c_B): below 1 where A is the more efficient.
     pub work: LogRatio,
     /// Ratio of the variances, V_A / V_B.
@@ -203,7 +203,7 @@ impl Efficiency {
     /// `largest_pass`). The first condition alone fails by chance in 1 - confidence of all honest
     /// comparisons: R of half the data has twice the variance, its covariance with R of all is the
     /// latter's variance, and so their difference has the standard error of R itself.
-    pub(crate) fn is_resolved(&self, confidence: f64) -> bool {
+    pub fn is_resolved(&self, confidence: f64) -> bool {
         let is_shared = [self.a, self.b].iter().all(|arm| arm.largest_pass.1 <= LARGEST_SHARE);
         // A NaN (a first half of zero variance) resolves nothing.
         is_shared && self.moved <= self.work.half_width(confidence)
@@ -212,7 +212,7 @@ impl Efficiency {
 
 /// What controls show of the machine: 0 with the error r and its degrees of freedom, from the logarithms of
 /// the cell's own control's ratio to itself and of those of all cells.
-pub(crate) fn machine(own: f64, all: &[f64]) -> Estimate {
+pub fn machine(own: f64, all: &[f64]) -> Estimate {
     let count = all.len() as f64;
     let mean = all.iter().map(|log| log * log).sum::<f64>() / count;
     Estimate { value: 0.0, std_error: mean.max(own * own).sqrt(), dof: count }
@@ -229,7 +229,7 @@ const ONE_ARM: f64 = 0.999;
 ///   max_k Q4 / (Q2 M2) <= s <= max_k sqrt(Q4) / M2.
 /// Over one block the bounds are kurtosis / n and sqrt(kurtosis / n). With the sum of a block's
 /// variances for Q2 and that of their squares for Q4, the same holds of the largest variance.
-pub(crate) fn one_pass_share(blocks: &[JackknifeBlock], values: Values, mean: f64) -> (f64, f64) {
+pub fn one_pass_share(blocks: &[JackknifeBlock], values: Values, mean: f64) -> (f64, f64) {
     let terms = |b: &JackknifeBlock| values.terms(&b.moments, mean);
     let m2: f64 = blocks.iter().map(|b| terms(b).0).sum();
     let bounds = blocks.iter().map(|b| {
@@ -254,7 +254,7 @@ fn about(moments: &Moments, mean: f64) -> (f64, f64) {
 /// # Errors
 ///
 /// [`NoRatio`].
-pub(crate) fn compare(
+pub fn compare(
     a: &[JackknifeBlock],
     b: &[JackknifeBlock],
     values: Values,
@@ -401,7 +401,7 @@ impl Deviations {
 /// The delete-one jackknife's standard error of a positive estimate's logarithm: from the estimates
 /// that leave one block out each, se^2 = (n - 1) / n sum (log - mean log)^2. Infinite for fewer than
 /// two. For estimates that are no sums over [`JackknifeBlock`]s.
-pub(crate) fn jackknife_log_error(without_one: &[f64]) -> f64 {
+pub fn jackknife_log_error(without_one: &[f64]) -> f64 {
     if without_one.len() < 2 {
         return f64::INFINITY;
     }

@@ -1,7 +1,7 @@
 //! Moments, tests, multiplicity. Door for `statrs`, of which only survival functions are used.
 
 /// Two estimators at equal cost.
-pub(crate) mod efficiency;
+pub mod efficiency;
 /// E-values: evidence that multiplies.
 pub(crate) mod evidence;
 /// Tests of samples against known probabilities.

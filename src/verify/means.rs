@@ -17,7 +17,7 @@ const MIN_BATCHES: usize = 64;
 /// Limit of |skewness| / sqrt(passes). With log-normal scores in 64 batches, a t test at level 1e-4
 /// was measured to give twice as many false alarms at 0.26, and 30 times as many at 3.2; batching does
 /// not cure skewness, only passes do.
-const SKEWNESS_LIMIT: f64 = 0.1;
+pub(crate) const SKEWNESS_LIMIT: f64 = 0.1;
 
 /// Limit of one batch's share of the variance between batches. Of 64 normal batches, one holds more
 /// than a half with probability below 1e-13; with more, one score decides, and hides every other

@@ -34,7 +34,7 @@ mod evidence;
 /// Tests under one family-wise level.
 mod family;
 /// Means against values and against each other.
-mod means;
+pub(crate) mod means;
 /// Claims that a record is reproduced.
 mod reproduction;
 /// Tests of samplers.

@@ -9,6 +9,8 @@ use scale::Scale;
 
 pub(crate) use scale::PlotAxis;
 
+/// The same as PDF.
+pub(crate) mod pdf;
 mod scale;
 /// Importance in a plane.
 pub(crate) mod slice;
@@ -265,6 +267,7 @@ impl Plot {
         names.extend(self.levels.iter().map(|(v, name)| (y.at(*v), name.as_str(), "currentColor")));
         names.retain(|(_, name, _)| !name.is_empty());
         names.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let ends: Vec<f64> = names.iter().map(|name| name.0).collect();
         let mut lowest = frame.top;
         for name in &mut names {
             name.0 = name.0.max(lowest).max(frame.top);
@@ -275,15 +278,25 @@ impl Plot {
             name.0 = name.0.min(highest);
             highest = name.0 - LINE;
         }
-        let text = |(at, name, colour): &(f64, &str, &str)| {
-            format!(
+        let text = |((at, name, colour), end): (&(f64, &str, &str), &f64)| {
+            // A line leads to a name that had to move away from where its series ends.
+            let end = end.clamp(frame.top, frame.bottom);
+            let lead = match (at - end).abs() > 0.5 * LINE {
+                true => format!(
+                    "<path d=\"M{:.1} {end:.1}L{:.1} {at:.1}\" stroke=\"{colour}\" stroke-width=\"0.7\" fill=\"none\"/>\n",
+                    frame.right + 1.0,
+                    frame.right + 7.0
+                ),
+                false => String::new(),
+            };
+            lead + &format!(
                 "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{colour}\">{}</text>\n",
                 frame.right + 8.0,
                 at + 4.0,
                 escape(&shortened(name))
             )
         };
-        names.iter().map(text).collect()
+        names.iter().zip(&ends).map(text).collect()
     }
 }
 
@@ -306,6 +319,11 @@ pub(crate) fn panels(plots: &[Plot]) -> String {
         below += height;
     }
     svg + "</svg>\n"
+}
+
+/// The picture as a file of its own: on paper, so that it reads on dark pages, too.
+pub(crate) fn on_paper(svg: &str) -> String {
+    svg.replacen(">\n", ">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n", 1)
 }
 
 impl Series {

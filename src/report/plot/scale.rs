@@ -81,7 +81,13 @@ impl<'a> Scale<'a> {
             return names.map(|(place, name)| (place as f64, name.clone())).collect();
         }
         let values = if self.axis.is_log { self.log_ticks() } else { self.linear_ticks() };
-        values.into_iter().map(|value| (value, number(value))).collect()
+        let mut ticks: Vec<(f64, String)> =
+            values.into_iter().map(|value| (value, number(value))).collect();
+        // One form on one axis.
+        if self.axis.is_log && ticks.iter().any(|(_, name)| name.contains('e')) {
+            ticks.iter_mut().for_each(|(value, name)| *name = with_exponent(*value));
+        }
+        ticks
     }
 
     fn log_ticks(&self) -> Vec<f64> {
@@ -139,6 +145,14 @@ fn number(x: f64) -> String {
     if exponent.is_empty() { mantissa.into() } else { format!("{mantissa}e{exponent}") }
 }
 
+/// A value above 0 with its exponent: `3e-4`; `3` without one.
+fn with_exponent(x: f64) -> String {
+    // A little more, because the logarithm of a power of ten may lie below the whole number.
+    let exponent = (log10(x) + 1e-9).floor() as i32;
+    let mantissa = number(x / power_of_ten(exponent));
+    if exponent == 0 { mantissa } else { format!("{mantissa}e{exponent}") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,7 +167,10 @@ mod tests {
     fn ticks_are_round() {
         assert_eq!(ticks(false, [0.0, 1.05]), "0 0.5 1");
         assert_eq!(ticks(false, [-0.013, 0.021]), "-0.01 0 0.01 0.02");
-        assert_eq!(ticks(true, [0.9, 1.2e6]), "1 10 100 1000 10000 100000 1e6");
+        assert_eq!(ticks(true, [0.9, 1.2e6]), "1 1e1 1e2 1e3 1e4 1e5 1e6");
+        assert_eq!(ticks(true, [2e-5, 0.4]), "1e-4 1e-3 1e-2 1e-1");
+        assert_eq!(ticks(true, [1e-4, 3e-3]), "1e-4 2e-4 3e-4 5e-4 1e-3 2e-3 3e-3");
+        assert_eq!(ticks(true, [1e-3, 0.5]), "0.001 0.01 0.1");
         assert_eq!(
             ticks(true, [0.8, 30.0]),
             "1 2 3 5 10 20 30".replace("2 3", "3").replace("5 ", "").replace("20 ", "")

@@ -44,8 +44,8 @@ struct Price {
 }
 
 const PRICES: [Price; 2] = [
-    Price { label: "CPU seconds", name: "time", of: seconds },
-    Price { label: "rays", name: "rays", of: rays },
+    Price { label: "CPU time / s", name: "time", of: seconds },
+    Price { label: "number of rays", name: "rays", of: rays },
 ];
 
 fn seconds(stored: &Stored, cell: &Cell, run: &EstimatorRun) -> Option<f64> {
@@ -68,7 +68,7 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> Vec<PlotFigure> {
             .flatten()
             .collect();
         let is_measured = !series.is_empty();
-        let plot = Plot::small(PlotAxis::log(price.label), PlotAxis::log("relative error"), series);
+        let plot = Plot::small(PlotAxis::log(price.label), PlotAxis::log("relative RMS error"), series);
         let name = format!("error-{}-{index:03}", price.name);
         let caption = format!("Against {}.", price.label);
         is_measured.then(|| PlotFigure::of(name, cell.label.clone(), caption, plot))

@@ -17,8 +17,10 @@ pub(super) fn section(stored: &Stored) -> Section {
     let cells = stored.record.cells.iter().enumerate();
     let bands = shown_bands(stored);
     let of_cell = |(index, cell): (usize, &Cell)| {
-        let plots = bands.iter().map(|band| of_band(stored, (index, cell), *band, &edges));
-        plots.collect::<Vec<_>>()
+        let absolute = bands.iter().map(|band| of_band(stored, (index, cell), *band, &edges));
+        let ratios =
+            bands.iter().filter_map(|band| over_transport(stored, (index, cell), *band, &edges));
+        absolute.chain(ratios).collect::<Vec<_>>()
     };
     Section {
         heading: "Radial profiles".into(),
@@ -36,9 +38,7 @@ pub(super) fn section(stored: &Stored) -> Section {
 fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &[f64]) -> PlotFigure {
     let line = |run: &EstimatorRun| {
         let point = |ring: usize| {
-            let observable = Observable { name: format!("ring_{ring}"), class: "all".into() };
-            let quantity = Quantity { cell: index, estimator: run.estimator.clone(), observable, band };
-            let mean = Estimate::of_batches(&stored.batches(&quantity)?);
+            let mean = ring_mean(stored, (index, run), band, ring)?;
             let [from, to] = [edges[ring], edges[ring + 1]];
             let area = PI * (to - from) * (to + from);
             let (value, std_error) = (mean.value / area, mean.std_error / area);
@@ -55,6 +55,55 @@ fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &
         "A ring whose mean is not above 0 has no point.".into(),
         Plot::small(x, y, runs(cell).map(line).collect()),
     )
+}
+
+/// The mean of a ring.
+fn ring_mean(
+    stored: &Stored,
+    (cell, run): (usize, &EstimatorRun),
+    band: usize,
+    ring: usize,
+) -> Option<Estimate> {
+    let observable = Observable { name: format!("ring_{ring}"), class: "all".into() };
+    let quantity = Quantity { cell, estimator: run.estimator.clone(), observable, band };
+    Some(Estimate::of_batches(&stored.batches(&quantity)?))
+}
+
+/// Every model over the first estimator of light transport; nothing where there is not one of each.
+fn over_transport(
+    stored: &Stored,
+    (index, cell): (usize, &Cell),
+    band: usize,
+    edges: &[f64],
+) -> Option<PlotFigure> {
+    let transport = runs(cell).find(|run| run.model.is_none())?;
+    let line = |run: &EstimatorRun| {
+        let point = |ring: usize| {
+            let [model, truth] = [run, transport].map(|run| ring_mean(stored, (index, run), band, ring));
+            let (model, truth) = (model?, truth?);
+            let value = model.value / truth.value;
+            // By the delta method, as model errors have it.
+            let square = |of: &Estimate| (of.std_error / of.value) * (of.std_error / of.value);
+            let std_error = value * (square(&model) + square(&truth)).sqrt();
+            let ratio = Estimate { value, std_error, dof: model.dof.min(truth.dof) };
+            let is_known = truth.value > 0.0 && model.value > 0.0;
+            is_known.then(|| PlotPoint::of(0.5 * (edges[ring] + edges[ring + 1]), &ratio))
+        };
+        Series::new(&run.estimator, Style::Line, (0..edges.len() - 1).filter_map(point).collect())
+    };
+    let models: Vec<Series> = runs(cell).filter(|run| run.model.is_some()).map(line).collect();
+    if models.is_empty() {
+        return None;
+    }
+    let y = PlotAxis::log(format!("model over {}", transport.estimator));
+    let mut plot = Plot::small(PlotAxis::log("distance / mm"), y, models);
+    plot.levels = vec![(1.0, transport.estimator.clone())];
+    Some(PlotFigure::of(
+        format!("profile-ratio-{index:03}-{}", band + 1),
+        joined(&[&cell.label, band_name(stored, band), "model over transport"]),
+        format!("Each model over `{}`, with the errors of both sides.", transport.estimator),
+        plot,
+    ))
 }
 
 #[cfg(test)]
@@ -79,6 +128,14 @@ mod tests {
         let points = &plots[0].series[0].points;
         assert_eq!(points.iter().map(|p| p.x).collect::<Vec<_>>(), [0.5, 2.0]);
         assert!(points.iter().all(|p| p.low < p.y && p.y < p.high && p.low > 0.0));
+        // Against light transport: two more, with one line.
+        let mut modelled = stored.clone();
+        modelled.record.cells[0].runs[1].model = Some("dipole".into());
+        let section = super::section(&modelled);
+        assert_eq!(section.drawn.len(), 4);
+        let Content::Plots(ratios) = &section.drawn[2].content else { panic!("plots") };
+        assert_eq!((ratios[0].series.len(), ratios[0].y.label.as_str()), (1, "model over mis"));
+        assert!(ratios[0].series[0].points.iter().all(|p| (p.y - 1.0).abs() < 0.1 && p.low < p.y));
         // Both rings of the sample have a mean of 1.
         let areas = [PI, 8.0 * PI];
         assert!(points.iter().zip(areas).all(|(p, area)| (p.y * area - 1.0).abs() < 0.1), "{points:?}");

@@ -151,7 +151,7 @@ fn of_axis(
             }
             let plot = Plot {
                 x,
-                y: PlotAxis::log("efficiency"),
+                y: PlotAxis::log(format!("efficiency, {candidate} over {baseline}")),
                 series: lines.into_iter().take(MOST_LINES).collect(),
                 levels: vec![(1.0, "equal".into())],
                 size: Size::Small,

@@ -68,7 +68,7 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
     let title = joined(&[&cell.label, &observable.name, &observable.class, &running.band]);
     let plot = Plot {
         x: PlotAxis::log("passes"),
-        y: PlotAxis { range, ..PlotAxis::linear("mean") },
+        y: PlotAxis { range, ..PlotAxis::linear(format!("mean of {}", observable.name)) },
         series,
         levels,
         size: Size::Wide,

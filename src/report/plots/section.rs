@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::report::document::{FigureBlock, PageBlock, PictureFile};
 use crate::report::pictures::few_bands;
 use crate::report::plot::slice::SlicePlot;
-use crate::report::plot::{Plot, panels, swatches};
+use crate::report::plot::{Plot, on_paper, panels, pdf, swatches};
 use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::{RecordFolder, Stored};
 
@@ -52,7 +52,11 @@ impl Section {
     /// I/O.
     pub(crate) fn write(&self, folder: &RecordFolder) -> Result<()> {
         for drawn in &self.drawn {
-            folder.write_view(&drawn.path(), drawn.to_svg().as_bytes())?;
+            let svg = on_paper(&drawn.to_svg());
+            folder.write_view(&drawn.path(), svg.as_bytes())?;
+            if let Some(pdf) = pdf::from_svg(&svg) {
+                folder.write_view(&format!("plots/{}.pdf", drawn.name), &pdf)?;
+            }
             for (number, numbers) in drawn.numbers().iter().enumerate() {
                 let part = if number == 0 { String::new() } else { format!("-{}", number + 1) };
                 let path = format!("plots/{}{part}.csv", drawn.name);

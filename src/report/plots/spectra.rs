@@ -45,7 +45,9 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [PlotFigure; 2] {
         Series::new(&run.estimator, Style::Line, points.collect())
     };
     let series = runs.iter().map(line).collect();
-    let plot = Plot::small(PlotAxis::linear("wavelength / nm"), PlotAxis::linear("mean"), series);
+    let observable = runs.first().and_then(|(run, _)| run.observables.first());
+    let y = observable.map_or("mean".into(), |of| format!("mean of {}", of.name));
+    let plot = Plot::small(PlotAxis::linear("wavelength / nm"), PlotAxis::linear(y), series);
     let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
     let colours: Vec<(String, [Estimate; 3])> =
         runs.iter().filter_map(|(run, _)| Some((run.estimator.clone(), colour(stored, run)?))).collect();

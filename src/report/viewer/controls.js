@@ -5,7 +5,7 @@ const ABOUT = {
   noise: "Standard error of a pixel over its mean. Grey: both are 0.",
   difference: "Difference from the other estimator's pixel, over that pixel. Grey: both are 0.",
   z: "Difference from the other estimator's pixel over the standard error of that difference, both sides' noise added in " +
-    "squares. Grey: no standard error on either side.",
+    "squares. Grey: no standard error on either side, or passes too skewed to judge.",
 };
 const MODES = { side: "Side by side", flip: "Flip", split: "Split" };
 const REACH = 10; // stops by which the exposure can be moved either way

@@ -1,16 +1,18 @@
 //! The viewer in HTML: data for the script, and the pictures beside the page for a reader without it.
 
 use super::maps;
-use crate::report::document::{FigureBlock, PageBlock, ViewerBlock};
+use crate::report::base64;
+use crate::report::document::{FigureBlock, PageBlock, PictureFile, ViewerBlock};
 use crate::report::markup::escape;
 
 const STYLE: &str = include_str!("viewer.css");
 /// In this order: each uses the ones before it.
-const SCRIPTS: [&str; 4] = [
+const SCRIPTS: [&str; 5] = [
     include_str!("values.js"),
     include_str!("canvases.js"),
     include_str!("controls.js"),
     include_str!("viewer.js"),
+    include_str!("cells.js"),
 ];
 
 /// A viewer on the page.
@@ -43,6 +45,35 @@ pub(crate) fn to_html(viewer: &ViewerBlock) -> String {
     }
 }
 
+/// Viewers of several cells, of which the script shows one at a time; without it all are there.
+pub(crate) fn cells(viewers: &[ViewerBlock]) -> String {
+    let mut room = SHEET_ROOM;
+    let mut cell = |viewer: &ViewerBlock| {
+        let label = escape(&viewer.cell);
+        // The last estimator's picture stands for the cell in the contact sheet.
+        let thumb = viewer.figures.last().and_then(|figure| match &figure.picture {
+            PictureFile::Png(png) => {
+                room = room.checked_sub(png.len())?;
+                let data = base64::encode(png);
+                Some(format!(
+                    "<img class=\"viewer-thumb\" alt=\"\" hidden src=\"data:image/png;base64,{data}\">\n"
+                ))
+            }
+            PictureFile::Svg(_) => None,
+        });
+        format!(
+            "<section class=\"viewer-cell\" data-cell=\"{label}\">\n<h3>{label}</h3>\n{}{}</section>\n",
+            thumb.unwrap_or_default(),
+            to_html(viewer)
+        )
+    };
+    let cells: String = viewers.iter().map(&mut cell).collect();
+    format!("<div class=\"viewer-cells\">\n{cells}</div>\n")
+}
+
+/// Bytes of all pictures of a contact sheet together.
+const SHEET_ROOM: usize = 3_000_000;
+
 /// Style and script of a page with viewers, for its head and its end.
 pub(crate) fn parts(blocks: &[PageBlock]) -> (String, String) {
     if !blocks.iter().any(has_viewer) {
@@ -60,7 +91,7 @@ pub(crate) fn parts(blocks: &[PageBlock]) -> (String, String) {
 
 fn has_viewer(block: &PageBlock) -> bool {
     match block {
-        PageBlock::Viewer(_) => true,
+        PageBlock::Viewer(_) | PageBlock::Cells(_) => true,
         PageBlock::Folded(_, blocks) => blocks.iter().any(has_viewer),
         _ => false,
     }

@@ -2,6 +2,7 @@
 
 use crate::math;
 use crate::results::image::{Picture, diverging};
+use crate::verify::means::SKEWNESS_LIMIT;
 
 /// z-scores are shown from -4 to 4.
 pub(super) const Z_LIMIT: f64 = 4.0;
@@ -28,15 +29,38 @@ pub(super) fn difference(a: &Picture, b: &Picture, band: usize) -> Vec<f64> {
     a.mean(band).zip(b.mean(band)).map(|(a, b)| (a - b) / b.abs()).collect()
 }
 
-/// (a - b) over its standard error, of two that are independent; not a number where neither has an
-/// error.
-pub(super) fn z_scores(a: &Picture, b: &Picture, band: usize) -> Vec<f64> {
-    let errors = a.std_error(band).zip(b.std_error(band));
-    let score = |((a, b), (ea, eb)): ((f64, f64), (f64, f64))| {
-        let error = (ea * ea + eb * eb).sqrt();
-        if error == 0.0 { f64::NAN } else { (a - b) / error }
-    };
-    a.mean(band).zip(b.mean(band)).zip(errors).map(score).collect()
+/// (a - b) over its standard error, of two that are independent and of so many passes.
+pub(super) struct ZScores {
+    /// By pixel; not a number where there is none.
+    pub values: Vec<f64>,
+    /// Pixels without a standard error on either side.
+    pub without_error: usize,
+    /// Pixels whose noise is so skewed on a side that a test of its mean would be refused.
+    pub skewed: usize,
+}
+
+impl ZScores {
+    pub(super) fn of([a, b]: [&Picture; 2], band: usize, passes: [u64; 2]) -> ZScores {
+        let mut scores = ZScores { values: Vec::new(), without_error: 0, skewed: 0 };
+        let sides = |of: &Picture| of.mean(band).zip(of.std_error(band)).collect::<Vec<_>>();
+        for ((a, ea), (b, eb)) in sides(a).into_iter().zip(sides(b)) {
+            let error = (ea * ea + eb * eb).sqrt();
+            let is_skewed = is_skewed(a, ea, passes[0]) || is_skewed(b, eb, passes[1]);
+            scores.without_error += usize::from(error == 0.0);
+            scores.skewed += usize::from(error != 0.0 && is_skewed);
+            scores.values.push(if error == 0.0 || is_skewed { f64::NAN } else { (a - b) / error });
+        }
+        scores
+    }
+}
+
+/// Whether the passes of a pixel are so skewed that a test of their mean would be refused
+/// ([`SKEWNESS_LIMIT`]), as far as mean and error tell. Of values that are never negative, E x^3 E x >=
+/// (E x^2)^2 (Cauchy and Schwarz), so their skewness is at least c - 1/c with c = standard deviation over
+/// mean; with c = r sqrt(n), r the relative error of the mean, skewness / sqrt(n) >= r - 1 / (n r).
+fn is_skewed(mean: f64, error: f64, passes: u64) -> bool {
+    let relative = error / mean;
+    mean > 0.0 && relative - 1.0 / (passes as f64 * relative) > SKEWNESS_LIMIT
 }
 
 /// The smallest range of [`LIMITS`] that holds 95 % of the values.
@@ -122,8 +146,47 @@ mod tests {
         let text = |values: Vec<f64>| format!("{values:?}");
         assert_eq!(text(noise(&a, 0)), "[0.15, NaN, 0.5, 0.0]");
         assert_eq!(text(difference(&a, &b, 0)), "[1.0, NaN, inf, -0.25]");
-        assert_eq!(text(z_scores(&a, &b, 0)), "[2.0, NaN, 2.0, NaN]");
-        assert_eq!(text(z_scores(&b, &a, 0)), "[-2.0, NaN, -2.0, NaN]");
+        let scores = |pair, passes| ZScores::of(pair, 0, passes);
+        // Two passes: nothing is known to be skewed.
+        assert_eq!(text(scores([&a, &b], [2, 2]).values), "[2.0, NaN, 2.0, NaN]");
+        let back = scores([&b, &a], [2, 2]);
+        assert_eq!(text(back.values), "[-2.0, NaN, -2.0, NaN]");
+        assert_eq!((back.without_error, back.skewed), (2, 0));
+        // Relative errors of 0.15 and 0.4, and of 0.5, of a hundred passes: 0.15 - 1 / 15 is within the limit of 0.1,
+        // 0.4 - 1 / 40 is not.
+        let many = scores([&a, &b], [100, 100]);
+        assert_eq!(
+            (text(many.values), many.without_error, many.skewed),
+            ("[NaN, NaN, NaN, NaN]".into(), 2, 2)
+        );
+        assert!(!is_skewed(2.0, 0.3, 100) && is_skewed(1.0, 0.4, 100) && !is_skewed(-1.0, 0.4, 100));
+    }
+
+    /// The bound holds of any values that are never negative, and is their skewness where only one differs from 0.
+    #[test]
+    fn skewness_is_at_least_what_mean_and_error_tell() {
+        for power in 1..12 {
+            for kind in 0..3 {
+                let value = |i: i32| match kind {
+                    0 => f64::from(u8::from(i % (1 << (power % 8)) == 0)),
+                    1 => f64::from(i).powi(power),
+                    _ => f64::from((i * 7919) % 101) + f64::from(power),
+                };
+                let values: Vec<f64> = (0..256).map(value).collect();
+                let n = values.len() as f64;
+                let mean = values.iter().sum::<f64>() / n;
+                let moment = |p: i32| values.iter().map(|x| (x - mean).powi(p)).sum::<f64>() / n;
+                let (deviation, skewness) = (moment(2).sqrt(), moment(3) / moment(2).powf(1.5));
+                let c = deviation / mean;
+                assert!(
+                    skewness >= c - 1.0 / c - 1e-9 || deviation == 0.0,
+                    "{power} {kind}: {skewness} {c}"
+                );
+                if kind == 0 && deviation > 0.0 {
+                    assert!((skewness - (c - 1.0 / c)).abs() < 1e-9, "{skewness} {c}");
+                }
+            }
+        }
     }
 
     #[test]

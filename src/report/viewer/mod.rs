@@ -13,13 +13,14 @@ use crate::results::image::{Picture, to_byte_png, to_linear_png};
 use crate::results::record::{Cell, EstimatorRun, StatedBias};
 use crate::results::store::Stored;
 use crate::stats::tails::student_two_sided;
+use crate::verify::means::SKEWNESS_LIMIT;
 
 /// The viewer in HTML.
 mod html;
 /// False-colour maps.
 mod maps;
 
-pub(crate) use html::{parts, to_html};
+pub(crate) use html::{cells, parts, to_html};
 
 /// Bytes of all viewers of a page together; a browser opens that much at once.
 const ROOM: usize = 24_000_000;
@@ -243,9 +244,9 @@ fn picture<'a>(
     };
     let z = |other: Shot<'a>| {
         let scores = |band| {
-            let z = maps::z_scores(&picture, &other.picture, band);
+            let z = maps::ZScores::of([&picture, &other.picture], band, [run.passes, other.run.passes]);
             let note = beyond(&z, run.passes.min(other.run.passes)) + &caution(&[run, other.run], band);
-            (z, note)
+            (z.values, note)
         };
         each(other, &scores, maps::Z_LIMIT)
     };
@@ -285,24 +286,41 @@ fn model_note(run: &EstimatorRun, other: &EstimatorRun) -> String {
     )
 }
 
-/// The number of z-scores beyond the scale, and the number expected by chance.
-fn beyond(z: &[f64], passes: u64) -> String {
+/// The number of z-scores beyond the scale, the number expected by chance, and what cannot be judged.
+fn beyond(scores: &maps::ZScores, passes: u64) -> String {
+    let z = &scores.values;
     let judged = z.iter().filter(|z| !z.is_nan()).count();
-    let found = z.iter().filter(|z| z.abs() > maps::Z_LIMIT).count();
-    let grey = z.len() - judged;
-    let mut text = format!("{found} of {judged} pixels are beyond ±{}", maps::Z_LIMIT);
+    let above = z.iter().filter(|z| **z > maps::Z_LIMIT).count();
+    let below = z.iter().filter(|z| **z < -maps::Z_LIMIT).count();
+    let limit = maps::Z_LIMIT;
+    let mut text = format!(
+        "{} of {judged} pixels are beyond ±{limit} ({above} above, {below} below)",
+        above + below
+    );
     // The smaller degrees of freedom of the two sides: their tail is at least as heavy as that of both.
     if passes > 1 && judged > 0 {
         let dof = passes as f64 - 1.0;
-        let chance = student_two_sided(maps::Z_LIMIT, dof) * judged as f64;
+        let chance = student_two_sided(limit, dof) * judged as f64;
         text += &format!(
             "; by chance it would be at most {} were the passes' noise normal (Student's t, {dof} degrees of freedom)",
             significant(chance, 2)
         );
     }
     text += ".";
-    if grey > 0 {
-        text += &format!(" Grey: {grey} pixels without a standard error on either side.");
+    if above + below > 0 {
+        text += " Passes are skewed where rare paths are bright, and then z is too large on one side without any \
+                 bias: the means of the image and of its tiles decide, not single pixels.";
+    }
+    if scores.skewed > 0 {
+        text += &format!(
+            " Grey: {} pixels are not judged, because their relative error shows that their passes are too skewed \
+             (|skewness| / sqrt(passes) above {SKEWNESS_LIMIT}, as for claims; scores that are never negative).",
+            scores.skewed
+        );
+    }
+    if scores.without_error > 0 {
+        text +=
+            &format!(" Grey: {} pixels without a standard error on either side.", scores.without_error);
     }
     text
 }

@@ -68,15 +68,37 @@ fn maps_of_a_cell() {
     assert_eq!((&mis["z"], &mis["difference"]), (&Value::Null, &Value::Null));
     assert_eq!((&mis["alone"], &snee["alone"]), (&"".into(), &"".into()));
     assert_eq!((&snee["z"]["of"], &snee["difference"]["of"]), (&"mis".into(), &"mis".into()));
-    // (1 - 2) / sqrt(0.3^2 + 0.4^2) = -2; the other pixels are equal.
-    assert_eq!(map(&snee["z"]["maps"][0]), [65, 128, 128, 128, 128, 128]);
+    // Relative errors of 0.15 and 0.4: too skewed to judge; the other pixels are equal.
+    assert_eq!(map(&snee["z"]["maps"][0]), [0, 128, 128, 128, 128, 128]);
     assert_eq!(data["limit"], 1.0, "one of eleven pixels differs by a half");
     assert_eq!(map(&snee["difference"]["maps"][0]), [65, 128, 128, 128, 128, 128]);
     let note = snee["z"]["notes"][0].as_str().expect("a note");
     assert!(
-        note.starts_with("0 of 6 pixels are beyond ±4; by chance it would be at most 5.0e-4"),
+        note.starts_with(
+            "0 of 5 pixels are beyond ±4 (0 above, 0 below); by chance it would be at most 4"
+        ),
         "{note}"
     );
+    assert!(note.contains("Grey: 1 pixels are not judged"), "{note}");
+    // (1.95 - 2) / sqrt(0.03^2 + 0.04^2) = -1.
+    set(&mut stored, 0, 2.0, 0.03);
+    set(&mut stored, 1, 1.95, 0.04);
+    let (_, data) = self::data(&stored);
+    let z = &data["pictures"][1]["z"];
+    assert_eq!(map(&z["maps"][0])[0], 96);
+    assert!(!z["notes"][0].to_string().contains("not judged"));
+}
+
+#[test]
+fn cells_have_a_viewer_and_a_thumbnail_each() {
+    let stored = sample::stored(0.5);
+    let mut viewers = viewers(&stored, &pictures(&stored)).expect("viewers");
+    viewers.push(ViewerBlock { cell: "<rough>".into(), ..viewers[0].clone() });
+    let html = cells(&viewers);
+    assert_eq!(html.matches("<section class=\"viewer-cell\"").count(), 2);
+    assert_eq!(html.matches("class=\"viewer-thumb\"").count(), 2);
+    assert!(html.contains("data-cell=\"&lt;rough&gt;\"") && !html.contains("<rough>"), "{html}");
+    assert_eq!(parts(&[PageBlock::Cells(viewers)]).1.matches("<script").count(), 2);
 }
 
 #[test]

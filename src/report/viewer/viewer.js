@@ -175,24 +175,46 @@ class Viewer extends Controls {
   }
 }
 
-async function start(root, palettes, number) {
-  try {
-    if (typeof DecompressionStream === "undefined") throw new Error("this browser cannot unpack it (DecompressionStream)");
-    await new Viewer(root, palettes, number).refresh();
-  } catch (error) {
-    const text = root.querySelector("noscript").textContent;
-    root.replaceChildren(make("p", {}, `The viewer does not work here: ${error.message}. The pictures beside the page:`));
-    root.insertAdjacentHTML("beforeend", text);
-  }
+// What was asked of another cell's viewer: the same layer, exposure, and part of the picture.
+function carry(from, to) {
+  const [old, own] = [from.state, to.state];
+  const kept = { mode: old.mode, exposure: old.exposure, seam: old.seam };
+  if (to.layers.includes(old.layer)) kept.layer = old.layer;
+  if (old.band < to.data.bands.length) kept.band = old.band;
+  if (to.pictures.length === from.pictures.length) Object.assign(kept, { pair: [...old.pair], isFlipped: old.isFlipped });
+  kept.x = (old.x / from.data.width) * to.data.width;
+  kept.y = (old.y / from.data.height) * to.data.height;
+  Object.assign(own, kept, { zoom: old.zoom, cursor: null });
+  to.settle();
+  return to.refresh();
 }
 
 const texts = JSON.parse(document.getElementById("viewer-palettes").textContent);
 const palettes = { noise: colours(texts.noise), signed: colours(texts.signed) };
 const roots = [...document.querySelectorAll(".viewer")];
-const observer = new IntersectionObserver((entries) => {
-  for (const entry of entries.filter((entry) => entry.isIntersecting)) {
-    observer.unobserve(entry.target);
-    start(entry.target, palettes, roots.indexOf(entry.target));
+const started = new Map(); // root -> promise of its viewer; none where it does not work
+
+async function build(root) {
+  try {
+    if (typeof DecompressionStream === "undefined") throw new Error("this browser cannot unpack it (DecompressionStream)");
+    const viewer = new Viewer(root, palettes, roots.indexOf(root));
+    await viewer.refresh();
+    return viewer;
+  } catch (error) {
+    const text = root.querySelector("noscript")?.textContent ?? "";
+    root.replaceChildren(make("p", {}, `The viewer does not work here: ${error.message}. The pictures beside the page:`));
+    root.insertAdjacentHTML("beforeend", text);
+    return null;
   }
+}
+
+function start(root) {
+  if (!started.has(root)) started.set(root, build(root));
+  observer.unobserve(root);
+  return started.get(root);
+}
+
+const observer = new IntersectionObserver((entries) => {
+  for (const entry of entries.filter((entry) => entry.isIntersecting)) start(entry.target);
 }, { rootMargin: "300px" });
 roots.forEach((root) => observer.observe(root));
