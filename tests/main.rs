@@ -8,6 +8,7 @@ mod cli;
 mod damage;
 mod docs;
 mod efficiency;
+mod faults;
 mod interruption;
 mod judging;
 mod layering;

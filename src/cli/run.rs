@@ -54,9 +54,9 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
         }
     }
     for experiment in &experiments {
-        let (folder, _) = crate::run::run(experiment, registry, &options, &interrupt)?;
-        let material = report::write(&folder)?;
-        tell(&material, &folder, out).map_err(unwritable)?;
+        let ran = crate::run::run(experiment, registry, &options, &interrupt)?;
+        let material = report::write(&ran.folder)?;
+        tell(&material, &ran.folder, out).map_err(unwritable)?;
     }
     Ok(0)
 }

@@ -15,6 +15,8 @@ pub mod exr_file;
 pub mod image;
 /// Canonical JSON and content hashes.
 pub mod json;
+/// One writer at a time in a results folder.
+pub(crate) mod lock;
 /// The summary of a result that is kept without its arrays.
 pub mod manifest;
 /// The table of everything that was measured.
