@@ -12,7 +12,7 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 21] = [
+const PAGES: [&str; 22] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
@@ -27,6 +27,7 @@ const PAGES: [&str; 21] = [
     "docs/limits.md",
     "docs/live-view.md",
     "docs/own-estimator.md",
+    "docs/reliability.md",
     "docs/subdivision.md",
     "docs/verification.md",
     "docs/walks.md",

@@ -18,5 +18,6 @@ mod planted;
 mod published;
 mod reproducibility;
 mod samplers;
+mod shards;
 mod tev;
 mod work;

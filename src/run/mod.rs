@@ -15,11 +15,13 @@ pub(crate) mod memory;
 pub(crate) mod memory_limits;
 pub(crate) mod pilot;
 pub(crate) mod progress;
+pub(crate) mod shard;
 pub(crate) mod tev;
 pub(crate) mod workers;
 
 mod assemble;
 mod jobs;
+mod merge;
 mod replay;
 mod retest;
 
@@ -42,6 +44,7 @@ use progress::Progress;
 use workers::Completed;
 
 pub(crate) use jobs::{Plan, plan};
+pub(crate) use merge::merge;
 pub(crate) use pilot::estimate_seconds;
 pub(crate) use retest::{Remeasured, retest};
 
