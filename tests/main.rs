@@ -9,6 +9,7 @@ mod damage;
 mod docs;
 mod efficiency;
 mod faults;
+mod hostile;
 mod interruption;
 mod judging;
 mod layering;

@@ -1,5 +1,6 @@
 //! Tables as aligned text for a terminal, as Markdown and as CSV; `latex` has them for papers.
 
+use super::markup::without_html;
 use crate::results::csv_text;
 
 /// A header and rows of text.
@@ -54,7 +55,7 @@ impl Table {
     /// A Markdown table, aligned so that it also reads as plain text.
     pub(crate) fn to_markdown(&self) -> String {
         let escaped = |row: &Vec<String>| {
-            row.iter().map(|f| f.replace('|', "\\|").replace('\n', " ")).collect()
+            row.iter().map(|f| without_html(f).replace('|', "\\|").replace('\n', " ")).collect()
         };
         let table =
             Table { header: escaped(&self.header), rows: self.rows.iter().map(escaped).collect() };

@@ -369,6 +369,9 @@ impl RecordFolder {
 
     /// Removes every view beside the record, so that none of an earlier record outlives it.
     pub fn clear_views(&self) -> Result<()> {
+        if self.root.is_dir() {
+            atomic::sweep(&self.root)?;
+        }
         for folder in VIEW_FOLDERS {
             remove_folder(&self.root.join(folder), "remove the views of an earlier record")?;
         }
@@ -383,6 +386,7 @@ impl RecordFolder {
     fn clear_pictures(&self) -> Result<()> {
         let folder = self.root.join("images");
         let Ok(entries) = fs::read_dir(&folder) else { return Ok(()) };
+        atomic::sweep(&folder)?;
         for entry in entries.flatten() {
             let name = entry.file_name();
             let name = name.to_string_lossy();
