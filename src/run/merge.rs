@@ -186,7 +186,7 @@ struct Merger<'a> {
 }
 
 /// What makes up the passes of a job.
-struct Joint<'a> {
+struct PassSources<'a> {
     start: Start,
     base: Block,
     chain: Vec<&'a (usize, ShardPiece)>,
@@ -205,7 +205,7 @@ impl Merger<'_> {
     }
 
     /// The passes of a job, what is kept of them, and the pieces that make up the rest.
-    fn joint(&self, job: &Job, passes: &Passes) -> Result<Joint<'_>> {
+    fn sources(&self, job: &Job, passes: &Passes) -> Result<PassSources<'_>> {
         let own = checkpoint::path(self.root, &job.identity);
         let budget = budget_hash(self.experiment, &passes.terms);
         let pieces = self.pieces(job);
@@ -230,9 +230,9 @@ impl Merger<'_> {
         // What is kept already, and then what is new; or shards from the first pass on.
         let next = kept.next_pass();
         match chain(pieces, next, count) {
-            Ok(chain) => Ok(Joint { start, base: kept, chain }),
+            Ok(chain) => Ok(PassSources { start, base: kept, chain }),
             Err(gap) => match chain(pieces, 0, count) {
-                Ok(chain) => Ok(Joint { start, base: empty(), chain }),
+                Ok(chain) => Ok(PassSources { start, base: empty(), chain }),
                 Err(first) => Err(self.refusal(job, if next > 0 { gap } else { first })),
             },
         }
@@ -244,11 +244,11 @@ impl Merger<'_> {
 
     /// Whether all that is needed of a job is there, by what the shards say.
     fn check(&self, job: &Job) -> Result<()> {
-        job.passes().map_or(Ok(()), |passes| self.joint(job, passes).map(drop))
+        job.passes().map_or(Ok(()), |passes| self.sources(job, passes).map(drop))
     }
 
     fn passes(&self, job: &Job, passes: &Passes) -> Result<Completed> {
-        let Joint { start, base: mut block, chain } = self.joint(job, passes)?;
+        let PassSources { start, base: mut block, chain } = self.sources(job, passes)?;
         let (keep_level, bands) = (batch_level(start.passes), passes.layout.bands());
         for (shard, piece) in &chain {
             let path = self.state(*shard, job);
