@@ -43,6 +43,9 @@ impl Place {
     }
 }
 
+/// Findings that are shown: a mistake in a generated file comes in thousands.
+const MOST_SHOWN: usize = 100;
+
 /// Everything that can go wrong, by what the caller should do; `exit_code` states it to a shell.
 #[derive(Debug)]
 pub enum Error {
@@ -104,11 +107,14 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Error::Input(findings) => {
-                for (i, finding) in findings.iter().enumerate() {
+                for (i, finding) in findings.iter().take(MOST_SHOWN).enumerate() {
                     if i > 0 {
                         writeln!(f)?;
                     }
                     write!(f, "{}", render(finding))?;
+                }
+                if findings.len() > MOST_SHOWN {
+                    write!(f, "\n\n.. and {} more", findings.len() - MOST_SHOWN)?;
                 }
                 if findings.len() > 1 {
                     write!(f, "\n\n{} errors", findings.len())?;

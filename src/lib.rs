@@ -71,6 +71,9 @@
 /// User-facing errors: what is wrong, where, and what to do.
 pub mod error;
 
+/// Files that are read as input.
+pub(crate) mod input;
+
 /// Vectors, frames, and every transcendental function that results use.
 pub mod math;
 

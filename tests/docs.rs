@@ -13,7 +13,7 @@ use toml::Table;
 use super::work::Work;
 
 /// Every page, from the package's folder.
-const PAGES: [&str; 24] = [
+const PAGES: &[&str] = &[
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
@@ -31,6 +31,7 @@ const PAGES: [&str; 24] = [
     "docs/own-estimator.md",
     "docs/python.md",
     "docs/record-layout.md",
+    "docs/reliability.md",
     "docs/subdivision.md",
     "docs/verification.md",
     "docs/walks.md",

@@ -108,10 +108,7 @@ pub(super) fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
         independent_pixels: args.independent_pixels,
     };
     let answer = judge(&question, &planes)?;
-    let cost = match seconds {
-        Some(theirs) => cost(&folder, &stored, cell, run, &planes, theirs)?,
-        None => None,
-    };
+    let cost = seconds.and_then(|theirs| cost(&stored, cell, run, &planes, theirs));
     if let Some(path) = &args.out {
         let figures = write_views(path, &answer, &planes)?;
         let title = format!("{} images against {}", planes.seeds.len(), run.estimator);
@@ -213,17 +210,16 @@ fn seconds(words: &[String], images: &[PathBuf]) -> Result<Option<f64>> {
 }
 
 fn cost(
-    folder: &RecordFolder,
     stored: &Stored,
     cell: usize,
     run: &EstimatorRun,
     planes: &Planes,
     theirs: f64,
-) -> Result<Option<Vec<Ratio>>> {
-    let timing = folder.read_timing()?;
-    let cost = timing.as_ref().and_then(|t| t.of(&stored.record.cells[cell].label, &run.estimator));
+) -> Option<Vec<Ratio>> {
+    let cost =
+        stored.timing.as_ref().and_then(|t| t.of(&stored.record.cells[cell].label, &run.estimator));
     let per_pass = cost.and_then(|cost| cost.cpu_seconds_per_pass());
-    Ok(per_pass.map(|ours| ratios(stored, cell, run, planes, [theirs, ours * run.passes as f64])))
+    per_pass.map(|ours| ratios(stored, cell, run, planes, [theirs, ours * run.passes as f64]))
 }
 
 /// Writes the pictures and the table.

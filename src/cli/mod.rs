@@ -6,6 +6,7 @@ mod completions;
 mod init;
 mod judge;
 mod list;
+mod merge;
 mod output;
 mod plan;
 mod report;
@@ -46,6 +47,7 @@ struct Command {
 #[derive(Subcommand)]
 enum Action {
     Run(run::Args),
+    Merge(merge::Args),
     Verify(verify::Args),
     Report(report::Args),
     Compare(compare::Args),
@@ -131,6 +133,7 @@ pub fn exit_code_of(registry: &Registry, arguments: impl IntoIterator<Item = OsS
     let out = &mut StandardOutput::new();
     let outcome = match &command.action {
         Action::Run(args) => run::run(args, registry, out),
+        Action::Merge(args) => merge::run(args, registry, out),
         Action::Verify(args) => verify::run(args, registry, out),
         Action::Report(args) => report::run(args, out),
         Action::Compare(args) => compare::run(args, out),

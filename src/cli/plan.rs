@@ -12,7 +12,8 @@ use crate::experiment::{Experiment, load};
 use crate::report::table::Table;
 use crate::run::chi_square::Draws;
 use crate::run::job::{Job, Passes};
-use crate::run::memory::{MemoryEstimate, available, readable};
+use crate::run::memory::MemoryEstimate;
+use crate::run::memory_limits::{available, readable};
 use crate::run::{self, Plan, estimate_seconds};
 
 /// Show what would run: cells, estimated time and memory, and where each value comes from.
@@ -64,7 +65,7 @@ fn tell(
     if !args.dry {
         writeln!(out, "about {:.0} s on {threads} threads", total / threads as f64)?;
     }
-    let free = available().map_or("unknown".into(), readable);
+    let free = available().map_or("unknown".into(), |available| available.words());
     writeln!(
         out,
         "memory: {} (shapes {}, making them {}, guides {}, results {}, working {}); available: {free}",
@@ -81,9 +82,22 @@ fn tell_origins(origins: &[(String, String, String)], out: &mut impl Write) -> i
     writeln!(out, "values and where they come from")?;
     let mut values = Table::new(&["key", "value", "from"]);
     for (key, value, origin) in origins {
-        values.push(vec![key.clone(), value.clone(), origin.clone()]);
+        values.push([key, value, origin].map(|text| shortened(text)).into());
     }
     writeln!(out, "{}", values.to_text())
+}
+
+/// Longest text in a table of the terminal, characters.
+const LONGEST: usize = 160;
+
+/// A text that fits into a table, with its length where it does not.
+fn shortened(text: &str) -> String {
+    let length = text.chars().count();
+    if length <= LONGEST {
+        return text.to_string();
+    }
+    let begin: String = text.chars().take(LONGEST / 2).collect();
+    format!("{begin}.. ({length} characters)")
 }
 
 /// The plan of estimators; returns its CPU seconds, 0 where `dry`.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::output::{say, unwritable};
-use super::{Reading, Working, listen};
+use super::{Reading, Working, counted, listen};
 use crate::error::Result;
 use crate::experiment::load;
 use crate::experiment::registry::Registry;
@@ -13,6 +13,7 @@ use crate::report::ReportData;
 use crate::report::{self, terminal};
 use crate::results::store::RecordFolder;
 use crate::run::live::Live;
+use crate::run::shard::{Shard, Sharded, run_shard};
 use crate::run::tev::Address;
 
 /// Run experiments; print progress, then a table and the path of the report.
@@ -31,6 +32,10 @@ pub(super) struct Args {
     /// record whose budget is in seconds reproduces bit for bit.
     #[arg(long, value_name = "DIR")]
     passes_of: Option<PathBuf>,
+    /// Run part I of N only, as 3/10, into DIR/NAME/shards; `merge` joins the parts into the record. Any N, in any
+    /// order, on any machine.
+    #[arg(long, value_name = "I/N", conflicts_with = "tev")]
+    shard: Option<Shard>,
     /// Show images in a running tev viewer while they are rendered; default address 127.0.0.1:14158.
     /// Results do not depend on it.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = Address::USUAL)]
@@ -54,14 +59,30 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
         }
     }
     for experiment in &experiments {
-        let (folder, _) = crate::run::run(experiment, registry, &options, &interrupt)?;
-        let material = report::write(&folder)?;
-        tell(&material, &folder, out).map_err(unwritable)?;
+        if let Some(shard) = args.shard {
+            let sharded = run_shard(experiment, registry, &options, shard, &interrupt)?;
+            tell_shard(shard, &sharded, out).map_err(unwritable)?;
+            continue;
+        }
+        let ran = crate::run::run(experiment, registry, &options, &interrupt)?;
+        let material = report::write(&ran.folder)?;
+        tell(&material, &ran.folder, out).map_err(unwritable)?;
     }
     Ok(0)
 }
 
-fn tell(material: &ReportData, folder: &RecordFolder, out: &mut impl Write) -> io::Result<()> {
+fn tell_shard(shard: Shard, sharded: &Sharded, out: &mut impl Write) -> io::Result<()> {
+    let Sharded { folder, measurements, passes } = sharded;
+    let what = counted(*measurements, "measurement");
+    writeln!(out, "shard {shard}: {passes} passes of {what}: {}", folder.display())
+}
+
+/// Prints the tables of a run.
+pub(super) fn tell(
+    material: &ReportData,
+    folder: &RecordFolder,
+    out: &mut impl Write,
+) -> io::Result<()> {
     write!(out, "{}", terminal::run_table(material).to_text())?;
     write!(out, "{}", terminal::sampler_table(material).to_text())?;
     if let Some(block) = terminal::efficiency_table(material) {

@@ -198,7 +198,7 @@ fn options(out: &Path, threads: usize) -> Options {
 fn ran(experiment: &Experiment) -> Stored {
     let folder = tempfile::tempdir().expect("a folder");
     let run = run(experiment, &registry(), &options(folder.path(), 1), &Interrupt::default());
-    run.unwrap_or_else(|error| panic!("{error}")).1
+    run.unwrap_or_else(|error| panic!("{error}")).stored
 }
 
 /// The verdicts on one sampler.
@@ -408,7 +408,7 @@ fn a_second_look_has_streams_of_its_own_and_more_draws() {
     let entries = [("hg", "phase", json!({ "g": 0.7 })), ("mix", "mixture", json!({}))];
     let made = experiment("twice", 20_000, &entries);
     let (options, interrupt) = (options(folder.path(), 2), Interrupt::default());
-    let (_, main) = run(&made, &registry(), &options, &interrupt).expect("a record");
+    let main = run(&made, &registry(), &options, &interrupt).expect("a record").stored;
     let again = retest(&made, &registry(), &options, &interrupt, &second_look(&main, "mix"));
     let again = again.expect("a record");
     let [run] = &again.record.samplers[..] else { panic!("one sampler") };
@@ -426,7 +426,7 @@ fn the_second_look_decides_what_the_first_cannot() {
         let made = experiment("looks", 20_000, &[("hg", "phase", json!({ "g": 0.7, "error": error }))]);
         let folder = tempfile::tempdir().expect("a folder");
         let (options, interrupt) = (options(folder.path(), 2), Interrupt::default());
-        let (_, main) = run(&made, &registry(), &options, &interrupt).expect("a record");
+        let main = run(&made, &registry(), &options, &interrupt).expect("a record").stored;
         let again = retest(&made, &registry(), &options, &interrupt, &second_look(&main, "hg"));
         (main, again.expect("a record"))
     };
@@ -458,7 +458,7 @@ fn a_claim_that_comes_after_the_draws_is_no_evidence() {
     let mut made = experiment("late", 5_000, &[("hg", "phase", json!({ "g": 0.7 }))]);
     let go = |made: &Experiment| {
         let run = run(made, &registry(), &options(folder.path(), 1), &Interrupt::default());
-        judge_alone(&run.expect("a record").1)
+        judge_alone(&run.expect("a record").stored)
     };
     assert_eq!(red(&go(&made)), Vec::<String>::new());
     made.file.claim[0].sampler = Some(SamplerClaim { detect: Some(0.5), ..SamplerClaim::default() });

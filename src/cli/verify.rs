@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::output::{say, unwritable};
 use super::{Reading, Working, listen};
@@ -11,6 +12,7 @@ use crate::experiment::schema::Budget;
 use crate::experiment::{Experiment, LoadOptions, load};
 use crate::report::undecided::{Undecided, two_digits_up, undecided};
 use crate::report::{self, tables::verdict_table};
+use crate::results::lock::{self, FolderLock};
 use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::{atomic, provenance};
@@ -75,6 +77,8 @@ struct Judged {
     retest: Option<Stored>,
     /// Absent where a results folder was named.
     experiment: Option<Experiment>,
+    /// Held until the report is written; absent where none is.
+    _lock: Option<Arc<FolderLock>>,
 }
 
 /// What a path names.
@@ -91,6 +95,8 @@ struct Court<'a> {
     reading: LoadOptions,
     working: Options,
     interrupt: Interrupt,
+    /// Whether reports are written into the results folders.
+    reports: bool,
 }
 
 /// Judges everything named as one family.
@@ -103,6 +109,7 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
         reading: args.reading.options(),
         working: args.working.options(),
         interrupt: listen()?,
+        reports: !args.no_report,
     };
     let token = args.fresh_seed.as_ref().map(|token| court.refresh(token));
     let mut subjects = court.subjects(&args.paths)?;
@@ -127,7 +134,7 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
     for (index, subject) in subjects.into_iter().enumerate() {
         let of = judgement.verdicts.iter().zip(&judgement.case_of);
         let own = of.filter(|(_, case)| **case == index).map(|(v, _)| v.clone()).collect();
-        if subject.experiment.is_some() && !args.no_report {
+        if subject.experiment.is_some() && court.reports {
             report::write_judged(&subject.folder, subject.main, own)?;
         }
     }
@@ -180,7 +187,7 @@ impl Court<'_> {
         let (mut named, mut wrong) = (Vec::new(), Vec::new());
         for path in paths {
             if path.join("record").join("record.json").exists() {
-                named.push(Named::Record(Box::new(Self::judged(RecordFolder::new(path), None)?)));
+                named.push(Named::Record(Box::new(Self::judged(RecordFolder::new(path), None, None)?)));
                 continue;
             }
             for file in experiment_files(path)? {
@@ -202,19 +209,25 @@ impl Court<'_> {
     }
 
     /// What is judged of a folder.
-    fn judged(folder: RecordFolder, experiment: Option<Experiment>) -> Result<Judged> {
+    fn judged(
+        folder: RecordFolder,
+        experiment: Option<Experiment>,
+        lock: Option<Arc<FolderLock>>,
+    ) -> Result<Judged> {
         let main = folder.read()?;
         let retest = folder.retest_of(&main)?;
-        Ok(Judged { folder, main, retest, experiment })
+        Ok(Judged { folder, main, retest, experiment, _lock: lock })
     }
 
     fn measured(&self, experiment: Experiment) -> Result<Judged> {
         let folder = RecordFolder::new(self.working.folder(&experiment.file.name));
-        if !crate::run::has_record(&experiment, &self.working.out) {
+        let lock = if crate::run::has_record(&experiment, &self.working.out) {
+            self.reports.then(|| lock::lock(folder.root())).transpose()?
+        } else {
             say(format_args!("running {}", experiment.file.name));
-            crate::run::run(&experiment, self.registry, &self.working, &self.interrupt)?;
-        }
-        Self::judged(folder, Some(experiment))
+            Some(crate::run::run(&experiment, self.registry, &self.working, &self.interrupt)?.lock)
+        };
+        Self::judged(folder, Some(experiment), lock)
     }
 
     /// An experiment, with everything found that `check` finds where it has yet to run.

@@ -10,6 +10,7 @@ use super::schema::{self, BoundaryEntry, LightEntry, NormalsEntry, ShapeEntry, S
 use super::{CellSpec, Experiment, resolve, resolve_path};
 use crate::error::{Error, Result};
 use crate::geometry::{Shape, Side, load_obj, procedural};
+use crate::input;
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 use crate::optics::medium::Medium;
@@ -199,7 +200,7 @@ pub(crate) fn inputs(experiment: &Experiment) -> BTreeMap<String, String> {
     let paths: BTreeSet<String> =
         experiment.cells.iter().flat_map(|cell| maps(cell).into_iter().chain(mesh(cell))).collect();
     let hash = |path: String| {
-        let bytes = std::fs::read(resolve_path(&experiment.path, &path)).ok()?;
+        let bytes = input::read(&resolve_path(&experiment.path, &path), input::LARGEST_DATA).ok()?;
         Some((path, hash_hex(&bytes)))
     };
     paths.into_iter().filter_map(hash).collect()

@@ -1,7 +1,6 @@
 //! A TOML text as a tree in which every value knows its place. Door for `toml`.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -35,16 +34,16 @@ pub struct Origin {
     pub place: Place,
 }
 
-impl fmt::Display for Origin {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let (line, column) = self.place.line_column();
+impl Origin {
+    /// For people, at a line and column of its text that are known.
+    pub(super) fn words(&self, [line, column]: [usize; 2]) -> String {
         let name = &self.place.name;
         match &self.source {
-            InputKind::File => write!(f, "{name}:{line}:{column}"),
-            InputKind::Set => write!(f, "--set {}", self.place.text),
-            InputKind::Setting(setting) => write!(f, "setting `{setting}` ({name}:{line}:{column})"),
-            InputKind::Sweep(axis) => write!(f, "sweep `{axis}` ({name}:{line}:{column})"),
-            InputKind::Csv => write!(f, "{name}:{line}"),
+            InputKind::File => format!("{name}:{line}:{column}"),
+            InputKind::Set => format!("--set {}", self.place.text),
+            InputKind::Setting(setting) => format!("setting `{setting}` ({name}:{line}:{column})"),
+            InputKind::Sweep(axis) => format!("sweep `{axis}` ({name}:{line}:{column})"),
+            InputKind::Csv => format!("{name}:{line}"),
         }
     }
 }
@@ -284,7 +283,7 @@ mod tests {
         assert!(at(&["a", "b"]).inline && !at(&["a"]).inline && !at(&["d"]).inline);
         assert_eq!(at(&["a"]).place().line_column(), (1, 1));
         assert_eq!(at(&["d"]).place().line_column(), (2, 2));
-        assert_eq!(at(&["d", "e"]).origin.to_string(), "x.toml:3:5");
+        assert_eq!(at(&["d", "e"]).origin.place.line_column(), (3, 5));
         assert_eq!(root.to_json(), json!({"a": {"b": {"c": [1, 2.5]}}, "d": {"e": true}}));
     }
 

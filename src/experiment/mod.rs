@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::error::{Error, Result};
+use crate::input;
 
 /// From entries to scenes.
 pub(crate) mod build;
@@ -143,7 +144,7 @@ pub struct LoadOptions {
 /// # Errors
 /// The file cannot be read, or everything that is wrong with it, at once.
 pub fn load(path: &Path, options: &LoadOptions, registry: &Registry) -> Result<Experiment> {
-    let text = std::fs::read_to_string(path).map_err(|error| {
+    let text = input::read_text(path, input::LONGEST_TEXT).map_err(|error| {
         Error::input_help(
             format!("could not read the experiment file {}: {error}", path.display()),
             "name a TOML file; `scatterproof init` writes an example",

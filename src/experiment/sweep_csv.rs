@@ -12,12 +12,13 @@ use super::rules::Findings;
 use super::suggest;
 use super::sweep_point::{AxisPoint, RowField};
 use crate::error::Place;
+use crate::input;
 
 /// Reads the rows that the `csv` entry of a sweep names; `path` is that of the CSV file. None where
 /// something is wrong with it; the findings state what.
 pub(super) fn points(entry: &Node, path: &Path, findings: &Findings) -> Option<Vec<AxisPoint>> {
     let path_node = entry.get("path")?;
-    let text = match std::fs::read_to_string(path) {
+    let text = match input::read_text(path, input::LONGEST_TEXT) {
         Ok(text) => text,
         Err(error) => {
             findings.at(path_node.place(), format!("could not read {}: {error}", path.display()), None);

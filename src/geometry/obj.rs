@@ -1,12 +1,15 @@
 //! Wavefront OBJ files. Door for `tobj`.
 
 use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 
 use tobj::LoadOptions;
 
 use super::{Mesh, Normals, extent};
 use crate::error::{Error, Result};
+use crate::input;
 use crate::math::DVec3;
 
 /// Reads a closed mesh from all objects of an OBJ file; faces with more corners become fans.
@@ -17,7 +20,7 @@ use crate::math::DVec3;
 /// # Errors
 /// Unreadable or malformed files, and everything that [`Mesh::new`] refuses, naming the file.
 pub fn load_obj(path: &Path, longest_side_mm: Option<f64>, interpolated: bool) -> Result<Mesh> {
-    let text = std::fs::File::open(path).map_err(|error| {
+    let mut text = open_text(path).map_err(|error| {
         let rule = format!("could not read the mesh `{}`: {error}", path.display());
         Error::input_help(rule, "its path is relative to the experiment file")
     })?;
@@ -27,8 +30,8 @@ pub fn load_obj(path: &Path, longest_side_mm: Option<f64>, interpolated: bool) -
         LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
     // Materials are of no interest, so a missing library is none either.
     let no_materials = |_: &Path| Ok(Default::default());
-    let (models, _) = tobj::load_obj_buf(&mut std::io::BufReader::new(text), &options, no_materials)
-        .map_err(|error| malformed(path, error))?;
+    let (models, _) =
+        tobj::load_obj_buf(&mut text, &options, no_materials).map_err(|error| malformed(path, error))?;
 
     let mut welder = Welder::default();
     let mut normals = Normals { vectors: Vec::new(), corners: Vec::new() };
@@ -51,6 +54,17 @@ pub fn load_obj(path: &Path, longest_side_mm: Option<f64>, interpolated: bool) -
     }
     Mesh::new(vertices, triangles, complete.then_some(normals), interpolated)
         .map_err(|error| name_file(path, error))
+}
+
+/// A file's text, without the byte order mark that some editors put before it: to `tobj` that is a letter of the first
+/// word.
+fn open_text(path: &Path) -> io::Result<BufReader<File>> {
+    const MARK: &[u8] = b"\xef\xbb\xbf";
+    let mut text = BufReader::new(input::open(path, input::LARGEST_DATA)?.0);
+    if text.fill_buf()?.starts_with(MARK) {
+        text.consume(MARK.len());
+    }
+    Ok(text)
 }
 
 /// Scales the longest side to `side` mm and centres the box at the origin.
@@ -192,6 +206,7 @@ mod tests {
     #[test]
     fn malformed_files_are_refused() {
         refused("v 0 0 zero\n", &["position parse error"]);
+        load(&format!("\u{feff}{TETRAHEDRON}")).expect("a byte order mark is no vertex");
         refused("v 0 0 0\nf 1 a 2\n", &["face parse error"]);
         refused("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", &["out of bounds", "lacks"]);
         refused("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", &["out of bounds"]);

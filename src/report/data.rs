@@ -10,6 +10,10 @@ use crate::verify::comparisons::EfficiencyRow;
 use crate::verify::model_errors::ModelError;
 use crate::verify::verdict::Verdict;
 
+/// What a crash between record and timing leaves.
+pub(super) const FOREIGN_TIMING: &str =
+    "The file timing.json is of another record and was left out; run the experiment again to time it";
+
 /// Everything that a report is made from.
 pub(crate) struct ReportData {
     /// The record, with its timing where it was measured.

@@ -1,5 +1,6 @@
 //! A page as blocks: one content, written as Markdown here and as HTML in `html`.
 
+use super::markup::without_html;
 use super::table::Table;
 
 /// One page of a report.
@@ -146,12 +147,16 @@ pub(crate) fn slug(text: &str) -> String {
 
 fn markdown(block: &PageBlock) -> String {
     match block {
-        PageBlock::Heading(level, text) => format!("{} {text}\n", "#".repeat(usize::from(*level))),
-        PageBlock::Text(text) => format!("{text}\n"),
-        PageBlock::List(items) => items.iter().map(|item| format!("- {item}\n")).collect(),
+        PageBlock::Heading(level, text) => {
+            format!("{} {}\n", "#".repeat(usize::from(*level)), without_html(text))
+        }
+        PageBlock::Text(text) => format!("{}\n", without_html(text)),
+        PageBlock::List(items) => {
+            items.iter().map(|item| format!("- {}\n", without_html(item))).collect()
+        }
         PageBlock::Code(code) => format!("```\n{code}\n```\n"),
         PageBlock::Table(t) if t.caption.is_empty() => t.table.to_markdown(),
-        PageBlock::Table(t) => format!("{}\n\n{}", t.caption, t.table.to_markdown()),
+        PageBlock::Table(t) => format!("{}\n\n{}", without_html(&t.caption), t.table.to_markdown()),
         PageBlock::Figures(figures) => each(figures),
         PageBlock::Wide(f) | PageBlock::Lead(f) => figure(f),
         PageBlock::Badges(badges) => {
@@ -166,7 +171,7 @@ fn markdown(block: &PageBlock) -> String {
         }
         PageBlock::Folded(title, blocks) => {
             let blocks: Vec<String> = blocks.iter().map(markdown).collect();
-            format!("**{title}**\n\n{}", blocks.join("\n"))
+            format!("**{}**\n\n{}", without_html(title), blocks.join("\n"))
         }
     }
 }
@@ -176,5 +181,6 @@ fn each(figures: &[FigureBlock]) -> String {
 }
 
 fn figure(f: &FigureBlock) -> String {
-    format!("![{}]({})\n{}: {}\n", f.title, f.path.replace(' ', "%20"), f.title, f.caption)
+    let [title, caption] = [&f.title, &f.caption].map(|text| without_html(text));
+    format!("![{title}]({})\n{title}: {caption}\n", f.path.replace(' ', "%20"))
 }

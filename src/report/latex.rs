@@ -30,7 +30,7 @@ fn block(of: &PageBlock) -> String {
             let items: String = items.iter().map(item).collect();
             format!("\\begin{{itemize}}\n{items}\\end{{itemize}}\n")
         }
-        PageBlock::Code(code) => format!("\\begin{{verbatim}}\n{code}\n\\end{{verbatim}}\n"),
+        PageBlock::Code(code) => format!("\\begin{{verbatim}}\n{}\n\\end{{verbatim}}\n", verbatim(code)),
         PageBlock::Table(t) => format!("{{\\scriptsize\n{}}}\n", long(&t.table, &t.name, &t.caption)),
         PageBlock::Figures(figures) => figures.iter().map(figure).collect(),
         PageBlock::Wide(f) | PageBlock::Lead(f) => figure(f),
@@ -149,15 +149,106 @@ pub(crate) fn escaped(text: &str) -> String {
             '~' => latex += "\\textasciitilde{}",
             '^' => latex += "\\textasciicircum{}",
             '<' | '>' | '|' => latex.extend(['$', first, '$']),
-            '±' => latex += "$\\pm$",
-            '×' => latex += "$\\times$",
             '`' | '\n' => latex.push(if first == '`' { '\'' } else { ' ' }),
-            other => latex.push(other),
+            other => letter(&mut latex, other),
         }
         before = first;
         rest = &rest[first.len_utf8()..];
     }
     latex
+}
+
+/// Letters and signs beyond ASCII that pdflatex sets with a command: Greek, and mathematics.
+const COMMANDS: [(char, &str); 57] = [
+    ('α', "alpha"),
+    ('β', "beta"),
+    ('γ', "gamma"),
+    ('δ', "delta"),
+    ('ε', "varepsilon"),
+    ('ϵ', "epsilon"),
+    ('ζ', "zeta"),
+    ('η', "eta"),
+    ('θ', "theta"),
+    ('ϑ', "vartheta"),
+    ('ι', "iota"),
+    ('κ', "kappa"),
+    ('λ', "lambda"),
+    ('μ', "mu"),
+    ('µ', "mu"),
+    ('ν', "nu"),
+    ('ξ', "xi"),
+    ('π', "pi"),
+    ('ρ', "rho"),
+    ('ϱ', "varrho"),
+    ('σ', "sigma"),
+    ('ς', "varsigma"),
+    ('τ', "tau"),
+    ('υ', "upsilon"),
+    ('φ', "varphi"),
+    ('ϕ', "phi"),
+    ('χ', "chi"),
+    ('ψ', "psi"),
+    ('ω', "omega"),
+    ('Γ', "Gamma"),
+    ('Δ', "Delta"),
+    ('Θ', "Theta"),
+    ('Λ', "Lambda"),
+    ('Ξ', "Xi"),
+    ('Π', "Pi"),
+    ('Σ', "Sigma"),
+    ('Υ', "Upsilon"),
+    ('Φ', "Phi"),
+    ('Ψ', "Psi"),
+    ('Ω', "Omega"),
+    ('±', "pm"),
+    ('×', "times"),
+    ('·', "cdot"),
+    ('−', "-"),
+    ('≤', "leq"),
+    ('≥', "geq"),
+    ('≠', "neq"),
+    ('≈', "approx"),
+    ('∼', "sim"),
+    ('∞', "infty"),
+    ('→', "rightarrow"),
+    ('←', "leftarrow"),
+    ('√', "surd"),
+    ('∑', "sum"),
+    ('∫', "int"),
+    ('∂', "partial"),
+    ('∝', "propto"),
+];
+
+/// One letter. What pdflatex has no glyph for is named by its number: an unknown letter would be an error.
+fn letter(latex: &mut String, letter: char) {
+    if let Some((_, command)) = COMMANDS.iter().find(|(sign, _)| *sign == letter) {
+        let backslash = if command.starts_with('-') { "" } else { "\\" };
+        *latex += &format!("${backslash}{command}$");
+    } else if is_in_font(letter) {
+        latex.push(letter);
+    } else {
+        *latex += &number_of(letter);
+    }
+}
+
+/// ASCII, the letters of western and central Europe, dashes and quotes: what the encoding T1 has.
+fn is_in_font(letter: char) -> bool {
+    let is_european = ('\u{a0}'..='\u{17e}').contains(&letter) && !"ĦħĸĿŀŉŦŧ".contains(letter);
+    (' '..='~').contains(&letter) || is_european || "–—‘’“”„…".contains(letter)
+}
+
+fn number_of(letter: char) -> String {
+    format!("U+{:04X}", u32::from(letter))
+}
+
+/// Text that is printed as it is, where no command works.
+fn verbatim(text: &str) -> String {
+    let shown = |letter: char| match letter.is_ascii() && (!letter.is_ascii_control() || letter == '\n')
+    {
+        true => letter.to_string(),
+        false => number_of(letter),
+    };
+    text.replace("\\end{verbatim}", "\\end {verbatim}").chars().map(shown).collect()
 }
 
 /// The length of a number such as `-1.5(2)e-7` at the start of a text, if it has to be set as
@@ -214,6 +305,8 @@ mod tests {
             ("a & b < c\\d", "a \\& b $<$ c\\textbackslash{}d"),
             ("400-420nm", "400-420nm"),
             ("0.25 ± 0", "0.25 $\\pm$ 0"),
+            ("λ = 1 µm, é", "$\\lambda$ = 1 $\\mu$m, é"),
+            ("5 − 3, 中\u{7}", "5 $-$ 3, U+4E2DU+0007"),
             ("e3 3e 2x", "e3 3e 2x"),
         ] {
             assert_eq!(escaped(text), latex, "{text}");
@@ -236,5 +329,32 @@ mod tests {
                 && !long.contains("{table}")
         );
         assert_eq!(to_latex(&Table::default(), "x", ""), "");
+    }
+
+    /// With pdflatex, where it is installed: every letter from space to the end of Greek, signs and other scripts.
+    #[test]
+    fn every_letter_compiles() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let letters: String =
+            (' '..='\u{3ff}').chain('\u{2000}'..='\u{2300}').chain("中ж😀\u{202e}".chars()).collect();
+        let mut table = Table::new(&["letter", "&%$#_{}~^\\<>|`λ"]);
+        let letters: Vec<String> = letters.chars().map(String::from).collect();
+        letters.chunks(16).for_each(|some| table.push(vec![some.concat(), some.join(" ")]));
+        let blocks = vec![PageBlock::Text(letters.join(" ")), PageBlock::Code(letters.concat())];
+        let page = Document { title: "η_λ & \\input{x}".into(), blocks };
+        let body =
+            to_document(&page).replace("\\end{document}", &(long(&table, "x", "Δ") + "\\end{document}"));
+        std::fs::write(folder.path().join("report.tex"), body).expect("a file");
+        let mut command = std::process::Command::new("pdflatex");
+        command
+            .args(["-interaction=nonstopmode", "-halt-on-error", "report.tex"])
+            .current_dir(folder.path());
+        let Ok(output) = command.output() else {
+            println!("left out: no pdflatex");
+            return;
+        };
+        let log = String::from_utf8_lossy(&output.stdout).into_owned();
+        let errors: Vec<&str> = log.lines().filter(|line| line.starts_with('!')).collect();
+        assert!(output.status.success(), "{errors:?}");
     }
 }

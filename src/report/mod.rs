@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 pub(crate) use self::data::ReportData;
 use crate::error::Result;
 use crate::results::json::canonical;
+use crate::results::lock;
 use crate::results::measurements::{self, measurements};
 use crate::results::store::{RecordFolder, Stored};
 use crate::verify::comparisons;
@@ -72,7 +73,7 @@ pub(crate) fn write_judged(
     stored: Stored,
     verdicts: Vec<Verdict>,
 ) -> Result<ReportData> {
-    let stored = Stored { timing: folder.read_timing()?, ..stored };
+    let _lock = lock::lock(folder.root())?;
     let provenance = folder.read_provenance()?;
     let rows = measurements(&stored, stored.timing.as_ref());
     folder.clear_views()?;

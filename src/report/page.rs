@@ -2,7 +2,7 @@
 //! measurements, cost, and how to reproduce it.
 
 use super::answer;
-use super::data::ReportData;
+use super::data::{FOREIGN_TIMING, ReportData};
 use super::document::{Document, PageBlock, TableBlock};
 use super::number::significant;
 use super::plots::Section;
@@ -306,7 +306,12 @@ fn cost(data: &ReportData) -> Vec<PageBlock> {
     }
     let text = "Seconds are of this machine and this run, without an interval; counts of work are exactly \
                 reproducible. Paths are per CPU second.";
-    vec![heading("Cost"), PageBlock::Text(text.into()), named("cost", table.without_empty_columns())]
+    let mut blocks = vec![heading("Cost"), PageBlock::Text(text.into())];
+    if data.stored.has_foreign_timing {
+        blocks.push(PageBlock::Text(format!("{FOREIGN_TIMING}.")));
+    }
+    blocks.push(named("cost", table.without_empty_columns()));
+    blocks
 }
 
 fn notes(data: &ReportData) -> Vec<PageBlock> {

@@ -1,5 +1,6 @@
 //! Tables as aligned text for a terminal, as Markdown and as CSV; `latex` has them for papers.
 
+use super::markup::without_html;
 use crate::results::csv_text;
 
 /// A header and rows of text.
@@ -53,8 +54,9 @@ impl Table {
 
     /// A Markdown table, aligned so that it also reads as plain text.
     pub(crate) fn to_markdown(&self) -> String {
-        let escaped =
-            |row: &Vec<String>| row.iter().map(|f| f.replace('|', "\\|").replace('\n', " ")).collect();
+        let escaped = |row: &Vec<String>| {
+            row.iter().map(|f| without_html(f).replace('|', "\\|").replace('\n', " ")).collect()
+        };
         let table =
             Table { header: escaped(&self.header), rows: self.rows.iter().map(escaped).collect() };
         let columns = table.columns();
@@ -100,9 +102,10 @@ struct ColumnLayout {
 }
 
 fn aligned(row: &[String], columns: &[ColumnLayout]) -> Vec<String> {
-    let pad = |(field, &ColumnLayout { width, numeric }): (&String, &ColumnLayout)| match numeric {
-        true => format!("{field:>width$}"),
-        false => format!("{field:<width$}"),
+    // Not by a width in `format!`, which takes at most 65535.
+    let pad = |(field, &ColumnLayout { width, numeric }): (&String, &ColumnLayout)| {
+        let blanks = " ".repeat(width - field.chars().count());
+        if numeric { blanks + field } else { format!("{field}{blanks}") }
     };
     row.iter().zip(columns).map(pad).collect()
 }
@@ -116,6 +119,13 @@ mod tests {
         table.push(vec!["a|b".into(), "1.0(2)".into(), String::new()]);
         table.push(vec!["c".into(), "-12".into(), String::new()]);
         table.without_empty_columns()
+    }
+
+    #[test]
+    fn fields_may_be_long() {
+        let mut table = Table::new(&["a", "b"]);
+        table.push(vec!["x".repeat(70_000), "y".into()]);
+        assert!(table.to_text().ends_with("x  y\n"));
     }
 
     #[test]

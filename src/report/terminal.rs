@@ -1,6 +1,6 @@
 //! The output of `run`: a row per measurement, short enough for a terminal.
 
-use super::data::ReportData;
+use super::data::{FOREIGN_TIMING, ReportData};
 use super::document::TableBlock;
 use super::number::{per_cent, significant, with_error};
 use super::summary;
@@ -109,6 +109,9 @@ pub(crate) fn notes(data: &ReportData) -> Vec<String> {
                 add(format!("{}: {count} of `{name}` in {total} paths", run.estimator), &cell.label);
             }
         }
+    }
+    if data.stored.has_foreign_timing {
+        add(FOREIGN_TIMING.into(), "");
     }
     let line = |(text, cells): (String, Vec<String>)| {
         let cells: Vec<String> = cells.into_iter().filter(|cell| !cell.is_empty()).collect();

@@ -43,7 +43,17 @@ pub fn sweep(folder: &Path) -> Result<()> {
 
 /// Creates a folder and its parents.
 pub fn create_folder(path: &Path, doing: &str) -> Result<()> {
-    fs::create_dir_all(path).map_err(Error::io(path, doing))
+    fs::create_dir_all(path).map_err(|source| match dangling(path) {
+        Some(link) => {
+            Error::record(&link, format!("could not {doing}: the link leads nowhere; remove or mend it"))
+        }
+        None => Error::io(path, doing)(source),
+    })
+}
+
+/// The link on the way to `path` whose target does not exist, where there is one.
+fn dangling(path: &Path) -> Option<PathBuf> {
+    path.ancestors().find(|part| part.is_symlink() && !part.exists()).map(Path::to_path_buf)
 }
 
 /// Replaces the folder `path` by the finished folder `stage` beside it. A folder cannot be renamed

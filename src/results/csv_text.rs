@@ -1,5 +1,6 @@
 //! Comma-separated text as RFC 4180 has it, with numbers that read back exactly.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use serde::Serialize;
@@ -12,11 +13,23 @@ pub fn to_text(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> 
     let mut put = |row: Vec<String>| {
         assert_eq!(row.len(), header.len(), "one field a column");
         // Writing to memory cannot fail.
-        let _ = writer.write_record(&row);
+        let _ = writer.write_record(row.iter().map(|field| inert(field).into_owned()));
     };
     put(header.iter().map(|name| name.to_string()).collect());
     rows.into_iter().for_each(&mut put);
     String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
+}
+
+/// A field that no spreadsheet takes for a formula: where it begins like one, an apostrophe stands before it. Numbers
+/// with their signs stay.
+fn inert(field: &str) -> Cow<'_, str> {
+    let is_number = |text: &str| text.chars().all(|c| c.is_ascii_digit() || " .,()[]%+-e±".contains(c));
+    let is_formula = match field.chars().next() {
+        Some('=' | '@' | '\t' | '\r') => true,
+        Some('+' | '-') => !is_number(field) && field.parse::<f64>().is_err(),
+        _ => false,
+    };
+    if is_formula { format!("'{field}").into() } else { field.into() }
 }
 
 /// Structs as CSV text: the columns are the fields, in their order, with their names. What is absent or
@@ -185,5 +198,22 @@ mod tests {
         let row = |small, absent| Row { name: "a,b".into(), count: 7, small, absent };
         let text = table(&[row(2e-5, Some(1.0)), row(f64::NAN, None)]);
         assert_eq!(text, "name,count,small,absent\n\"a,b\",7,2e-5,1.0\n\"a,b\",7,,\n");
+    }
+
+    #[test]
+    fn nothing_is_a_formula() {
+        for (field, inert) in [
+            ("=1+1", "'=1+1"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("-1+cmd|' /C calc'!A0", "'-1+cmd|' /C calc'!A0"),
+            ("+A1", "'+A1"),
+            ("-1.5(2)e-7", "-1.5(2)e-7"),
+            ("+1.7 [+1.4, -2.0] %", "+1.7 [+1.4, -2.0] %"),
+            ("-inf", "-inf"),
+            ("a=b", "a=b"),
+            ("", ""),
+        ] {
+            assert_eq!(super::inert(field), inert);
+        }
     }
 }

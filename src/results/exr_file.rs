@@ -1,10 +1,11 @@
 //! OpenEXR files: a run's image with its error in every band, and images made elsewhere.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
+use exr::meta::MetaData;
+use exr::meta::header::Header;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
     LayerAttributes, ReadChannels, ReadLayers, SmallVec, Text, WritableImage,
@@ -13,6 +14,7 @@ use exr::prelude::{
 use super::atomic;
 use super::image::Picture;
 use crate::error::{Error, Result};
+use crate::input;
 
 /// Planes of f32 by channel name.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,10 +85,44 @@ fn layer(
     Layer::new(size, about, Encoding::SMALL_LOSSLESS, channels)
 }
 
+/// Longest side of an image.
+const LONGEST_SIDE: usize = 16_384;
+/// Largest image, bytes of all its channels.
+const LARGEST_IMAGE: usize = 4 << 30;
+/// No compression of OpenEXR makes an image smaller than this part of itself: deflate, the strongest on a constant,
+/// reaches 1/1032.
+const STRONGEST_COMPRESSION: usize = 2048;
+
+/// What speaks against memory for the image that the headers describe. The decoder would ask for whatever they state.
+fn too_large(headers: &[Header], file: usize) -> Option<String> {
+    let side = headers.iter().flat_map(|header| [header.layer_size.x(), header.layer_size.y()]).max();
+    if let Some(side) = side.filter(|side| *side > LONGEST_SIDE) {
+        return Some(format!("a side of {side} pixels; at most {LONGEST_SIDE} are read"));
+    }
+    let of = |header: &Header| {
+        let samples = header.channels.list.iter().map(|channel| channel.sample_type.bytes_per_sample());
+        samples.sum::<usize>().saturating_mul(header.layer_size.area())
+    };
+    let bytes = headers.iter().map(of).fold(0, usize::saturating_add);
+    if bytes > LARGEST_IMAGE {
+        return Some(format!(
+            "its header states {bytes} bytes of pixels; at most {LARGEST_IMAGE} are read"
+        ));
+    }
+    let possible = file.saturating_mul(STRONGEST_COMPRESSION);
+    (bytes > possible).then(|| {
+        format!("its header states {bytes} bytes of pixels, which a file of {file} bytes cannot hold")
+    })
+}
+
 /// Reads every channel of an image as f32: half, float or integer, one part or several of one size.
 pub fn read_exr(path: &Path) -> Result<ExrImage> {
     let refuse = |what: String| Error::record(path, format!("not a usable OpenEXR image: {what}"));
-    let bytes = fs::read(path).map_err(Error::io(path, "read the image"))?;
+    let bytes = input::read(path, input::LARGEST_DATA).map_err(Error::io(path, "read the image"))?;
+    let about = MetaData::read_from_buffered(&bytes[..], false).map_err(|e| refuse(e.to_string()))?;
+    if let Some(what) = too_large(&about.headers, bytes.len()) {
+        return Err(refuse(what));
+    }
     let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels();
     let image = reader.all_layers().all_attributes().non_parallel().from_buffered(Cursor::new(bytes));
     let layers = image.map_err(|e| refuse(e.to_string()))?.layer_data;
@@ -112,6 +148,8 @@ pub fn read_exr(path: &Path) -> Result<ExrImage> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::super::sample;
     use super::*;
 
@@ -135,6 +173,36 @@ mod tests {
         let meta = exr::meta::MetaData::read_from_file(&a, true).expect("meta data");
         let comments = meta.headers[2].own_attributes.comments.as_ref().map(ToString::to_string);
         assert_eq!(comments.as_deref(), Some("experiment: sample\ncell: smooth\nestimator: mis\n"));
+    }
+
+    #[test]
+    fn headers_are_not_believed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.exr");
+        let stored = sample::stored(0.5);
+        let picture = Picture::of(&stored, &stored.record.cells[0].runs[0]).expect("a picture");
+        write_exr(&path, &picture, &[]).expect("a write");
+        let good = fs::read(&path).expect("bytes");
+        // `dataWindow` and `displayWindow` are two corners, inclusive.
+        let window = |[x, y]: [i32; 2]| [0, 0, x - 1, y - 1].map(i32::to_le_bytes).concat();
+        let claiming = |size: [i32; 2]| {
+            let old = window([3, 2]);
+            let mut bytes = good.clone();
+            let at: Vec<usize> =
+                (0..bytes.len() - 16).filter(|&i| bytes[i..i + 16] == old[..]).collect();
+            assert!(at.len() >= 2, "{at:?}");
+            at.iter().for_each(|&i| bytes[i..i + 16].copy_from_slice(&window(size)));
+            fs::write(&path, bytes).expect("a write");
+            read_exr(&path).expect_err("a refusal").to_string()
+        };
+        for (size, what) in [
+            ([100_000, 100_000], "a side of 100000 pixels; at most 16384"),
+            ([16_384, 16_384], "bytes of pixels"),
+            ([2_000, 2_000], "cannot hold"),
+        ] {
+            let message = claiming(size);
+            assert!(message.contains("a.exr") && message.contains(what), "{message}");
+        }
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub mod json;
 pub mod layout;
 /// Letters for labels in pictures.
 mod letters;
+/// One writer at a time in a results folder.
+pub(crate) mod lock;
 /// The summary of a result that is kept without its arrays.
 pub mod manifest;
 /// The table of everything that was measured.

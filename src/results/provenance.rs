@@ -58,7 +58,6 @@ impl Provenance {
     /// Of this process, now.
     pub fn collect(threads: usize) -> Provenance {
         let (commit, dirty) = checkout(Path::new(env!("CARGO_MANIFEST_DIR")));
-        let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
         Provenance {
             version: env!("CARGO_PKG_VERSION").into(),
             fingerprint: fingerprint(),
@@ -74,7 +73,7 @@ impl Provenance {
             target_features: features().into_iter().map(String::from).collect(),
             cpu: cpu_model().unwrap_or_else(|| "unknown".into()),
             threads,
-            date: utc(seconds),
+            date: now(),
             command: std::env::args().collect(),
         }
     }
@@ -93,10 +92,9 @@ pub fn build() -> &'static str {
 /// Today's date, UTC, and the commit of the checkout that this program was built from, as
 /// `2026-11-21 cf14d94`.
 pub fn today_and_commit() -> String {
-    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
     let (commit, _) = checkout(Path::new(env!("CARGO_MANIFEST_DIR")));
     let commit = commit.map_or("unknown".to_string(), |c| c.chars().take(12).collect());
-    format!("{} {commit}", &utc(seconds)[..10])
+    format!("{} {commit}", &now()[..10])
 }
 
 /// What fixes the bits, as one line; records of different fingerprints are not merged.
@@ -142,6 +140,11 @@ fn cpu_model() -> Option<String> {
     let info = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = info.lines().find(|line| line.starts_with("model name"))?;
     Some(line.split_once(':')?.1.trim().to_string())
+}
+
+/// The time, UTC, ISO 8601.
+pub(crate) fn now() -> String {
+    utc(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()))
 }
 
 /// Seconds since 1970 as `2026-11-21T10:30:00Z`.

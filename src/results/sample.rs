@@ -46,7 +46,7 @@ pub fn stored(noise: f64) -> Stored {
         samplers: vec![],
         checksums: BTreeMap::new(),
     };
-    Stored { record, arrays, timing: None }
+    Stored { record, arrays, timing: None, has_foreign_timing: false }
 }
 
 /// Band `band` of the observable `mean` of all classes of an estimator.

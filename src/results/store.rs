@@ -23,6 +23,7 @@ use super::pictures::Wanted;
 use super::record::{EstimatorRun, Quantity, Record, SCHEMA_VERSION};
 use super::{atomic, provenance::Provenance, timing::Timing};
 use crate::error::{Error, Result};
+use crate::input;
 use crate::stats::moments::Moments;
 
 /// The manifest's name in a results folder.
@@ -54,6 +55,8 @@ pub struct Stored {
     pub arrays: Arrays,
     /// Times, where they were measured; not part of the record, without a checksum.
     pub timing: Option<Timing>,
+    /// True where `timing.json` is of another record, as after a crash, and was left out.
+    pub has_foreign_timing: bool,
 }
 
 /// Path of a run's moments of the observables, relative to the record's folder: `run` is its index
@@ -227,7 +230,7 @@ impl RecordFolder {
     pub fn write(&self, mut record: Record, arrays: Arrays) -> Result<Stored> {
         let checksums = arrays.iter().map(|(name, array)| (name.clone(), hash_hex(&array.to_npy())));
         record.checksums = checksums.collect();
-        let stored = Stored { record, arrays, timing: None };
+        let stored = Stored { record, arrays, timing: None, has_foreign_timing: false };
         if let Some(defect) = stored.defect() {
             return Err(Error::record(&self.root, format!("will not write a record whose {defect}")));
         }
@@ -251,8 +254,25 @@ impl RecordFolder {
 
     /// Reads a record and checks version, checksums and shapes.
     pub fn read(&self) -> Result<Stored> {
-        let dir = self.record_dir();
-        atomic::recover(&dir, &self.aside())?;
+        // A writer may put another record in place meanwhile: what is found damaged is read again, if so.
+        let mut stored = loop {
+            let before = self.checksum_line();
+            let stored = self.read_as_it_is();
+            if stored.is_ok() || self.checksum_line() == before {
+                break stored?;
+            }
+        };
+        let timing = self.read_timing()?;
+        let numbers = stored.numbers();
+        let is_own = |timing: &Timing| timing.record.as_ref().is_none_or(|timed| *timed == numbers);
+        stored.has_foreign_timing = timing.as_ref().is_some_and(|timing| !is_own(timing));
+        stored.timing = timing.filter(is_own);
+        Ok(stored)
+    }
+
+    /// The record without its timing.
+    fn read_as_it_is(&self) -> Result<Stored> {
+        let dir = self.readable_dir();
         let path = dir.join("record.json");
         if !path.exists() {
             return Err(Error::record(&self.root, "no record here; `scatterproof run` makes one"));
@@ -262,11 +282,23 @@ impl RecordFolder {
         for (name, checksum) in &record.checksums {
             arrays.insert(name.clone(), read_array(&dir, name, checksum)?);
         }
-        let stored = Stored { record, arrays, timing: self.read_timing()? };
+        let stored = Stored { record, arrays, timing: None, has_foreign_timing: false };
         match stored.defect() {
             Some(defect) => Err(Error::record(&path, format!("inconsistent: {defect}"))),
             None => Ok(stored),
         }
+    }
+
+    /// The line of the record's checksum, where there is one.
+    fn checksum_line(&self) -> Option<Vec<u8>> {
+        fs::read(self.readable_dir().join("record.json.b3")).ok()
+    }
+
+    /// Where the record is: aside after a crash within the swap, which the next run finishes. Readers repair nothing,
+    /// for a writer may be at work.
+    fn readable_dir(&self) -> PathBuf {
+        let (dir, aside) = (self.record_dir(), self.aside());
+        if !dir.exists() && aside.exists() { aside } else { dir }
     }
 
     /// Folder of the second look at this record.
@@ -337,6 +369,9 @@ impl RecordFolder {
 
     /// Removes every view beside the record, so that none of an earlier record outlives it.
     pub fn clear_views(&self) -> Result<()> {
+        if self.root.is_dir() {
+            atomic::sweep(&self.root)?;
+        }
         for folder in VIEW_FOLDERS {
             remove_folder(&self.root.join(folder), "remove the views of an earlier record")?;
         }
@@ -351,6 +386,7 @@ impl RecordFolder {
     fn clear_pictures(&self) -> Result<()> {
         let folder = self.root.join("images");
         let Ok(entries) = fs::read_dir(&folder) else { return Ok(()) };
+        atomic::sweep(&folder)?;
         for entry in entries.flatten() {
             let name = entry.file_name();
             let name = name.to_string_lossy();
@@ -370,7 +406,8 @@ impl RecordFolder {
         if !path.exists() {
             return Ok(None);
         }
-        let text = fs::read_to_string(&path).map_err(Error::io(&path, "read results"))?;
+        let text =
+            input::read_text(&path, input::LARGEST_DATA).map_err(Error::io(&path, "read results"))?;
         let value = serde_json::from_str(&text);
         value.map(Some).map_err(|e| Error::record(&path, format!("{e}; remove the file or run again")))
     }
@@ -423,7 +460,7 @@ fn readable<T: Serialize + DeserializeOwned + PartialEq>(value: &T, path: &Path)
 }
 
 fn read_record(path: &Path) -> Result<Record> {
-    let bytes = fs::read(path).map_err(Error::io(path, "read the record"))?;
+    let bytes = input::read(path, input::LARGEST_DATA).map_err(Error::io(path, "read the record"))?;
     let value: serde_json::Value = serde_json::from_slice(&bytes)
         .map_err(|e| Error::record(path, format!("truncated or not JSON ({e}); run it again")))?;
     // The version first: another version's layout and hash mean nothing to this program.
@@ -437,7 +474,8 @@ fn read_record(path: &Path) -> Result<Record> {
         return Err(Error::record(path, message));
     }
     let sum = path.with_extension("json.b3");
-    let line = fs::read_to_string(&sum).map_err(Error::io(&sum, "read the record's checksum"))?;
+    let line = input::read_text(&sum, input::LONGEST_TEXT)
+        .map_err(Error::io(&sum, "read the record's checksum"))?;
     if line.split_whitespace().next() != Some(&hash_hex(&bytes)) {
         return Err(Error::record(path, "checksum mismatch: the file was changed after it was written"));
     }
@@ -446,7 +484,7 @@ fn read_record(path: &Path) -> Result<Record> {
 
 fn read_array(dir: &Path, name: &str, checksum: &str) -> Result<Array> {
     let path = inside(dir, name)?;
-    let bytes = fs::read(&path).map_err(Error::io(&path, "read the record"))?;
+    let bytes = input::read(&path, input::LARGEST_ARRAY).map_err(Error::io(&path, "read the record"))?;
     let array = Array::from_npy(&bytes, &path)?;
     if hash_hex(&bytes) != checksum {
         return Err(Error::record(

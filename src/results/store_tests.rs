@@ -24,7 +24,15 @@ fn refused(folder: &RecordFolder, what: &[&str]) {
 fn views_go_with_their_record() {
     let (_temp, folder, stored) = written();
     let own = ["images/of-mine.png", "notes.txt"];
-    let views = VIEW_FILES.into_iter().chain(["plots/x.svg", "tables/x.md", "images/000-mis.png"]);
+    // And what a killed report left unfinished.
+    let made = [
+        "plots/x.svg",
+        "tables/x.md",
+        "images/000-mis.png",
+        "images/.000-mis.exr.7.tmp",
+        ".report.md.7.tmp",
+    ];
+    let views = VIEW_FILES.into_iter().chain(made);
     let views: Vec<&str> = views.collect();
     views.iter().chain(&own).for_each(|name| folder.write_view(name, b"").expect("a file"));
     folder.write(stored.record, stored.arrays).expect("a written record");

@@ -8,6 +8,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Timing {
+    /// [`Stored::numbers`](super::store::Stored::numbers) of the record that was timed. A crash between record and
+    /// timing leaves the timing of another record, which is not read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub record: Option<String>,
     /// Cell label -> estimator -> cost.
     pub cells: BTreeMap<String, BTreeMap<String, TimeSpent>>,
     /// Cell label -> estimator -> CPU time by batch of the record.

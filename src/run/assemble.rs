@@ -75,7 +75,7 @@ pub(super) fn assemble(
         match (&job.task, output) {
             (Task::Estimate(passes), Output::Passes(finished)) => {
                 let cell = &mut cells[passes.cell];
-                timing.add(&cell.label, &passes.arm.name, cost(passes, &finished));
+                timing.add(&cell.label, &passes.arm.name, cost(&finished));
                 timing.set_batches(&cell.label, &passes.arm.name, batches(&finished));
                 let run = estimator_run(experiment, passes, cell.runs.len(), *finished, &mut arrays);
                 cell.runs.push(run);
@@ -123,11 +123,11 @@ fn regions(job: &Passes) -> Vec<ObservedRegion> {
     job.layout.regions().iter().map(region).collect()
 }
 
-fn cost(job: &Passes, finished: &Finished) -> timing::TimeSpent {
+fn cost(finished: &Finished) -> timing::TimeSpent {
     let total = finished.total();
     timing::TimeSpent {
         cpu_seconds: total.cpu_seconds,
-        set_up_seconds: job.set_up.seconds(),
+        set_up_seconds: finished.tally.set_up_seconds,
         wall_seconds: finished.tally.wall_seconds,
         passes: finished.passes,
         paths: total.cost[Cost::Paths as usize],

@@ -36,6 +36,8 @@ struct Header<T> {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Nodes {
+    /// First pass.
+    start: u64,
     tally: Tally,
     /// Level and number of values of every node of moments.
     moments: Vec<(u32, usize)>,
@@ -137,11 +139,12 @@ pub(crate) fn start(path: &Path, identity: &str) -> Option<Start> {
     load::<IgnoredAny>(path, identity).map(|(header, _)| header.start)
 }
 
-/// Writes the state of a job whose passes start at 0.
+/// Writes the state of a job, or of a part of it.
 pub(crate) fn save_passes(path: &Path, identity: &str, start: &Start, block: &Block) -> Result<()> {
     let moments = block.moments.nodes();
     let (pixels, spread) = (block.pixels.nodes(), block.spread.nodes());
     let nodes = Nodes {
+        start: block.moments.start(),
         tally: block.tally,
         moments: moments.iter().map(|n| (n.level, n.value.len())).collect(),
         pixels: pixels.iter().map(|n| (n.level, n.value.n, n.value.mean.len())).collect(),
@@ -153,12 +156,16 @@ pub(crate) fn save_passes(path: &Path, identity: &str, start: &Start, block: &Bl
     save(path, identity, start, nodes, moments.chain(images))
 }
 
-/// Reads the state of a job, with moments kept at `keep_level`; `None` where there is none that fits.
-pub(crate) fn load_passes(path: &Path, identity: &str, keep_level: u32) -> Option<Block> {
+/// Reads the state of a job from pass `start` on, with moments kept at `keep_level`; `None` where there is none that
+/// fits.
+pub(crate) fn load_passes(path: &Path, identity: &str, start: u64, keep_level: u32) -> Option<Block> {
     let (Header { content: nodes, .. }, numbers) = load::<Nodes>(path, identity)?;
+    if nodes.start != start {
+        return None;
+    }
     let mut numbers = numbers.into_iter();
     let mut take = |n: usize| take(&mut numbers, n);
-    let mut block = Block::empty(0, keep_level);
+    let mut block = Block::empty(start, keep_level);
     for (level, length) in nodes.moments {
         if level > keep_level {
             return None; // kept coarser than this run's batches: they cannot be cut
@@ -190,6 +197,15 @@ pub(crate) fn load_passes(path: &Path, identity: &str, keep_level: u32) -> Optio
     let fits = ends.iter().all(|end| *end == block.moments.next_pass())
         && block.spread.next_pass() == block.moments.next_pass() / 2;
     fits.then_some(block)
+}
+
+/// The pass, or draw, after the last that an undamaged state of the job holds.
+pub(crate) fn end(path: &Path, identity: &str) -> Option<u64> {
+    if let Some((Header { content: nodes, .. }, _)) = load::<Nodes>(path, identity) {
+        let passes = nodes.moments.iter().map(|(level, _)| 1u64.checked_shl(*level).unwrap_or(0));
+        return Some(nodes.start + passes.sum::<u64>());
+    }
+    load::<Counted>(path, identity).map(|(header, _)| header.content.run.samples)
 }
 
 /// Writes the state of a sampler.
@@ -266,18 +282,18 @@ mod tests {
         let block = block(13, 2);
         save_passes(&path, "me", &Start::default(), &block).expect("saved");
         // How many bands an image has is known from the next run.
-        assert_eq!(load_passes(&path, "me", 2), Some(Block { bands: 0, ..block.clone() }));
-        assert!(load_passes(&path, "you", 2).is_none(), "another job");
-        assert!(load_passes(&path, "me", 1).is_none(), "coarser than asked");
+        assert_eq!(load_passes(&path, "me", 0, 2), Some(Block { bands: 0, ..block.clone() }));
+        assert!(load_passes(&path, "you", 0, 2).is_none(), "another job");
+        assert!(load_passes(&path, "me", 0, 1).is_none(), "coarser than asked");
         // A longer run keeps wider batches: the nodes merge on.
-        assert_eq!(load_passes(&path, "me", 3).expect("a state").moments.nodes().len(), 3);
+        assert_eq!(load_passes(&path, "me", 0, 3).expect("a state").moments.nodes().len(), 3);
 
         let mut bytes = std::fs::read(&path).expect("bytes");
         bytes[200] ^= 1;
         std::fs::write(&path, &bytes).expect("written");
-        assert!(load_passes(&path, "me", 2).is_none(), "damaged");
+        assert!(load_passes(&path, "me", 0, 2).is_none(), "damaged");
         std::fs::write(&path, &bytes[..100]).expect("written");
-        assert!(load_passes(&path, "me", 2).is_none(), "truncated");
+        assert!(load_passes(&path, "me", 0, 2).is_none(), "truncated");
     }
 
     #[test]
@@ -291,7 +307,9 @@ mod tests {
         save_passes(&theirs, &other, &start_of("y"), &block(13, 2)).expect("saved");
         fs::write(folder.path().join("state/damaged.state"), "?").expect("written");
         reduce_others(folder.path(), [mine.as_str()].into_iter()).expect("reduced");
-        assert!(load_passes(&own, &mine, 2).is_some() && load_passes(&theirs, &other, 2).is_none());
+        assert!(
+            load_passes(&own, &mine, 0, 2).is_some() && load_passes(&theirs, &other, 0, 2).is_none()
+        );
         assert_eq!(start(&theirs, &other), Some(start_of("y")));
         assert_eq!(fs::read_dir(folder.path().join("state")).expect("a folder").count(), 2);
         reduce_others(folder.path(), std::iter::empty()).expect("reduced");
@@ -314,6 +332,27 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path().join("state")).expect("a folder").count(), 0);
     }
 
+    /// A state that begins anywhere, odd passes included, joins with the one before it.
+    #[test]
+    fn parts_join() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let whole = block(29, 3);
+        for cut in [1, 8, 11, 16, 28] {
+            let parts = [(0, cut), (cut, 29)].map(|(start, end)| {
+                let path = folder.path().join(format!("{start}.state"));
+                save_passes(&path, "me", &Start::default(), &blocks(start, end, 3)).expect("saved");
+                assert_eq!(super::end(&path, "me"), Some(end));
+                assert!(load_passes(&path, "me", start + 1, 3).is_none(), "another part");
+                load_passes(&path, "me", start, 3).expect("a state")
+            });
+            let [mut first, second] = parts;
+            // A state does not say how many bands its images have; the run does.
+            (first.bands, first.tally) = (2, whole.tally);
+            first.append(Block { bands: 2, tally: Tally::default(), ..second });
+            assert_eq!(first, whole, "{cut}");
+        }
+    }
+
     #[test]
     fn going_on_gives_the_same_bits() {
         let folder = tempfile::tempdir().expect("a folder");
@@ -321,7 +360,7 @@ mod tests {
         let whole = block(29, 3);
         let later = blocks(11, 29, 3);
         save_passes(&path, "me", &Start::default(), &block(11, 0)).expect("saved");
-        let mut resumed = load_passes(&path, "me", 3).expect("a state");
+        let mut resumed = load_passes(&path, "me", 0, 3).expect("a state");
         resumed.append(later);
         assert_eq!((resumed.moments, resumed.pixels), (whole.moments, whole.pixels));
         assert_eq!(resumed.work, whole.work);

@@ -72,6 +72,8 @@ pub(crate) struct Passes {
     pub stage: Stage,
     /// Number of passes, where the budget does not state it.
     pub count: Option<u64>,
+    /// Passes that are run, where they are not all.
+    pub part: Option<PassRange>,
     /// Estimator that runs the passes.
     pub estimator: Box<dyn Estimator>,
     /// What building and preparing it took.
@@ -82,6 +84,15 @@ pub(crate) struct Passes {
     pub groups: Vec<Group>,
     /// What the budget means for this run.
     pub terms: BudgetTerms,
+}
+
+/// A run of passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct PassRange {
+    /// Number of the first pass.
+    pub start: u64,
+    /// Number of the pass after the last.
+    pub end: u64,
 }
 
 /// CPU time that an estimator takes before its first pass.
@@ -119,7 +130,7 @@ impl SetUp {
 pub(crate) struct BudgetTerms {
     /// Observables whose relative error a budget may bound.
     pub targets: Vec<usize>,
-    /// Part of the budget's passes or seconds.
+    /// PassRange of the budget's passes or seconds.
     pub share: f64,
 }
 
@@ -199,6 +210,8 @@ pub(crate) struct Tally {
     pub wall_seconds: f64,
     /// Processes that ran some of the passes.
     pub processes: u64,
+    /// The longest that one of them took before its first pass, CPU seconds: a process alone would take as long.
+    pub set_up_seconds: f64,
 }
 
 impl Tally {
@@ -207,6 +220,7 @@ impl Tally {
         self.anomalies.iter_mut().zip(other.anomalies).for_each(|(a, b)| *a += b);
         self.wall_seconds += other.wall_seconds;
         self.processes += other.processes;
+        self.set_up_seconds = self.set_up_seconds.max(other.set_up_seconds);
     }
 }
 
@@ -384,6 +398,7 @@ impl Passes {
             anomalies: scores.anomalies,
             wall_seconds: wall.elapsed().as_secs_f64(),
             processes: 0,
+            set_up_seconds: self.set_up.seconds(),
         };
         Some(block)
     }

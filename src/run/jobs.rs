@@ -196,6 +196,7 @@ impl Planner<'_> {
             arm,
             stage,
             count: None,
+            part: None,
             estimator,
             set_up,
             layout,

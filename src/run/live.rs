@@ -70,7 +70,8 @@ impl Live {
         })?;
         let shared = Arc::new(Shared::default());
         let sending = Arc::clone(&shared);
-        std::thread::spawn(move || sending.send_all(connection));
+        let sends = std::thread::Builder::new().spawn(move || sending.send_all(connection));
+        sends.map_err(|error| format!("tev is left out: could not start a thread: {error}"))?;
         Ok(Live { address: address.clone(), shared, pace: Mutex::default() })
     }
 

@@ -1,6 +1,7 @@
 //! Memory of a run, and whether it fits.
 
 use super::job::{Job, Passes};
+use super::memory_limits::{Available, readable};
 use crate::error::{Error, Result};
 
 /// Estimate of a run's largest memory, bytes.
@@ -60,21 +61,21 @@ impl MemoryEstimate {
     }
 
     /// Whether it fits into nine tenths of the memory that the system has to give.
-    pub(crate) fn fits(&self, available: Option<usize>) -> bool {
-        available.is_none_or(|available| self.total() <= available / 10 * 9)
+    pub(crate) fn fits(&self, available: Option<Available>) -> bool {
+        available.is_none_or(|available| self.total() <= available.bytes / 10 * 9)
     }
 
     /// Refuses what does not fit.
     ///
     /// # Errors
     /// More than nine tenths of the memory available.
-    pub(crate) fn check(&self, available: Option<usize>) -> Result<()> {
+    pub(crate) fn check(&self, available: Option<Available>) -> Result<()> {
         match available {
             Some(available) if !self.fits(Some(available)) => Err(Error::input_help(
                 format!(
                     "the run would need {} of memory and {} are available",
                     readable(self.total()),
-                    readable(available)
+                    available.words()
                 ),
                 "lower the sensor's resolution, the number of bands or cells, or split the experiment; \
                  `scatterproof plan` shows what needs how much",
@@ -84,26 +85,6 @@ impl MemoryEstimate {
     }
 }
 
-/// Memory that the system can give without swapping, bytes; `None` where it does not report it.
-pub(crate) fn available() -> Option<usize> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kib: usize = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib * 1024)
-}
-
-/// A number of bytes for people.
-pub(crate) fn readable(bytes: usize) -> String {
-    let units = ["B", "KiB", "MiB", "GiB", "TiB", "PiB"];
-    let mut value = bytes as f64;
-    let mut unit = 0;
-    while value >= 1024.0 && unit + 1 < units.len() {
-        value /= 1024.0;
-        unit += 1;
-    }
-    if unit == 0 { format!("{bytes} B") } else { format!("{value:.1} {}", units[unit]) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,19 +92,15 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_refused() {
         let estimate = MemoryEstimate { results: 950, ..MemoryEstimate::default() };
-        assert!(estimate.check(Some(1000)).is_err());
-        assert!(estimate.check(Some(2000)).is_ok());
+        let of = |bytes| Some(Available { bytes, limit: "of the test" });
+        let message = estimate.check(of(1000)).expect_err("refused").to_string();
+        assert!(message.contains("1000 B (of the test) are available"), "{message}");
+        assert!(estimate.check(of(2000)).is_ok());
         assert!(estimate.check(None).is_ok());
         // What makes a mesh is gone when passes run: the larger of the two counts.
         let mesh = MemoryEstimate { shapes: 300, guides: 0, building: 500, results: 200, working: 100 };
         assert_eq!(mesh.total(), 800);
         assert_eq!(MemoryEstimate { guides: 300, ..mesh }.total(), 900);
         assert_eq!(MemoryEstimate { building: 250, ..mesh }.total(), 600);
-    }
-
-    #[test]
-    fn bytes_for_people() {
-        assert_eq!(readable(999), "999 B");
-        assert_eq!(readable(3 << 20), "3.0 MiB");
     }
 }

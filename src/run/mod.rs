@@ -12,13 +12,16 @@ pub(crate) mod job;
 pub(crate) mod keys;
 pub(crate) mod live;
 pub(crate) mod memory;
+pub(crate) mod memory_limits;
 pub(crate) mod pilot;
 pub(crate) mod progress;
+pub(crate) mod shard;
 pub(crate) mod tev;
 pub(crate) mod workers;
 
 mod assemble;
 mod jobs;
+mod merge;
 mod replay;
 mod retest;
 
@@ -29,9 +32,11 @@ use crate::error::{Error, Result};
 use crate::experiment::Experiment;
 use crate::experiment::picture;
 use crate::experiment::registry::Registry;
+use crate::results::lock::{self, FolderLock};
 use crate::results::provenance::{self, Provenance};
 use crate::results::record::Replay;
 use crate::results::store::{RecordFolder, Stored};
+use crate::results::timing::Timing;
 use interrupt::Interrupt;
 use job::Task;
 use live::{Live, Show};
@@ -39,6 +44,7 @@ use progress::Progress;
 use workers::Completed;
 
 pub(crate) use jobs::{Plan, plan};
+pub(crate) use merge::merge;
 pub(crate) use pilot::estimate_seconds;
 pub(crate) use retest::{Remeasured, retest};
 
@@ -81,6 +87,16 @@ impl Options {
     }
 }
 
+/// What was run, in a folder that no other process writes to until this is dropped.
+pub(crate) struct Ran {
+    /// Folder of the results.
+    pub folder: RecordFolder,
+    /// Record as it was written.
+    pub stored: Stored,
+    /// Lock of the folder.
+    pub lock: Arc<FolderLock>,
+}
+
 /// Runs an experiment, or what is left of it, and writes its record, timing and provenance.
 ///
 /// # Errors
@@ -91,15 +107,14 @@ pub(crate) fn run(
     registry: &Registry,
     options: &Options,
     interrupt: &Interrupt,
-) -> Result<(RecordFolder, Stored)> {
+) -> Result<Ran> {
     let mut plan = plan(experiment, registry)?;
     if let Some(folder) = &options.passes_of {
         take_passes(&mut plan, experiment, &RecordFolder::new(folder.join(&experiment.file.name)))?;
     }
-    let (folder, stored) =
-        execute(experiment, &plan, &options.folder(&experiment.file.name), options, interrupt)?;
-    folder.write_pictures(&picture::wanted(&experiment.file.picture))?;
-    Ok((folder, stored))
+    let ran = execute(experiment, &plan, &options.folder(&experiment.file.name), options, interrupt)?;
+    ran.folder.write_pictures(&picture::wanted(&experiment.file.picture))?;
+    Ok(ran)
 }
 
 /// Sets the passes of every estimator to those of the record in `from`.
@@ -133,10 +148,33 @@ fn execute(
     root: &Path,
     options: &Options,
     interrupt: &Interrupt,
-) -> Result<(RecordFolder, Stored)> {
-    let available = memory::available();
+) -> Result<Ran> {
+    check_memory(plan, options)?;
+    let lock = lock::lock(root)?;
+    let completed = measure(experiment, plan, root, options, interrupt)?;
+    conclude(experiment, plan, root, lock, completed, options, interrupt)
+}
+
+/// Whether the arms of a cell can run by turns in the memory that there is.
+///
+/// # Errors
+/// It does not suffice for one arm after the other either.
+fn check_memory(plan: &Plan, options: &Options) -> Result<bool> {
+    let available = memory_limits::available();
     let is_interleaved = plan.memory(options.threads, true).fits(available);
     plan.memory(options.threads, is_interleaved).check(available)?;
+    Ok(is_interleaved)
+}
+
+/// Runs all jobs of a plan that are not complete in `root`, and keeps their states there.
+fn measure(
+    experiment: &Experiment,
+    plan: &Plan,
+    root: &Path,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Vec<Completed>> {
+    let is_interleaved = check_memory(plan, options)?;
     checkpoint::prepare(root)?;
     let name = experiment.file.name.as_str();
     let progress = Progress::new(plan.jobs.len(), options.quiet);
@@ -162,18 +200,33 @@ fn execute(
         budget: experiment.file.budget.as_ref(),
         claims: &assemble::claim_hashes(experiment),
     };
+    let running = interrupt.running();
     let completed = workers::run_all(&plan.jobs, &settings);
+    drop(running);
     progress.finish();
-    let completed = completed?;
+    completed
+}
+
+/// Writes record, timing and provenance of completed jobs into `root`.
+fn conclude(
+    experiment: &Experiment,
+    plan: &Plan,
+    root: &Path,
+    lock: Arc<FolderLock>,
+    completed: Vec<Completed>,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Ran> {
     let replays = replays(experiment, plan, &completed, interrupt)?;
     let assembled = assemble::assemble(experiment, plan, completed, replays)?;
     let folder = RecordFolder::new(root);
     let mut stored = folder.write(assembled.record, assembled.arrays)?;
-    folder.write_timing(&assembled.timing)?;
-    stored.timing = Some(assembled.timing);
+    let timing = Timing { record: Some(stored.numbers()), ..assembled.timing };
+    folder.write_timing(&timing)?;
+    stored.timing = Some(timing);
     folder.write_provenance(&Provenance::collect(options.threads))?;
     checkpoint::reduce_others(root, plan.jobs.iter().map(|job| job.identity.as_str()))?;
-    Ok((folder, stored))
+    Ok(Ran { folder, stored, lock })
 }
 
 /// Runs the first passes again where `reproduces` claims ask for it.

@@ -58,5 +58,5 @@ pub(crate) fn retest(
         }
     }
     let root = RecordFolder::new(options.folder(&experiment.file.name)).retest();
-    execute(experiment, &plan, root.root(), options, interrupt).map(|(_, stored)| stored)
+    execute(experiment, &plan, root.root(), options, interrupt).map(|ran| ran.stored)
 }

@@ -20,13 +20,14 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::checkpoint;
 use super::chi_square::{Draws, Sampled};
 use super::interrupt::Interrupt;
-use super::job::{Block, Finished, Job, Passes, Start, Task};
+use super::job::{Block, Finished, Job, PassRange, Passes, Start, Task};
 use super::keys::Stage;
 use super::live::Show;
 use super::pilot;
@@ -92,12 +93,16 @@ const TURN_SECONDS: f64 = 0.125;
 const CONTROL_EVERY: u64 = 8;
 /// The same where a claim rests on CPU time.
 const CLAIMED_CONTROL_EVERY: u64 = 2;
+/// Time that workers have to come to an end of their passes after a signal.
+const PATIENCE: Duration = Duration::from_millis(500);
+/// Longest time between looks at the interrupt.
+const LOOK: Duration = Duration::from_millis(50);
 /// Time between checkpoints of a job under way.
 const CHECKPOINT_EVERY: Duration = Duration::from_secs(5);
 
 enum Message {
     /// A job begins: what is fixed of it, and what an earlier run had done.
-    Begin { job: usize, start: Start, done: Box<Block> },
+    Begin { job: usize, start: Start, done: Box<Block>, end: u64 },
     /// A block is done.
     Block { job: usize, block: Box<Block> },
     /// A sampler is done, in this run or an earlier one.
@@ -122,11 +127,17 @@ struct Active {
     seconds_per_pass: Option<f64>,
 }
 
+/// A job among those of its group.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Lane {
-    job: usize,
-    passes: u64,
-    next: u64,
+pub(super) struct Lane {
+    /// Index of the job.
+    pub job: usize,
+    /// Number of all its passes.
+    pub passes: u64,
+    /// The first that is not done.
+    pub next: u64,
+    /// The one after the last that is run here.
+    pub end: u64,
 }
 
 /// A run of passes of one job.
@@ -185,9 +196,17 @@ pub(crate) fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed
     // Bounded: blocks with images wait with their workers, not in memory.
     let (sender, receiver) = mpsc::sync_channel(settings.threads);
     std::thread::scope(|scope| {
-        for _ in 0..settings.threads {
+        for number in 1..=settings.threads {
             let (pool, sender) = (&pool, sender.clone());
-            scope.spawn(move || pool.work(&sender));
+            let spawned = std::thread::Builder::new().spawn_scoped(scope, move || pool.work(&sender));
+            if let Err(source) = spawned {
+                settings.interrupt.raise();
+                let what = format!("thread {number} of {}", settings.threads);
+                return Err(Error::io(
+                    Path::new(&what),
+                    "start a thread (lower --threads or raise the limit)",
+                )(source));
+            }
         }
         drop(sender);
         let collected = Collector::new(jobs, settings).collect(receiver);
@@ -199,7 +218,7 @@ pub(crate) fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed
 }
 
 /// The jobs of a cell together, where they are interleaved; the others one by one.
-fn groups(jobs: &[Job], is_interleaved: bool) -> Vec<Vec<usize>> {
+pub(super) fn groups(jobs: &[Job], is_interleaved: bool) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     let cell = |index: usize| jobs[index].passes().map(|passes| passes.cell).filter(|_| is_interleaved);
     for index in 0..jobs.len() {
@@ -213,12 +232,21 @@ fn groups(jobs: &[Job], is_interleaved: bool) -> Vec<Vec<usize>> {
 }
 
 /// Whole batches of the longest lane of whose part every lane has done all.
-fn done_everywhere(lanes: &[Lane]) -> u64 {
+pub(super) fn done_everywhere(lanes: &[Lane]) -> u64 {
     let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
     let part =
         |lane: &Lane| u128::from(lane.next) * u128::from(longest) / u128::from(lane.passes.max(1));
     let level = batch_level(longest);
     (lanes.iter().map(part).min().unwrap_or(0) as u64 >> level) << level
+}
+
+/// The pass of the longest lane after which no lane has any left.
+fn last(lanes: &[Lane]) -> u64 {
+    let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
+    let end = |lane: &Lane| {
+        (u128::from(lane.end) * u128::from(longest)).div_ceil(u128::from(lane.passes.max(1))) as u64
+    };
+    lanes.iter().map(end).max().unwrap_or(0)
 }
 
 /// The passes [from, from + length) of the longest lane and the same part of every other, in the order
@@ -236,8 +264,13 @@ fn turn(lanes: &[Lane], from: u64, length: u64, has_control: bool) -> (Vec<Span>
     let there = lanes.iter().map(|lane| (lane, span(lane, (from, middle), Second::After)));
     let back = lanes.iter().rev().map(|lane| (lane, span(lane, (middle, end), Second::Before)));
     let spans: Vec<(&Lane, Span)> = there.chain(back).collect();
-    let is_whole = length > 1 && spans.iter().all(|(lane, span)| span.start >= lane.next);
-    let left = |(lane, span): (&Lane, Span)| Span { start: span.start.max(lane.next), ..span };
+    let is_whole =
+        length > 1 && spans.iter().all(|(lane, span)| span.start >= lane.next && span.end <= lane.end);
+    let left = |(lane, span): (&Lane, Span)| Span {
+        start: span.start.max(lane.next),
+        end: span.end.min(lane.end),
+        ..span
+    };
     (spans.into_iter().map(left).filter(|span| span.start < span.end).collect(), is_whole)
 }
 
@@ -351,16 +384,17 @@ impl Pool<'_> {
         let group = active.group;
         if let [lane] = active.lanes[..] {
             let start = lane.next;
-            let end = lane.passes.min(start + self.block_length(active));
+            let end = lane.end.min(start + self.block_length(active));
             active.lanes[0].next = end;
             let (keep_level, twice) = (batch_level(lane.passes), None);
             let span = Span { job: lane.job, start, end, keep_level, twice };
-            let passes = end - start;
+            let passes = end.saturating_sub(start);
             return (passes > 0).then(|| Turn { group, spans: vec![span], passes, is_balanced: false });
         }
         let longest = active.lanes.iter().map(|lane| lane.passes).max()?;
-        while active.given < longest {
-            let passes = self.turn_length(active, longest);
+        let last = last(&active.lanes);
+        while active.given < last {
+            let passes = self.turn_length(active, longest, last);
             let arms = || active.lanes.iter().filter_map(|lane| self.jobs[lane.job].passes());
             let is_main = arms().all(|arm| arm.stage == Stage::Main);
             let is_claimed = arms().any(|arm| arm.arm.is_control);
@@ -378,8 +412,8 @@ impl Pool<'_> {
 
     /// Passes of the longest lane in the next turn: a power of two, so that turns fill batches, and at
     /// most a batch of passes, so that a warm-up costs no more.
-    fn turn_length(&self, active: &Active, longest: u64) -> u64 {
-        let left = longest - active.given;
+    fn turn_length(&self, active: &Active, longest: u64, last: u64) -> u64 {
+        let left = last - active.given;
         if let Some(passes) = self.settings.block_passes {
             return left.min(passes.saturating_mul(2));
         }
@@ -390,7 +424,7 @@ impl Pool<'_> {
     }
 
     fn block_length(&self, active: &Active) -> u64 {
-        let left = active.lanes[0].passes - active.lanes[0].next;
+        let left = active.lanes[0].end.saturating_sub(active.lanes[0].next);
         let fair = (left / (2 * self.settings.threads as u64)).max(1);
         let timed = match active.seconds_per_pass {
             Some(seconds) => (BLOCK_SECONDS / seconds.max(1e-9)) as u64,
@@ -413,14 +447,15 @@ impl Pool<'_> {
         };
         let keep_level = batch_level(count);
         // Where a state goes too far or too coarsely, its passes run again.
-        let mut done = checkpoint::load_passes(&path, identity, keep_level)
-            .filter(|block| block.next_pass() <= count)
-            .unwrap_or_else(|| Block::empty(0, keep_level));
+        let PassRange { start: from, end } = passes.part.unwrap_or(PassRange { start: 0, end: count });
+        let mut done = checkpoint::load_passes(&path, identity, from, keep_level)
+            .filter(|block| block.next_pass() <= end)
+            .unwrap_or_else(|| Block::empty(from, keep_level));
         let start = Start { claims: self.claims(earlier.as_ref()), budget, passes: count };
         let next = done.next_pass();
-        done.tally.processes += u64::from(next < count);
-        sender.send(Message::Begin { job: index, start, done: Box::new(done) }).ok()?;
-        Some(Lane { job: index, passes: count, next })
+        done.tally.processes += u64::from(next < end);
+        sender.send(Message::Begin { job: index, start, done: Box::new(done), end }).ok()?;
+        Some(Lane { job: index, passes: count, next, end })
     }
 }
 
@@ -437,6 +472,8 @@ struct Collector<'a> {
 struct UnderWay {
     start: Start,
     done: Block,
+    /// The pass after its last.
+    end: u64,
     /// Passes that the state on disk holds.
     on_disk: u64,
     /// Blocks that came before their turn, by first pass.
@@ -452,12 +489,28 @@ impl<'a> Collector<'a> {
 
     fn collect(mut self, receiver: mpsc::Receiver<Message>) -> Result<Vec<Completed>> {
         // Owned: where this returns early, waiting senders fail instead of blocking for ever.
-        for message in receiver {
+        let (mut stopped, mut is_kept) = (None, false);
+        loop {
+            if self.settings.interrupt.raised() && !is_kept {
+                let stopped = stopped.get_or_insert_with(Instant::now);
+                // A pass or a set-up under way may take long, and is lost anyway.
+                if stopped.elapsed() > PATIENCE {
+                    self.save_all()?;
+                    self.settings.interrupt.kept(self.what_is_kept());
+                    is_kept = true;
+                }
+            }
+            let message = match receiver.recv_timeout(LOOK) {
+                Ok(message) => message,
+                Err(RecvTimeoutError::Timeout) => continue,
+                Err(RecvTimeoutError::Disconnected) => break,
+            };
             let job = match message {
-                Message::Begin { job, start, done } => {
+                Message::Begin { job, start, done, end } => {
                     let (early, saved) = (BTreeMap::new(), Instant::now());
                     let on_disk = done.next_pass();
-                    self.under_way.insert(job, UnderWay { start, done: *done, on_disk, early, saved });
+                    self.under_way
+                        .insert(job, UnderWay { start, done: *done, end, on_disk, early, saved });
                     job
                 }
                 Message::Block { job, block } => {
@@ -489,16 +542,24 @@ impl<'a> Collector<'a> {
             slow.iter().chain(&gone).for_each(|what| self.settings.progress.say(what));
             return Ok(self.completed.into_values().collect());
         }
-        for (&job, running) in &self.under_way {
-            self.save(job, running)?;
-        }
-        let done = self.completed.len();
-        Err(Error::Interrupted(format!(
-            "{done} of {} measurements are complete and the passes done of the others are kept in {}; the \
-             same command resumes from there",
+        self.save_all()?;
+        Err(Error::Interrupted(self.what_is_kept()))
+    }
+
+    /// Saves the states of all jobs under way.
+    fn save_all(&self) -> Result<()> {
+        self.under_way.iter().try_for_each(|(&job, running)| self.save(job, running))
+    }
+
+    /// For the person who has stopped the run.
+    fn what_is_kept(&self) -> String {
+        format!(
+            "{} of {} measurements are complete and the passes done of the others are kept in {}; the same \
+             command resumes from there",
+            self.completed.len(),
             self.jobs.len(),
             self.settings.root.display()
-        )))
+        )
     }
 
     /// Takes a block; true where passes were appended, of this block or of others that waited for it.
@@ -518,7 +579,7 @@ impl<'a> Collector<'a> {
     }
 
     fn close_if_done(&mut self, job: usize) -> Result<()> {
-        if self.under_way.get(&job).is_some_and(|r| r.done.next_pass() == r.start.passes)
+        if self.under_way.get(&job).is_some_and(|r| r.done.next_pass() == r.end)
             && let Some(running) = self.under_way.remove(&job)
         {
             if running.done.next_pass() > running.on_disk {
@@ -544,7 +605,10 @@ impl<'a> Collector<'a> {
         if let Some(gone) = self.settings.show.and_then(|show| show.live.complaint()) {
             self.settings.progress.say(&gone);
         }
-        let share = |r: &UnderWay| r.done.next_pass() as f64 / r.start.passes as f64;
+        let share = |r: &UnderWay| {
+            let from = r.done.moments.start();
+            (r.done.next_pass() - from) as f64 / (r.end - from).max(1) as f64
+        };
         let under_way: f64 = self.under_way.values().map(share).sum();
         let message = match self.under_way.get(&job) {
             Some(running) => format!("{}: {} passes", self.jobs[job].label, running.start.passes),
@@ -566,7 +630,7 @@ mod tests {
 
     #[test]
     fn rivals_run_in_an_order_that_cancels_drift() {
-        let lane = |job| Lane { job, passes: 300, next: 0 };
+        let lane = |job| Lane { job, passes: 300, next: 0, end: 300 };
         let lanes = [lane(3), lane(5), lane(8)];
         let (spans, is_whole) = order(&lanes, 8, 8);
         assert!(is_whole);
@@ -585,7 +649,10 @@ mod tests {
 
     #[test]
     fn arms_of_different_lengths_run_the_same_part() {
-        let lanes = [Lane { job: 0, passes: 300, next: 0 }, Lane { job: 1, passes: 1000, next: 0 }];
+        let lanes = [
+            Lane { job: 0, passes: 300, next: 0, end: 300 },
+            Lane { job: 1, passes: 1000, next: 0, end: 1000 },
+        ];
         let turns: Vec<_> = (0..250).flat_map(|i| order(&lanes, 4 * i, 4).0).collect();
         for (job, passes) in [(0, 300), (1, 1000)] {
             let mut own: Vec<(u64, u64)> =
@@ -599,7 +666,7 @@ mod tests {
 
     #[test]
     fn what_was_run_is_not_run_again() {
-        let lane = |job, next| Lane { job, passes: 300, next };
+        let lane = |job, next| Lane { job, passes: 300, next, end: 300 };
         let lanes = [lane(0, 10), lane(1, 16)];
         assert_eq!(done_everywhere(&lanes), 8);
         assert_eq!(order(&lanes, 0, 8), (vec![], false));

@@ -1,5 +1,7 @@
 //! Rules of lists of named entries and of `pair`.
 
+use std::collections::BTreeSet;
+
 use super::At;
 use super::claims::{Known, filter, names as estimators};
 use crate::experiment::document::Node;
@@ -18,15 +20,29 @@ pub(crate) fn experiment_name(at: At, name: &str) {
             "take letters, digits, `-` and `_` only, the first of them a letter or a digit",
         );
     }
+    is_short(at, name);
+}
+
+/// Longest name, bytes: file systems take 255, of which what surrounds a name in a file's name needs some.
+const LONGEST_NAME: usize = 128;
+
+/// Files carry the name.
+fn is_short(at: At, name: &str) {
+    if name.len() > LONGEST_NAME {
+        at.report_help(
+            format!("the name has {} bytes, and at most {LONGEST_NAME} are possible", name.len()),
+            "files carry the name; a `description` may be as long as you like",
+        );
+    }
 }
 
 /// The names of a list's entries are unique and of printable signs; `what` they are, in words:
 /// `estimators`.
 pub(crate) fn names(at: At, entries: &Node, what: &str) {
-    let mut seen = Vec::new();
+    let mut seen = BTreeSet::new();
     for (i, entry) in entries.items().iter().enumerate() {
         let Some(name) = entry.get("name").and_then(Node::as_str) else { continue };
-        if seen.contains(&name) {
+        if !seen.insert(name) {
             at.item(i).to("name").report(format!("two {what} are named `{name}`"));
         }
         if let Some(sign) = name.chars().find(|c| "/\\".contains(*c) || c.is_control()) {
@@ -35,7 +51,7 @@ pub(crate) fn names(at: At, entries: &Node, what: &str) {
                 "pictures and tables carry the name: leave out `/`, `\\` and control characters",
             );
         }
-        seen.push(name);
+        is_short(at.item(i).to("name"), name);
     }
 }
 

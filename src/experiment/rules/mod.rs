@@ -1,6 +1,7 @@
 //! What the schema cannot express: rules between values, each with the place of the offending key.
 
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 
 use serde::de::DeserializeOwned;
 
@@ -31,14 +32,19 @@ pub(super) use sensor::sensor;
 
 /// Where the rules put their findings; a finding that is already there is not repeated.
 #[derive(Default)]
-pub(crate) struct Findings(RefCell<Vec<Diagnostic>>);
+pub(crate) struct Findings {
+    list: RefCell<Vec<Diagnostic>>,
+    /// Rule and first byte of each, of which a generated file may have thousands.
+    known: RefCell<BTreeSet<(String, usize)>>,
+}
 
 impl Findings {
     /// Adds a finding unless it is already there.
     pub(crate) fn add(&self, finding: Diagnostic) {
-        let mut findings = self.0.borrow_mut();
-        if !findings.contains(&finding) {
-            findings.push(finding);
+        let start = finding.place.as_ref().map_or(0, |place| place.span.start);
+        let mut list = self.list.borrow_mut();
+        if self.known.borrow_mut().insert((finding.rule.clone(), start)) || !list.contains(&finding) {
+            list.push(finding);
         }
     }
 
@@ -49,7 +55,7 @@ impl Findings {
 
     /// Everything found, in the order of the text.
     pub(crate) fn into_sorted(self) -> Vec<Diagnostic> {
-        let mut findings = self.0.into_inner();
+        let mut findings = self.list.into_inner();
         findings.sort_by_key(|f| f.place.as_ref().map(|p| (p.name.to_string(), p.span.start)));
         findings
     }

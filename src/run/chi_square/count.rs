@@ -4,6 +4,7 @@
 //! integers, and the moments of contrasts are merged by the fixed tree over chunks.
 
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::Builder;
 
 use super::bins::{Extra, Partition};
 use crate::results::sampler::OWN_DENSITY;
@@ -123,7 +124,9 @@ impl Counting<'_> {
                 }
             };
             let parts = std::thread::scope(|scope| {
-                let others: Vec<_> = (1..threads).map(|_| scope.spawn(worker)).collect();
+                // A thread that the system refuses is done without: results do not depend on their number.
+                let spawn = |_| Builder::new().spawn_scoped(scope, worker).ok();
+                let others: Vec<_> = (1..threads).filter_map(spawn).collect();
                 let mut parts = vec![worker()];
                 for other in others {
                     match other.join() {
