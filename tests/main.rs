@@ -4,6 +4,7 @@
 #![allow(clippy::disallowed_methods)]
 
 mod browser;
+mod checks;
 mod cli;
 mod damage;
 mod docs;

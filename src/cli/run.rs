@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::output::{say, unwritable};
-use super::{Reading, Working, listen};
+use super::{Reading, Working, experiment_files, listen};
 use crate::error::Result;
 use crate::experiment::load;
 use crate::experiment::registry::Registry;
@@ -20,8 +20,8 @@ use crate::run::tev::Address;
 /// An interrupted run resumes where it stopped; a complete run is not repeated.
 #[derive(clap::Args, Debug)]
 pub(super) struct Args {
-    /// Experiment files.
-    #[arg(required = true, value_name = "FILE")]
+    /// Experiment files, or folders of them.
+    #[arg(required = true, value_name = "FILE or DIR")]
     files: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
@@ -46,7 +46,15 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
     let mut options = args.working.options();
     options.passes_of = args.passes_of.clone();
     let read = |file: &PathBuf| load(file, &args.reading.options(), registry);
-    let experiments = args.files.iter().map(read).collect::<Result<Vec<_>>>()?;
+    let experiments = experiment_files(&args.files)?.iter().map(read).collect::<Result<Vec<_>>>()?;
+    if !args.working.replace {
+        experiments.iter().try_for_each(|e| crate::run::refuse_to_replace(e, &options.out))?;
+    }
+    if let [_, _, ..] = experiments[..] {
+        experiments
+            .iter()
+            .try_for_each(|experiment| crate::run::plan(experiment, registry).map(drop))?;
+    }
     if let Some(address) = &args.tev {
         match Live::connect(address) {
             Ok(live) => options.live = Some(Arc::new(live)),

@@ -50,35 +50,67 @@ impl<'a> Builder<'a> {
         self.shapes.values().map(|shape| shape.building_bytes()).max().unwrap_or(0)
     }
 
-    /// The scene of one cell.
+    /// The scene of the cell `index`.
     ///
     /// # Errors
-    /// A mesh or map that cannot be used, a sensor inside the body, a vertex outside.
-    pub(crate) fn scene(&mut self, cell: &CellSpec) -> Result<Scene> {
-        let shape = self.shape(&cell.object.shape)?;
-        let boundary = self.boundary(&cell.object.boundary)?;
-        let medium = cell.object.medium.per_band(&self.experiment.file.band_list());
-        let medium = medium.ok_or_else(|| Error::input("the medium has no coefficients"))?;
+    /// A mesh or map that cannot be used, a sensor inside the body, a vertex outside, a sensor that does
+    /// not see the body; each at its place in the file.
+    pub(crate) fn scene(&mut self, index: usize) -> Result<Scene> {
+        let experiment = self.experiment;
+        let cell = &experiment.cells[index];
+        let place = |key: &str| experiment.sources.place(index, key);
+        let shape = match &cell.object.shape {
+            words @ ShapeEntry::Mesh { .. } => {
+                self.shape(words).map_err(|error| error.at(place("object.shape.mesh.path")))?
+            }
+            words => self.shape(words).map_err(|error| error.at(place("object.shape")))?,
+        };
+        let boundary = self.boundary(&cell.object.boundary);
+        let boundary = boundary.map_err(|error| error.at(place("object.boundary")))?;
+        let medium = cell.object.medium.per_band(&experiment.file.band_list());
+        let no_medium = || Error::input("the medium has no coefficients").at(place("object.medium"));
+        let medium = medium.ok_or_else(no_medium)?;
         let emission = cell.object.medium.emission(medium.len());
         let medium = medium
             .iter()
             .zip(emission)
             .map(|(m, emission)| Medium { emission, ..Medium::new(m.sigma_a, m.sigma_s, m.g) });
         let medium = medium.collect();
-        let lights = cell.light.iter().enumerate();
-        let lights = lights.map(|(i, entry)| self.light(i, entry)).collect::<Result<Vec<Light>>>()?;
-        let sensor = cell.sensor.build(&shape)?;
+        let light = |(i, entry): (usize, &LightEntry)| {
+            let key = match entry.environment {
+                Some(_) => format!("light.{i}.environment.map"),
+                None => format!("light.{i}"),
+            };
+            self.light(i, entry).map_err(|error| error.at(place(&key)))
+        };
+        let lights = cell.light.iter().enumerate().map(light).collect::<Result<Vec<Light>>>()?;
+        let at_sensor = |error: Error| error.at(cell.sensor.key_of_position().and_then(place));
+        let sensor = cell.sensor.build(&shape).map_err(|error| error.at(place("sensor")))?;
         match sensor.position() {
-            Some((point, Side::Outside)) if shape.covers(point) => Err(Error::input_help(
-                format!("the sensor at {point} mm is inside or on the body (cell `{}`)", cell.label),
-                "move it outside",
-            )),
-            Some((point, Side::Inside)) if !shape.contains(point) => Err(Error::input_help(
-                format!("the vertex at {point} mm is not inside the body (cell `{}`)", cell.label),
-                "move it inside",
-            )),
-            _ => Ok(Scene { shape, boundary, medium, lights, sensor }),
+            Some((point, Side::Outside)) if shape.covers(point) => {
+                return Err(at_sensor(Error::input_help(
+                    format!("the sensor at {point} mm is inside or on the body"),
+                    format!("move it outside; {}", extent(&shape)),
+                )));
+            }
+            Some((point, Side::Inside)) if !shape.contains(point) => {
+                return Err(at_sensor(Error::input_help(
+                    format!("the vertex at {point} mm is not inside the body"),
+                    format!("move it inside; {}", extent(&shape)),
+                )));
+            }
+            _ => {}
         }
+        let scene = Scene { shape, boundary, medium, lights, sensor };
+        if !scene.is_seen() {
+            let what = match scene.sensor.pixels() {
+                Some(_) => "no ray of any pixel meets the body: every pixel would be 0",
+                None => "the ray passes the body by: the probe would measure 0",
+            };
+            let help = format!("aim the sensor at the body; {}", extent(&scene.shape));
+            return Err(Error::input_help(what, help).at(place("sensor")));
+        }
+        Ok(scene)
     }
 
     fn boundary(&self, words: &BoundaryEntry) -> Result<Vec<Boundary>> {
@@ -150,7 +182,13 @@ impl<'a> Builder<'a> {
         if let Some(map) = self.maps.get(&name) {
             return Ok(Arc::clone(map));
         }
-        let map = Arc::new(self.read_map(path, &read_exr(path)?, scale)?);
+        let image = read_exr(path).map_err(|error| {
+            error.of_input(
+                "a map is a latitude-longitude OpenEXR image; its path is relative to the folder of the \
+                 experiment file, and `~` has no meaning in it",
+            )
+        })?;
+        let map = Arc::new(self.read_map(path, &image, scale)?);
         self.maps.insert(name, Arc::clone(&map));
         Ok(map)
     }
@@ -213,6 +251,26 @@ pub(crate) fn bands(words: &schema::BandsEntry) -> Vec<Band> {
         display_rgb,
     };
     words.list().into_iter().zip(words.display_rgb()).map(band).collect()
+}
+
+/// Where a body is, in words.
+fn extent(shape: &Shape) -> String {
+    match (shape, shape.bounds()) {
+        (_, Some(bounds)) => {
+            format!(
+                "it lies in the sphere of radius {} mm about {} mm",
+                short(bounds.radius),
+                bounds.center
+            )
+        }
+        (Shape::Slab { thickness }, None) => format!("it lies between z = -{thickness} and z = 0 mm"),
+        (_, None) => "it lies below z = 0".into(),
+    }
+}
+
+/// A length to four digits, for messages.
+fn short(length: f64) -> f64 {
+    format!("{length:.3e}").parse().unwrap_or(length)
 }
 
 fn build_shape(words: &ShapeEntry, experiment: &Experiment) -> Result<Shape> {

@@ -13,7 +13,7 @@ use super::schema_json::json_schema;
 use super::sweep::{self, AxisPoint, SweepAxis};
 use super::validate::SchemaWalk;
 use super::validate::grammar::Grammar;
-use super::{Axis, CellSpec, Experiment, LoadOptions, origins, overrides, resolved};
+use super::{Axis, CellSpec, Experiment, LoadOptions, Sources, origins, overrides, resolved};
 use crate::error::{Diagnostic, Error, Place, Result};
 
 /// Reads, overrides and validates the experiment in `text`, which was read from `path`.
@@ -100,8 +100,9 @@ impl Loader<'_> {
                 file.sweep = resolved::sweep(&axes);
                 file.setting.clear();
                 let origins = origins::list(&first, &file);
-                let axes = axes.iter().map(Axis::from).collect();
-                Ok(Experiment { path: self.path.to_path_buf(), file, cells, axes, settings, origins })
+                let (names, path) = (axes.iter().map(Axis::from).collect(), self.path.to_path_buf());
+                let sources = Sources::new(self.root, axes);
+                Ok(Experiment { path, file, cells, axes: names, settings, origins, sources })
             }
             (findings, ..) => Err(refusal(findings)),
         }

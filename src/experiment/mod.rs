@@ -13,6 +13,9 @@ pub(crate) mod build;
 /// Claims as they are written.
 mod claim_words;
 
+/// Kinds described by the schema.
+pub(crate) mod describe;
+
 /// Directions as they are written.
 mod direction;
 
@@ -55,6 +58,9 @@ pub(crate) mod schema_json;
 /// Sensors as they are written.
 mod sensor;
 
+/// Where values were written.
+mod sources;
+
 /// Suggestions of similar names ("did you mean").
 pub(crate) mod suggest;
 
@@ -74,12 +80,13 @@ pub(crate) mod validate;
 pub(crate) mod tests;
 
 pub use registry::Registry;
+pub(crate) use sources::Sources;
 pub(crate) use sweep::resolve_path;
 
 use schema::{ExperimentFile, LightEntry, Object, SensorEntry};
 
 /// A validated experiment.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Experiment {
     /// The file that it was read from.
     pub path: PathBuf,
@@ -96,6 +103,8 @@ pub struct Experiment {
     /// Dotted key, value and origin of everything in the first cell, sorted by key; an origin is a
     /// place, `--set ...`, or `default`.
     pub origins: Vec<(String, String, String)>,
+    /// Where values were written.
+    pub(crate) sources: Sources,
 }
 
 /// An axis of the sweep.

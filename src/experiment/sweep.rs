@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::document::{InputKind, Node, Value};
-use super::overrides::{is_within, overlap, relabel};
+use super::overrides::{indexed, is_within, overlap, relabel};
 use super::rules::{CELL_KEYS, Findings};
 use super::suggest;
 use super::sweep_csv;
@@ -28,14 +28,14 @@ pub(crate) fn axes(
     findings: &Findings,
 ) -> Option<Vec<SweepAxis>> {
     let entries = root.get("sweep").map(Node::items).unwrap_or_default();
-    let read = entries.iter().map(|entry| axis(entry, experiment, findings));
+    let read = entries.iter().map(|entry| by_index(root, axis(entry, experiment, findings)?, findings));
     let axes: Vec<Option<SweepAxis>> = read.collect();
     let axes: Option<Vec<SweepAxis>> = axes.into_iter().collect();
     let axes = axes?;
     let sound = [
         unique_axes(&axes, entries, findings),
         keys_apart(&axes, findings),
-        not_overridden(&axes, overridden, findings),
+        not_overridden(root, &axes, overridden, findings),
         few_cells(&axes, entries, findings),
     ];
     sound.iter().all(|ok| *ok).then_some(axes)
@@ -68,6 +68,21 @@ fn axis(entry: &Node, experiment: &Path, findings: &Findings) -> Option<SweepAxi
     }
     let known_keys = cell_keys_only(&points, findings);
     (unique_labels(&points, findings) && known_keys).then_some(SweepAxis { name, points })
+}
+
+/// Keys that name a light or an estimator, by its index.
+fn by_index(root: &Node, mut axis: SweepAxis, findings: &Findings) -> Option<SweepAxis> {
+    let mut sound = true;
+    for (key, value) in axis.points.iter_mut().flat_map(|point| &mut point.sets) {
+        match indexed(root, key) {
+            Ok(by_index) => *key = by_index,
+            Err((rule, help)) => {
+                sound = false;
+                findings.at(value.key.as_ref().unwrap_or(&value.origin.place), rule, help);
+            }
+        }
+    }
+    sound.then_some(axis)
 }
 
 enum AxisForm {
@@ -213,7 +228,12 @@ fn keys_apart(axes: &[SweepAxis], findings: &Findings) -> bool {
     sound
 }
 
-fn not_overridden(axes: &[SweepAxis], overridden: &[(String, Place)], findings: &Findings) -> bool {
+fn not_overridden(
+    root: &Node,
+    axes: &[SweepAxis],
+    overridden: &[(String, Place)],
+    findings: &Findings,
+) -> bool {
     let swept: Vec<(&str, &str)> = axes
         .iter()
         .filter_map(|axis| Some((axis, axis.points.first()?)))
@@ -221,6 +241,7 @@ fn not_overridden(axes: &[SweepAxis], overridden: &[(String, Place)], findings: 
         .collect();
     let mut sound = true;
     for (key, place) in overridden {
+        let key = &indexed(root, key).unwrap_or_else(|_| key.clone());
         if let Some((axis, _)) = swept.iter().find(|(_, swept)| is_within(key, swept)) {
             sound = false;
             let rule = format!("`{key}` has no effect: the sweep `{axis}` sets it in every cell");

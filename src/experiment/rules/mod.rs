@@ -20,8 +20,8 @@ mod sensor;
 pub(super) use bands::bands;
 pub(super) use claims::{Known, claim};
 pub(super) use entries::{
-    CELL_KEYS, ExperimentParts, SAMPLER_KEYS, SCENE_KEYS, budget_share, experiment_name, names, pair,
-    parts,
+    CELL_KEYS, ExperimentParts, SAMPLER_KEYS, SCENE_KEYS, SWEPT_KEYS, budget_share, experiment_name,
+    names, pair, parts,
 };
 pub(super) use invariants::{CellPoint, mean_path_length};
 pub(super) use lights::lights;

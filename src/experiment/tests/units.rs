@@ -16,7 +16,7 @@ const LIGHT: &str = "directional = { toward = [1, 1, 1], irradiance = 1.0 }";
 fn scene(old: &str, new: &str) -> Scene {
     assert!(GOOD.contains(old));
     let experiment = good(&GOOD.replace(old, new));
-    Builder::new(&experiment).scene(&experiment.cells[0]).unwrap_or_else(|error| panic!("{error}"))
+    Builder::new(&experiment).scene(0).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Irradiance of band 1 on a plane with this normal, int L(w) cos dw: midpoints in cosine and azimuth.

@@ -124,16 +124,47 @@ impl<'a> SchemaWalk<'a> {
     fn wrong_type(&mut self, node: &Node, schema: &Json) {
         let types: Vec<&str> =
             self.types(schema).into_iter().filter(|t| *t != "null").map(article).collect();
-        let rule = format!("expected {}, found {}", suggest::join(&types, "or"), found(node));
-        let doc = grammar::doc(schema);
-        self.report(node.place(), rule, (!doc.is_empty()).then(|| doc.to_string()));
+        let mut rule = format!("expected {}, found {}", suggest::join(&types, "or"), found(node));
+        let mut help = Some(grammar::doc(schema).to_string()).filter(|doc| !doc.is_empty());
+        match (&node.value, types[..].contains(&"an integer")) {
+            (Value::Float(number), true) if number.fract() == 0.0 && number.abs() < 1e15 => {
+                rule = format!("expected an integer, found `{}`", node.origin.place.text());
+                help = Some(format!("write {number}: an integer has neither a point nor an exponent"));
+            }
+            (Value::Table(_), _) if types == ["an array"] && self.holds_tables(schema) => {
+                let key = node.key.as_ref().map_or("entry", |key| key.text());
+                let of = if node.inline {
+                    format!(
+                        "write `[[{key}]]` and its keys below it, or put the table in an array: `[{{ ... }}]`"
+                    )
+                } else {
+                    format!("write `[[{key}]]`, with two brackets")
+                };
+                help = Some(help.map_or(of.clone(), |doc| format!("{of}. {doc}")));
+            }
+            _ => {}
+        }
+        self.report(node.place(), rule, help);
+    }
+
+    /// Whether an array is one of tables.
+    fn holds_tables(&self, schema: &Json) -> bool {
+        schema.get("items").is_some_and(|items| self.types(items).contains(&"object"))
     }
 
     fn missing(&mut self, node: &Node, key: &str, path: &str) {
         let path = join_path(path, key);
         let words: Vec<&str> = path.split('.').collect();
-        let doc = self.grammar.at(&words).map(grammar::doc).filter(|doc| !doc.is_empty());
-        let help = doc.map(|doc| format!("`{key}`: {doc}"));
+        let schema = self.grammar.at(&words);
+        let doc = schema.map(grammar::doc).filter(|doc| !doc.is_empty());
+        let kinds = match schema.map(|schema| self.grammar.form(schema)) {
+            Some(SchemaForm::Variants(variants)) => variants.iter().map(|v| v.name).collect(),
+            _ => Vec::new(),
+        };
+        let help = doc.map(|doc| match kinds.is_empty() {
+            true => format!("`{key}`: {doc}"),
+            false => format!("`{key}`: {doc} One of {}", suggest::quoted(&kinds)),
+        });
         self.report(node.place(), format!("missing key `{path}`"), help);
     }
 
