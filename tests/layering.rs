@@ -25,16 +25,18 @@ const LESS: [(&str, &str); 9] = [
 ];
 
 /// The modules that may name a crate. Options are deserialised, and described, where they are used.
-const DOORS: [(&str, &str); 21] = [
+const DOORS: [(&str, &str); 23] = [
     ("annotate_snippets", "error"),
     ("glam", "math"),
     ("libm", "math"),
     ("rand_pcg", "sampling"),
     ("obvhs", "geometry"),
     ("tobj", "geometry"),
+    ("ply_rs_bw", "geometry"),
     ("statrs", "stats"),
     ("blake3", "results"),
     ("exr", "results"),
+    ("image", "results"),
     ("png", "results"),
     ("csv", "results experiment"),
     ("schemars", "sampling optics geometry samplers estimators results experiment"),

@@ -13,6 +13,7 @@ mod interruption;
 mod judging;
 mod layering;
 mod looks;
+mod own_data;
 mod pictures;
 mod planted;
 mod published;

@@ -61,6 +61,9 @@ mod sensor;
 /// Where values were written.
 mod sources;
 
+/// Spectra from CSV files.
+mod spectrum_csv;
+
 /// Suggestions of similar names ("did you mean").
 pub(crate) mod suggest;
 
@@ -83,7 +86,7 @@ pub use registry::Registry;
 pub(crate) use sources::Sources;
 pub(crate) use sweep::resolve_path;
 
-use schema::{ExperimentFile, LightEntry, Object, SensorEntry};
+use schema::{Budget, EstimatorEntry, ExperimentFile, LightEntry, Object, SensorEntry};
 
 /// A validated experiment.
 #[derive(Clone, Debug)]
@@ -129,6 +132,10 @@ pub struct CellSpec {
     pub sensor: SensorEntry,
     /// Lights of the cell.
     pub light: Vec<LightEntry>,
+    /// The estimators of the cell, where the sweep sets options of one.
+    pub estimator: Option<Vec<EstimatorEntry>>,
+    /// The budget of the cell, where the sweep sets it.
+    pub budget: Option<Budget>,
     /// The columns of the rows that the cell took, as texts; where two axes have a column of one
     /// name, that of the first.
     pub csv_row: BTreeMap<String, String>,
@@ -159,6 +166,14 @@ pub fn load(path: &Path, options: &LoadOptions, registry: &Registry) -> Result<E
         )
     })?;
     load::load_text(path, &text, options, registry)
+}
+
+impl Experiment {
+    /// The estimator `entry` as the cell `cell` runs it.
+    pub(crate) fn estimator(&self, cell: usize, entry: usize) -> &EstimatorEntry {
+        let own = self.cells.get(cell).and_then(|cell| cell.estimator.as_ref());
+        own.and_then(|list| list.get(entry)).unwrap_or(&self.file.estimator[entry])
+    }
 }
 
 impl From<&sweep::SweepAxis> for Axis {

@@ -4,14 +4,16 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::registry::Registry;
-use super::rules::{SAMPLER_KEYS, SCENE_KEYS, SWEPT_KEYS};
+use super::rules::{CELL_KEYS, SAMPLER_KEYS, SCENE_KEYS};
 use super::schema::ExperimentFile;
+use super::spectrum_csv;
 
 /// The JSON Schema (2020-12) of an experiment file whose estimators and samplers are those of
 /// `registry`, as validation walks it.
 pub(crate) fn json_schema(registry: &Registry) -> Json {
     let mut schema = schemars::schema_for!(ExperimentFile).to_value();
     schema["title"] = json!("scatterproof experiment");
+    spectrum_csv::extend_schema(&mut schema);
     let estimators = registry.estimators.iter().map(|entry| (entry.kind, entry.doc, entry.options()));
     inject("EstimatorEntry", "", estimators.collect(), &mut schema);
     let samplers = registry.samplers.iter().map(|entry| (entry.kind, entry.doc, entry.options()));
@@ -28,10 +30,10 @@ pub(crate) fn editor_schema(registry: &Registry) -> Json {
     };
     // A medium that emits needs no light.
     let scene = without(&SCENE_KEYS, &["light"]);
-    let swept = without(&scene, &SWEPT_KEYS);
+    let swept = without(&scene, &CELL_KEYS);
     let strict: Map<String, Json> =
-        SWEPT_KEYS.iter().map(|key| (key.to_string(), schema["properties"][key].clone())).collect();
-    for key in SWEPT_KEYS {
+        CELL_KEYS.iter().map(|key| (key.to_string(), schema["properties"][key].clone())).collect();
+    for key in CELL_KEYS {
         let mut names = Vec::new();
         schema["properties"][key] = relaxed(&schema["properties"][key], &mut names);
         while let Some(name) = names.pop() {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::document::{InputKind, Node, Value};
 use super::overrides::{indexed, is_within, overlap, relabel};
-use super::rules::{CELL_KEYS, Findings};
+use super::rules::{CELL_KEYS, Findings, RUN_KEYS};
 use super::suggest;
 use super::sweep_csv;
 pub(crate) use super::sweep_point::{AxisPoint, RowField, SweepAxis};
@@ -75,7 +75,13 @@ fn by_index(root: &Node, mut axis: SweepAxis, findings: &Findings) -> Option<Swe
     let mut sound = true;
     for (key, value) in axis.points.iter_mut().flat_map(|point| &mut point.sets) {
         match indexed(root, key) {
-            Ok(by_index) => *key = by_index,
+            Ok(by_index) => {
+                *key = by_index;
+                if let Some((rule, help)) = other_estimator(root, key) {
+                    sound = false;
+                    findings.at(value.key.as_ref().unwrap_or(&value.origin.place), rule, Some(help));
+                }
+            }
             Err((rule, help)) => {
                 sound = false;
                 findings.at(value.key.as_ref().unwrap_or(&value.origin.place), rule, help);
@@ -83,6 +89,30 @@ fn by_index(root: &Node, mut axis: SweepAxis, findings: &Findings) -> Option<Swe
         }
     }
     sound.then_some(axis)
+}
+
+/// Why a key cannot be swept that is about an estimator: a sweep changes its options and neither its name
+/// nor its kind, by which claims and tables know it.
+fn other_estimator(root: &Node, key: &str) -> Option<(String, String)> {
+    let words: Vec<&str> = key.split('.').collect();
+    let ["estimator", rest @ ..] = &words[..] else { return None };
+    let entry = rest.first().and_then(|index| root.at(&["estimator", index]))?;
+    let is_kind = |word: &&&str| **word != "name" && entry.get(word).is_some();
+    if rest.get(1).filter(is_kind).is_some() {
+        return None;
+    }
+    let name = entry.get("name").and_then(Node::as_str).unwrap_or_default();
+    let kind = match &entry.value {
+        Value::Table(entries) => entries.keys().find(|key| *key != "name").cloned(),
+        _ => None,
+    };
+    let kind = kind.unwrap_or_else(|| "KIND".into());
+    Some((
+        format!("`{key}` cannot be swept: a sweep changes options of an estimator"),
+        format!(
+            "an option of `{name}` is `estimator.{name}.{kind}.OPTION` (`scatterproof list {kind}`)"
+        ),
+    ))
 }
 
 enum AxisForm {
@@ -184,11 +214,13 @@ fn unique_labels(points: &[AxisPoint], findings: &Findings) -> bool {
 
 fn cell_keys_only(points: &[AxisPoint], findings: &Findings) -> bool {
     let sets = points.first().map(|point| &point.sets[..]).unwrap_or_default();
-    let is_foreign = |key: &str| !key.split('.').next().is_some_and(|word| CELL_KEYS.contains(&word));
+    let known = |word: &str| CELL_KEYS.contains(&word) || RUN_KEYS.contains(&word);
+    let is_foreign = |key: &str| !key.split('.').next().is_some_and(known);
     let foreign: Vec<_> = sets.iter().filter(|(key, _)| is_foreign(key)).collect();
     for (key, value) in &foreign {
         let place = value.key.as_ref().unwrap_or(&value.origin.place);
-        let help = "a sweep sets keys that begin with `object`, `sensor` or `light`";
+        let help =
+            "a sweep sets keys that begin with `object`, `sensor`, `light`, `estimator` or `budget`";
         findings.at(place, format!("`{key}` cannot be swept"), Some(help.into()));
     }
     foreign.is_empty()

@@ -10,6 +10,7 @@ use super::chi_square::Draws;
 use super::clock::thread_cpu_time;
 use super::keys::Stage;
 use crate::estimators::{Anomaly, BandUse, Cost, Estimator, Layout, Scores};
+use crate::experiment::schema::Budget;
 use crate::sampling::stream::StreamKey;
 use crate::stats::moments::{ImageMoments, Moments};
 use crate::stats::tree::{Counter, Merge};
@@ -121,6 +122,9 @@ pub(crate) struct BudgetTerms {
     pub targets: Vec<usize>,
     /// Part of the budget's passes or seconds.
     pub share: f64,
+    /// The budget itself, where the sweep sets one for the cell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<Budget>,
 }
 
 /// Bands that one call runs together.

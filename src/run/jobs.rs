@@ -91,7 +91,7 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
             }
             let targets = targets(index, &words.name, &comparisons, &observables[index]);
             let share = share(experiment, cell.spec, &words.name);
-            let terms = BudgetTerms { targets, share };
+            let terms = BudgetTerms { targets, share, budget: cell.spec.budget.clone() };
             for arm in arms.of(cell.spec, &words.name) {
                 let job = planner.passes(index, cell, entry, arm, terms.clone());
                 jobs.extend(refusals.keep(&cell.spec.label, job)?);
@@ -110,10 +110,13 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
         return Err(error.at(experiment.sources.place(0, "only_claimed")));
     }
     decidable::check(experiment, &comparisons, &jobs)?;
-    let passes = match experiment.file.budget {
-        Some(Budget::Passes(passes)) => Some(passes),
+    let budgets =
+        experiment.cells.iter().map(|cell| cell.budget.as_ref().or(experiment.file.budget.as_ref()));
+    let passes = budgets.map(|budget| match budget {
+        Some(Budget::Passes(passes)) => Some(*passes),
         _ => None,
-    };
+    });
+    let passes = passes.collect::<Option<Vec<u64>>>().and_then(|passes| passes.into_iter().max());
     let scene_bytes = [builder.memory_bytes(), builder.building_bytes()];
     Ok(Plan { jobs, comparisons, stage, scene_bytes, passes, bands })
 }
@@ -177,7 +180,7 @@ impl Planner<'_> {
         arm: Arm,
         terms: BudgetTerms,
     ) -> Result<Job> {
-        let words = &self.experiment.file.estimator[entry];
+        let words = self.experiment.estimator(index, entry);
         let no_kind = || Error::input(format!("estimator `{}` has no kind", words.name));
         let (kind, options) = words.choice().ok_or_else(no_kind)?;
         let unknown = || Error::input(format!("estimator `{}`: unknown kind `{kind}`", words.name));

@@ -20,7 +20,7 @@ mod sensor;
 pub(super) use bands::bands;
 pub(super) use claims::{Known, claim};
 pub(super) use entries::{
-    CELL_KEYS, ExperimentParts, SAMPLER_KEYS, SCENE_KEYS, SWEPT_KEYS, budget_share, experiment_name,
+    CELL_KEYS, ExperimentParts, RUN_KEYS, SAMPLER_KEYS, SCENE_KEYS, budget_share, experiment_name,
     names, pair, parts,
 };
 pub(super) use invariants::{CellPoint, mean_path_length};

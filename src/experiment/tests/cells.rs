@@ -37,7 +37,7 @@ fn set_replaces_leaves_variants_and_elements() {
 #[test]
 fn bad_overrides_are_refused_at_the_argument() {
     let message = set_error(&["object.shape.box.size_mm=[1, 1, 1]"]);
-    assert!(message.contains("only one kind may be given, found `box`, `sphere`"), "{message}");
+    assert!(message.contains("`object.shape` is `sphere` here: it has no `box.size_mm`"), "{message}");
     let message = set_error(&["object.shape.sphere.radius_mm=-1"]);
     assert!(message.contains("must be greater than 0, is -1"), "{message}");
     assert!(message.contains("--set:1:31"), "{message}");

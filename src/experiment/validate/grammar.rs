@@ -61,6 +61,11 @@ impl Grammar {
         if schema.get("type").is_none() { SchemaForm::Anything } else { SchemaForm::Plain(schema) }
     }
 
+    /// A definition of the schema by its name.
+    pub(crate) fn definition(&self, name: &str) -> Option<&Json> {
+        self.root["$defs"].get(name)
+    }
+
     /// The schema at a path of keys and indices, if the grammar knows it.
     pub(crate) fn at<'a>(&'a self, path: &[&str]) -> Option<&'a Json> {
         path.iter().try_fold(&self.root, |schema, word| self.step(schema, word))
