@@ -140,15 +140,34 @@ impl Error {
     }
 }
 
+impl Error {
+    /// As a terminal with colours shows it.
+    pub(crate) fn to_coloured(&self) -> String {
+        Told { error: self, renderer: &Renderer::styled() }.to_string()
+    }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
+        Told { error: self, renderer: &Renderer::plain() }.fmt(f)
+    }
+}
+
+/// An error in one style or another.
+struct Told<'a> {
+    error: &'a Error,
+    renderer: &'a Renderer,
+}
+
+impl fmt::Display for Told<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.error {
             Error::Input(findings) => {
                 for (i, finding) in findings.iter().enumerate() {
                     if i > 0 {
                         writeln!(f)?;
                     }
-                    write!(f, "{}", render(finding))?;
+                    write!(f, "{}", render(finding, self.renderer))?;
                 }
                 if findings.len() > 1 {
                     write!(f, "\n\n{} errors", findings.len())?;
@@ -212,7 +231,7 @@ impl Refusals {
     }
 }
 
-fn render(finding: &Diagnostic) -> String {
+fn render(finding: &Diagnostic, renderer: &Renderer) -> String {
     let Some(place) = &finding.place else {
         let help = finding.help.as_ref().map(|h| format!("\n  help: {h}")).unwrap_or_default();
         return format!("error: {}{help}", finding.rule);
@@ -226,5 +245,5 @@ fn render(finding: &Diagnostic) -> String {
         Some(help) => groups.push(title.element(Level::HELP.message(&**help))),
         None => groups.push(title),
     }
-    Renderer::plain().render(&groups).to_string()
+    renderer.render(&groups).to_string()
 }

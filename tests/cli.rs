@@ -123,7 +123,7 @@ fn meshes() {
         let work = with_mesh(mesh);
         refused(&work, &[&["body.obj", "help:"], words].concat());
     };
-    bad(None, &["could not read the mesh", "relative to the experiment file"]);
+    bad(None, &["could not read the mesh", "relative to the folder of the experiment file"]);
     bad(Some(&format!("{CORNERS}f 1 3 2\nf 1 2 4\nf 1 4 3\n")), &["3 boundary edges", "close the mesh"]);
     bad(Some(&format!("{CORNERS}{FACES}f 1 2 9\n")), &["out of bounds", "export it again"]);
     bad(Some(CORNERS), &["no triangles"]);
@@ -263,7 +263,7 @@ fn init_run_verify_report() {
     work.run("init").exits(2).complains("experiment.toml already exists").complains("name another file");
     work.run("init no/such/folder.toml").exits(3).complains("no/such/folder.toml");
     let ran = work.run("run experiment.toml --setting quick");
-    ran.exits(0).says("report: results/first-sphere/report.html").says("\n 1.1  path");
+    ran.exits(0).says("report: results/first-sphere/report.html").says("\neta = 1.1  path");
     ran.check(ran.stderr().is_empty(), "no bar where there is no terminal");
     ran.check(!ran.stdout().contains(['\u{1b}', '\r']), "no control characters");
 

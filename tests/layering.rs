@@ -25,7 +25,7 @@ const LESS: [(&str, &str); 9] = [
 ];
 
 /// The modules that may name a crate. Options are deserialised, and described, where they are used.
-const DOORS: [(&str, &str); 23] = [
+const DOORS: [(&str, &str); 24] = [
     ("annotate_snippets", "error"),
     ("glam", "math"),
     ("libm", "math"),
@@ -46,6 +46,7 @@ const DOORS: [(&str, &str); 23] = [
     ("rustix", "run"),
     ("signal_hook", "run"),
     ("clap", "cli"),
+    ("console", "cli"),
     ("clap_complete", "cli"),
     ("serde", "sampling optics geometry samplers estimators stats results verify report experiment run"),
     ("serde_json", "samplers estimators stats results verify report experiment run cli"),

@@ -95,7 +95,10 @@ fn skies_turn_and_get_wavelengths() {
     let one = |text: &str| {
         let light =
             "name = \"sun\"\ndirectional = { toward = [1, 0, 1], irradiance = 1.0 }\n[[light]]\n";
-        replaced(&replaced(text, light, ""), SENSOR, east)
+        // So dense that no light from behind comes through.
+        let dense = text.replace("sigma_t_per_mm = 2", "sigma_t_per_mm = 40");
+        let dense = dense.replace("[1, 2, 4], albedo = [0.9, 0.8, 0.7]", "40, albedo = 0.8");
+        replaced(&replaced(&dense, light, ""), SENSOR, east)
     };
     let measured = |text: &str, words: &str| -> Vec<f64> {
         let map = format!("map = \"sky.hdr\"{words}");
@@ -184,8 +187,7 @@ fn options_and_budgets_are_swept() {
         "[[sweep]]\nkey = \"estimator.miss.path.roulette.below\"\nvalues = [0.1, 0.9]\n",
         &["no `[[estimator]]` is named `miss`", "did you mean `estimator.mis`?"],
     );
-    refused(
-        "[[sweep]]\nkey = \"estimator.mis.path.roulette.below\"\nvalues = [0.1, 9]\n",
-        &["must be at most 1, is 9"],
-    );
+    let beyond = "[[sweep]]\nkey = \"estimator.mis.path.roulette.below\"\nvalues = [0.1, 9]\n";
+    let ran = Work::with(&(text.clone() + beyond)).run("check x.toml");
+    ran.exits(2).complains_of(&["must be at most 1, is 9", "x.toml:23:16"]);
 }

@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use super::console::Console;
 use super::output::unwritable;
 use super::{Reading, counted, experiment_files};
 use crate::error::{Diagnostic, Error, Result};
@@ -52,7 +53,9 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
         });
         match checked {
             Ok(experiment) => {
-                writeln!(out, "{}: ok, {}", path.display(), summary(&experiment)).map_err(unwritable)?;
+                let ok = Console::of_output().verdict("ok", true);
+                writeln!(out, "{}: {ok}, {}", path.display(), summary(&experiment))
+                    .map_err(unwritable)?;
             }
             Err(error) => match error.of_input("everything that an experiment reads must be there") {
                 Error::Input(more) => findings.extend(more),

@@ -3,6 +3,7 @@
 mod check;
 mod compare;
 mod completions;
+mod console;
 mod init;
 mod judge;
 mod list;
@@ -145,7 +146,10 @@ pub fn main_with(registry: &Registry, arguments: impl IntoIterator<Item = OsStri
     match outcome {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            say(&error);
+            match console::has_coloured_errors() {
+                true => say(error.to_coloured()),
+                false => say(&error),
+            }
             ExitCode::from(error.exit_code())
         }
     }

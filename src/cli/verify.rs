@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use super::console::Console;
 use super::output::{say, unwritable};
 use super::{Reading, Working, files_of, listen};
 use crate::error::{Error, Result};
@@ -344,17 +345,21 @@ fn tell(
         .cloned()
         .collect();
     if !shown.is_empty() {
-        write!(out, "{}", verdict_table(&shown).to_text())?;
+        let console = Console::of_output();
+        let table = verdict_table(&shown);
+        write!(out, "{}", console.outcomes(&console.laid_out(&table)))?;
     }
     for group in &groups {
         writeln!(out, "{}; {}", group.sentence(), next_step(group, subjects, reading))?;
     }
-    writeln!(
-        out,
+    let console = Console::of_output();
+    let summary = format!(
         "{green} of {} verdicts are green; any of them fails by chance with probability at most \
          {FAMILY_LEVEL:e} (Holm over all; below {FIRST_LOOK:e} a second look on fresh streams decides)",
         verdicts.len()
-    )?;
+    );
+    let summary = console.wrapped(&summary, usize::MAX);
+    writeln!(out, "{}", console.verdict(&summary, green == verdicts.len()))?;
     tell_power(verdicts, out)
 }
 

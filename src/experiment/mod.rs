@@ -176,6 +176,13 @@ impl Experiment {
     }
 }
 
+/// A cell by its place on the axes of the sweep, as `alpha = 0.1, g = 0.8`; the label itself where there is
+/// no sweep.
+pub(crate) fn titled(axes: &BTreeMap<String, String>, label: &str) -> String {
+    let words: Vec<String> = axes.iter().map(|(axis, label)| format!("{axis} = {label}")).collect();
+    if words.is_empty() { label.into() } else { words.join(", ") }
+}
+
 impl From<&sweep::SweepAxis> for Axis {
     fn from(axis: &sweep::SweepAxis) -> Axis {
         let labels = axis.points.iter().map(|point| point.label.clone()).collect();

@@ -25,6 +25,7 @@ pub(crate) fn json_schema(registry: &Registry) -> Json {
 /// both. In a file with a sweep, keys that rows may set can be missing.
 pub(crate) fn editor_schema(registry: &Registry) -> Json {
     let mut schema = json_schema(registry);
+    leave_null_out(&mut schema);
     let without = |keys: &[&'static str], left_out: &[&str]| -> Vec<&'static str> {
         keys.iter().copied().filter(|key| !left_out.contains(key)).collect()
     };
@@ -58,6 +59,39 @@ pub(crate) fn editor_schema(registry: &Registry) -> Json {
         "dependentRequired": together([&scene, &SAMPLER_KEYS]),
     });
     schema
+}
+
+/// TOML has no null: an optional key takes what it takes where it is given, and editors then say what is wrong
+/// with that.
+fn leave_null_out(schema: &mut Json) {
+    let is_null = |form: &Json| form["type"] == "null";
+    match schema {
+        Json::Object(object) => {
+            if let Some(Json::Array(forms)) = object.get_mut("anyOf") {
+                forms.retain(|form| !is_null(form));
+            }
+            let only = match object.get("anyOf") {
+                Some(Json::Array(forms)) if forms.len() == 1 => forms[0].as_object().cloned(),
+                _ => None,
+            };
+            if let Some(only) = only {
+                object.remove("anyOf");
+                for (key, value) in only {
+                    object.entry(key).or_insert(value);
+                }
+            }
+            if let Some(Json::Array(types)) = object.get_mut("type") {
+                types.retain(|name| name != "null");
+                if let [only] = &types[..] {
+                    let only = only.clone();
+                    object.insert("type".into(), only);
+                }
+            }
+            object.values_mut().for_each(leave_null_out);
+        }
+        Json::Array(items) => items.iter_mut().for_each(leave_null_out),
+        _ => {}
+    }
 }
 
 /// What the names of definitions begin with in which rows of a sweep may set what is missing.

@@ -29,10 +29,11 @@ impl Sources {
     /// row that the cell `cell` takes from the sweep, or else in the file.
     pub(crate) fn place(&self, cell: usize, key: &str) -> Option<Place> {
         let swept = self.row(cell).find(|(name, _)| is_within(key, name));
-        let (node, words) = match swept {
-            Some((name, value)) => (value, key.split('.').skip(name.split('.').count())),
-            None => (&self.root, key.split('.').skip(0)),
+        let (node, depth) = match swept {
+            Some((name, value)) => (value, name.split('.').count()),
+            None => (&self.root, 0),
         };
+        let words = key.split('.').skip(depth);
         let mut found = node;
         for word in words {
             match found.at(&[word]) {

@@ -141,7 +141,7 @@ fn means(
     let is_sound = wrong.is_empty();
     wrong.into_iter().for_each(|finding| findings.add(finding));
     let words = serde_json::from_value::<SpectrumFile>(node.to_json()).ok().filter(|_| is_sound)?.csv;
-    let table = Table::read(node.at(&["csv"])?, &words, experiment, findings)?;
+    let table = WavelengthTable::read(node.at(&["csv"])?, &words, experiment, findings)?;
     let mut means = Vec::new();
     for band in bands? {
         let Some([from, to]) = band.range_nm else {
@@ -166,18 +166,18 @@ fn means(
 }
 
 /// Values over wavelengths, nm, which increase.
-struct Table {
+struct WavelengthTable {
     rows: Vec<[f64; 2]>,
     place: Place,
 }
 
-impl Table {
+impl WavelengthTable {
     fn read(
         node: &Node,
         words: &SpectrumColumn,
         experiment: &Path,
         findings: &Findings,
-    ) -> Option<Table> {
+    ) -> Option<WavelengthTable> {
         let at = |key: &str| node.get(key).map_or(node.place(), Node::place);
         let path = resolve_path(experiment, &words.path);
         let text = match std::fs::read_to_string(&path) {
@@ -255,7 +255,7 @@ impl Table {
             findings.at(at("path"), "the CSV file has no rows", None);
             return None;
         }
-        Some(Table { rows, place: place(1) })
+        Some(WavelengthTable { rows, place: place(1) })
     }
 
     /// The wavelengths that it covers, nm.
@@ -271,9 +271,10 @@ impl Table {
         }
         let integral: f64 = self
             .rows
-            .array_windows()
-            .map(|[[a, left], [b, right]]| {
-                let (low, high) = (from.max(*a), to.min(*b));
+            .windows(2)
+            .map(|pair| {
+                let ([a, left], [b, right]) = (pair[0], pair[1]);
+                let (low, high) = (from.max(a), to.min(b));
                 if low >= high {
                     return 0.0;
                 }
@@ -297,9 +298,9 @@ impl Table {
 mod tests {
     use super::*;
 
-    fn table(rows: &[[f64; 2]]) -> Table {
+    fn table(rows: &[[f64; 2]]) -> WavelengthTable {
         let place = Place { name: "".into(), text: "".into(), span: 0..0 };
-        Table { rows: rows.to_vec(), place }
+        WavelengthTable { rows: rows.to_vec(), place }
     }
 
     /// Means by hand: of a line, across a kink, of steps, and beyond the table.

@@ -197,7 +197,8 @@ fn setting(key: &Node, value: &Node) -> Option<(String, Node)> {
 
 fn not_empty(list: &Node, findings: &Findings) -> Option<()> {
     if list.items().is_empty() {
-        findings.at(list.place(), "empty sweep", None);
+        let help = "give the list at least one entry, or remove the sweep";
+        findings.at(list.place(), "empty sweep", Some(help.into()));
         return None;
     }
     Some(())

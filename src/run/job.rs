@@ -19,6 +19,8 @@ use crate::stats::tree::{Counter, Merge};
 pub(crate) struct Job {
     /// Label in messages: cell and estimator, or the sampler.
     pub label: String,
+    /// The same for progress, the cell by its place on the axes: `alpha = 0.1 / mis`.
+    pub title: String,
     /// Hash of all that its result depends on except the number of passes, hex: its state is kept under
     /// it.
     pub identity: String,

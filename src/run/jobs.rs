@@ -18,7 +18,7 @@ use crate::estimators::Layout;
 use crate::experiment::build::{self, Builder};
 use crate::experiment::registry::Registry;
 use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure, Faster, SamplerEntry};
-use crate::experiment::{CellSpec, Experiment};
+use crate::experiment::{CellSpec, Experiment, titled};
 use crate::results::json::{canonical, hash_bytes, hash_json};
 use crate::results::provenance;
 use crate::results::record::{Against, Band, Comparison, Observable};
@@ -197,6 +197,10 @@ impl Planner<'_> {
             "" => arm.name.clone(),
             cell => format!("{cell} / {}", arm.name),
         };
+        let title = match cell.spec.axes.is_empty() {
+            true => arm.name.clone(),
+            false => format!("{} / {}", titled(&cell.spec.axes, &cell.spec.label), arm.name),
+        };
         let file = &self.experiment.file;
         let identity = json!({
             "build": provenance::build(),
@@ -224,7 +228,8 @@ impl Planner<'_> {
             groups,
             terms,
         };
-        Ok(Job { label, identity: hash_json(&identity), task: Task::Estimate(Box::new(passes)) })
+        let task = Task::Estimate(Box::new(passes));
+        Ok(Job { label, title, identity: hash_json(&identity), task })
     }
 
     /// Bands that run together, with their streams.
@@ -276,7 +281,7 @@ impl Planner<'_> {
             key: StreamKey::new(hash_bytes(canonical(&name).as_bytes())),
         };
         let (label, identity) = (words.name.clone(), hash_json(&identity));
-        Ok(Job { label, identity, task: Task::Draw(Box::new(draws)) })
+        Ok(Job { title: label.clone(), label, identity, task: Task::Draw(Box::new(draws)) })
     }
 }
 

@@ -198,8 +198,8 @@ fn replays(
 
 /// Parts of an experiment that leave its measurements what they are: a record of other values of these may be
 /// replaced, by more passes of the same streams for example.
-const NO_OTHER_EXPERIMENT: [&str; 6] =
-    ["budget", "budget_share", "description", "display", "fresh", "only_claimed"];
+const NO_OTHER_EXPERIMENT: [&str; 7] =
+    ["budget", "budget_share", "description", "display", "fresh", "only_claimed", "samples"];
 
 /// Refuses to run where the folder holds the record of another experiment.
 ///

@@ -122,8 +122,10 @@ impl<'a> SchemaWalk<'a> {
     }
 
     fn wrong_type(&mut self, node: &Node, schema: &Json) {
-        let types: Vec<&str> =
-            self.types(schema).into_iter().filter(|t| *t != "null").map(article).collect();
+        let mut types: Vec<&str> = Vec::new();
+        for name in self.types(schema).into_iter().filter(|t| *t != "null").map(article) {
+            types.extend((!types.contains(&name)).then_some(name));
+        }
         let mut rule = format!("expected {}, found {}", suggest::join(&types, "or"), found(node));
         let mut help = Some(grammar::doc(schema).to_string()).filter(|doc| !doc.is_empty());
         match (&node.value, types[..].contains(&"an integer")) {
@@ -205,13 +207,15 @@ impl<'a> SchemaWalk<'a> {
             [_] => {}
             [] if self.lenient || keys.iter().any(|key| meant.contains(key)) => {}
             [] => {
-                self.report(node.place(), format!("exactly one of {needed} is needed, found none"), None)
+                let rule = format!("exactly one of {needed} is needed, found none");
+                let help = format!("add one of them; `scatterproof list {}` shows how", keys[0]);
+                self.report(node.place(), rule, Some(help));
             }
             [.., last] => {
                 let place = entries[last].key.clone().unwrap_or_else(|| node.place().clone());
                 let rule =
                     format!("exactly one of {needed} is needed, found {}", suggest::quoted(&given));
-                self.report(&place, rule, None);
+                self.report(&place, rule, Some("keep one of those found, and remove the others".into()));
             }
         }
     }
