@@ -34,6 +34,11 @@ pub struct Place {
 }
 
 impl Place {
+    /// The text that the finding covers.
+    pub(crate) fn text(&self) -> &str {
+        self.text.get(self.span.clone()).unwrap_or("")
+    }
+
     /// Line and column, counted from 1, of the first byte.
     pub fn line_column(&self) -> (usize, usize) {
         let before = &self.text[..self.span.start.min(self.text.len())];
@@ -93,6 +98,41 @@ impl Error {
         Error::Record { path: path.to_path_buf(), message: message.into() }
     }
 
+    /// Findings without a place get this one.
+    pub(crate) fn at(self, place: Option<Place>) -> Error {
+        match self {
+            Error::Input(mut findings) => {
+                findings.iter_mut().filter(|f| f.place.is_none()).for_each(|f| f.place = place.clone());
+                Error::Input(findings)
+            }
+            other => other,
+        }
+    }
+
+    /// Findings begin with these words.
+    pub(crate) fn about(self, what: &str) -> Error {
+        match self {
+            Error::Input(mut findings) => {
+                findings.iter_mut().for_each(|f| f.rule = format!("{what}: {}", f.rule));
+                Error::Input(findings)
+            }
+            other => other,
+        }
+    }
+
+    /// What is wrong with a file that an experiment names is bad input, whatever it is: a finding.
+    pub(crate) fn of_input(self, help: &str) -> Error {
+        match self {
+            Error::Io { path, doing, source } => {
+                Error::input_help(format!("could not {doing} `{}`: {source}", path.display()), help)
+            }
+            Error::Record { path, message } => {
+                Error::input_help(format!("`{}`: {message}", path.display()), help)
+            }
+            other => other,
+        }
+    }
+
     /// The process exit code: 2 bad input, 3 I/O or unusable record, 130 interrupted.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -103,15 +143,34 @@ impl Error {
     }
 }
 
+impl Error {
+    /// As a terminal with colours shows it.
+    pub(crate) fn to_coloured(&self) -> String {
+        Told { error: self, renderer: &Renderer::styled() }.to_string()
+    }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
+        Told { error: self, renderer: &Renderer::plain() }.fmt(f)
+    }
+}
+
+/// An error in one style or another.
+struct Told<'a> {
+    error: &'a Error,
+    renderer: &'a Renderer,
+}
+
+impl fmt::Display for Told<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.error {
             Error::Input(findings) => {
                 for (i, finding) in findings.iter().take(MOST_SHOWN).enumerate() {
                     if i > 0 {
                         writeln!(f)?;
                     }
-                    write!(f, "{}", render(finding))?;
+                    write!(f, "{}", render(finding, self.renderer))?;
                 }
                 if findings.len() > MOST_SHOWN {
                     write!(f, "\n\n.. and {} more", findings.len() - MOST_SHOWN)?;
@@ -132,7 +191,53 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
-fn render(finding: &Diagnostic) -> String {
+/// The findings of several attempts, told together: one that occurs in many cells is told once.
+#[derive(Debug, Default)]
+pub(crate) struct Refusals(Vec<(Diagnostic, Vec<String>)>);
+
+impl Refusals {
+    /// The value of an attempt in the cell `label`, or none, its findings being kept.
+    ///
+    /// # Errors
+    /// What is no finding about an input.
+    pub(crate) fn keep<T>(&mut self, label: &str, result: Result<T>) -> Result<Option<T>> {
+        let findings = match result {
+            Ok(value) => return Ok(Some(value)),
+            Err(Error::Input(findings)) => findings,
+            Err(other) => return Err(other),
+        };
+        for finding in findings {
+            match self.0.iter_mut().find(|(known, _)| *known == finding) {
+                Some((_, labels)) => labels.push(label.into()),
+                None => self.0.push((finding, vec![label.into()])),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Nothing was refused in any of so many cells.
+    ///
+    /// # Errors
+    /// All findings, each with the cells that it is about where others are not affected.
+    pub(crate) fn none_in(self, cells: usize) -> Result<()> {
+        let told = |(mut finding, mut labels): (Diagnostic, Vec<String>)| {
+            labels.dedup();
+            match &labels[..] {
+                several if several.len() >= cells => {}
+                [one] => finding.rule += &format!(" (cell `{one}`)"),
+                [first, rest @ ..] => {
+                    finding.rule += &format!(" (cell `{first}` and {} more)", rest.len());
+                }
+                [] => {}
+            }
+            finding
+        };
+        let findings: Vec<Diagnostic> = self.0.into_iter().map(told).collect();
+        if findings.is_empty() { Ok(()) } else { Err(Error::Input(findings)) }
+    }
+}
+
+fn render(finding: &Diagnostic, renderer: &Renderer) -> String {
     let Some(place) = &finding.place else {
         let help = finding.help.as_ref().map(|h| format!("\n  help: {h}")).unwrap_or_default();
         return format!("error: {}{help}", finding.rule);
@@ -146,5 +251,5 @@ fn render(finding: &Diagnostic) -> String {
         Some(help) => groups.push(title.element(Level::HELP.message(&**help))),
         None => groups.push(title),
     }
-    Renderer::plain().render(&groups).to_string()
+    renderer.render(&groups).to_string()
 }

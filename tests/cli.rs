@@ -123,7 +123,7 @@ fn meshes() {
         let work = with_mesh(mesh);
         refused(&work, &[&["body.obj", "help:"], words].concat());
     };
-    bad(None, &["could not read the mesh", "relative to the experiment file"]);
+    bad(None, &["could not read the mesh", "relative to the folder of the experiment file"]);
     bad(Some(&format!("{CORNERS}f 1 3 2\nf 1 2 4\nf 1 4 3\n")), &["3 boundary edges", "close the mesh"]);
     bad(Some(&format!("{CORNERS}{FACES}f 1 2 9\n")), &["out of bounds", "export it again"]);
     bad(Some(CORNERS), &["no triangles"]);
@@ -263,26 +263,26 @@ fn init_run_verify_report() {
     work.run("init").exits(2).complains("experiment.toml already exists").complains("name another file");
     work.run("init no/such/folder.toml").exits(3).complains("no/such/folder.toml");
     let ran = work.run("run experiment.toml --setting quick");
-    ran.exits(0).says("report: results/furnace/report.html").says("\n 1.1  path");
+    ran.exits(0).says("report: results/first-sphere/report.html").says("\neta = 1.1  path");
     ran.check(ran.stderr().is_empty(), "no bar where there is no terminal");
     ran.check(!ran.stdout().contains(['\u{1b}', '\r']), "no control characters");
 
     let views = ["report.html", "report.md", "measurements.csv", "verdicts.csv", "summary.json"];
-    let views = views.map(|view| format!("results/furnace/{view}"));
+    let views = views.map(|view| format!("results/first-sphere/{view}"));
     let before = views.each_ref().map(|view| work.read(view));
-    let record = work.files("results/furnace/record");
+    let record = work.files("results/first-sphere/record");
     views.iter().for_each(|view| std::fs::remove_file(work.path(view)).expect("removed"));
-    work.run("report results/furnace").exits(0).says("results/furnace/report.html");
+    work.run("report results/first-sphere").exits(0).says("results/first-sphere/report.html");
     assert_eq!(before, views.each_ref().map(|view| work.read(view)), "the same from the record alone");
-    assert_eq!(record, work.files("results/furnace/record"), "a report changes no record");
+    assert_eq!(record, work.files("results/first-sphere/record"), "a report changes no record");
 
     let ran = work.run("verify experiment.toml --setting quick --junit junit.xml --verbose");
     ran.exits(0).says("verdicts are green");
     assert!(work.read("junit.xml").contains("<testsuite"), "{}", work.read("junit.xml"));
     // A folder is judged as it is; and a claim that is wrong is found.
-    work.run("verify results/furnace").exits(0);
+    work.run("verify results/first-sphere").exits(0);
     let text = work.read("experiment.toml").replace("value = 1.0", "value = 1.5");
-    work.write("wrong.toml", &text.replace("\"furnace\"", "\"wrong\""));
+    work.write("wrong.toml", &text.replace("\"first-sphere\"", "\"wrong\""));
     work.run("verify wrong.toml -q").exits(1).says("a relative deviation of -3.3e-1");
 }
 
@@ -323,7 +323,7 @@ fn names_of_estimators_are_no_paths() {
     assert!(work.path("results/x/images/000-analog.png").exists());
     // Under another name, no picture of the old one remains.
     work.write("x.toml", &edit("name = \"mis\"", "name = \"two\""));
-    work.run("run x.toml -q --set budget.passes=2").exits(0);
+    work.run("run x.toml -q --replace --set budget.passes=2").exits(0);
     assert!(!work.path("results/x/images/000-000.mean-as-published.png").exists());
     assert!(work.path("results/x/images/000-two.exr").exists());
 }

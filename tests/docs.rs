@@ -17,6 +17,7 @@ const PAGES: &[&str] = &[
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
+    "docs/bring-your-own.md",
     "docs/bssrdf.md",
     "docs/comparing-records.md",
     "docs/SUMMARY.md",
@@ -155,11 +156,37 @@ fn write_sky(path: &Path) {
     write_exr(path, &Picture::new(&bands, &pixels), &[]).expect("a sky");
 }
 
+/// The same body as a PLY file.
+fn octahedron_ply() -> String {
+    let lines = |key: char| OCTAHEDRON.lines().filter(move |line| line.starts_with(key));
+    let vertices = lines('v').map(|line| format!("{}\n", &line[2..]));
+    let faces = lines('f').map(|line| {
+        let corners =
+            line[2..].split(' ').map(|i| (i.parse::<usize>().expect("an index") - 1).to_string());
+        format!("3 {}\n", corners.collect::<Vec<_>>().join(" "))
+    });
+    let head = "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
+                element face 8\nproperty list uchar int vertex_indices\nend_header\n";
+    head.to_string() + &vertices.collect::<String>() + &faces.collect::<String>()
+}
+
+/// A sky of four columns, reddish on one side.
+fn write_hdr(path: &Path) {
+    let mut bytes = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec();
+    for pixel in 0..8u8 {
+        bytes.extend([100 + 20 * (pixel % 4), 100, 100, 128]);
+    }
+    fs::write(path, bytes).expect("a sky");
+}
+
 /// Result of `check` on a page's experiments: their number, and the errors.
 fn refused(page: &str) -> (usize, String) {
     let work = Work::new();
     work.write("body.obj", OCTAHEDRON);
     write_sky(&work.path("sky.exr"));
+    write_hdr(&work.path("sky.hdr"));
+    work.write("body.ply", &octahedron_ply());
+    work.write("statue.ply", &octahedron_ply());
     for block in blocks(page, "csv") {
         let name = block.tag.strip_prefix("csv ").expect("the name of the CSV file");
         work.write(name, &block.text());
@@ -186,8 +213,16 @@ fn every_snippet_is_accepted() {
     assert!(count > 40, "only {count} snippets were found");
     let (_, errors) = refused(&text("docs/bssrdf.md"));
     assert!(errors.is_empty(), "snippets of docs/bssrdf.md, by their line: {errors}");
-    let with_toml = PAGES.into_iter().filter(|page| !blocks(&text(page), "toml").is_empty());
-    let judged = ["README.md", "docs/bssrdf.md", "docs/experiment-file.md", "docs/own-estimator.md"];
+    let with_toml = PAGES.iter().copied().filter(|page| !blocks(&text(page), "toml").is_empty());
+    let (_, errors) = refused(&text("docs/bring-your-own.md"));
+    assert!(errors.is_empty(), "snippets of docs/bring-your-own.md, by their line: {errors}");
+    let judged = [
+        "README.md",
+        "docs/bring-your-own.md",
+        "docs/bssrdf.md",
+        "docs/experiment-file.md",
+        "docs/own-estimator.md",
+    ];
     assert_eq!(with_toml.collect::<Vec<_>>(), judged, "each page with TOML needs a test of it");
 }
 
@@ -211,6 +246,25 @@ fn planted_snippets_are_found() {
         // After a file that cannot be read nothing more is checked.
         assert!(files >= at_least && errors.contains(words), "{new}:\n{errors}");
     }
+}
+
+/// The worked example of the page on own data runs, and its numbers are those of the files.
+#[test]
+fn own_data_is_read_as_the_page_says() {
+    let work = Work::new();
+    let page = text("docs/bring-your-own.md");
+    let complete = blocks(&page, "toml").into_iter().find(|block| block.tag == "toml complete");
+    work.write("my-statue.toml", &complete.expect("a complete file").text());
+    work.write("milk.csv", &only_block(&page, "csv"));
+    work.write("statue.ply", &octahedron_ply());
+    write_hdr(&work.path("sky.hdr"));
+    let small = "--set sensor.perspective.resolution=[8,8] --set budget.passes=4";
+    work.run("check my-statue.toml").exits(0).says("2 cells, 2 estimators, 6 bands");
+    // The band of 450 to 500 nm lies between the rows of 450 and 520 nm: the mean of a straight line.
+    let mean = 0.1 * (0.40 + (0.12 - 0.40) * 25.0 / 70.0);
+    let plan = work.run("plan my-statue.toml --dry");
+    plan.exits(0).says(&format!("{mean:.4}"));
+    work.run(&format!("run my-statue.toml -q {small}")).exits(0).says("results/my-statue/report.html");
 }
 
 #[test]
@@ -386,7 +440,7 @@ fn every_command_exists() {
     let found = found.collect::<Vec<_>>().join("\n");
     for words in [
         "1 no subcommand `rum`",
-        "1 error: invalid value 'glases'",
+        "1 error: unknown topic or kind `glases`",
         "4 `plan` has no `--wet`",
         "5 no file experiments/none.toml",
         "6 error: unknown key `sead`",

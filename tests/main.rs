@@ -4,6 +4,7 @@
 #![allow(clippy::disallowed_methods)]
 
 mod browser;
+mod checks;
 mod cli;
 mod damage;
 mod docs;
@@ -14,6 +15,7 @@ mod interruption;
 mod judging;
 mod layering;
 mod looks;
+mod own_data;
 mod pictures;
 mod planted;
 mod published;

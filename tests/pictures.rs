@@ -89,7 +89,7 @@ fn claims_are_about_pixels_where_there_are_some() {
     let rows = csv.lines().filter(|line| line.contains(",all,pixels,")).count();
     assert_eq!(rows, 3 * 2, "bands, measures: {csv}");
     work.write("x.toml", &(text + &claim(", class = \"single\"")));
-    work.run("run x.toml -q").exits(2).complains("images are not kept by class");
+    work.run("run x.toml -q --replace").exits(2).complains("images are not kept by class");
     work.write("x.toml", &(super::work::probe() + &claim("")));
-    work.run("run x.toml -q").exits(2).complains("whose sensor has none");
+    work.run("run x.toml -q --replace").exits(2).complains("the sensor has no `pixels`");
 }

@@ -165,7 +165,7 @@ fn paired_cells_share_their_streams() {
 fn furnace() -> (Work, String, String) {
     let work = Work::new();
     work.run("init x.toml").exits(0);
-    let text = work.read("x.toml").replace("\"furnace\"", "\"x\"");
+    let text = work.read("x.toml").replace("\"first-sphere\"", "\"x\"");
     let (head, tail) = text.split_once("[[claim]]").expect("a claim");
     let (_, settings) = tail.split_once("# Named").expect("settings");
     (work, text.clone(), format!("{head}# {settings}"))
@@ -196,7 +196,7 @@ fn claims_made_after_the_run_are_not_green() {
         is_post_hoc(&work, &format!("--set budget.passes={passes}"));
     }
     work.run("verify results/x").exits(3).says("post hoc");
-    work.run("verify x.toml -q --set seed=5").exits(0).says("9 of 9 verdicts are green");
+    work.run("verify x.toml -q --set seed=5 --replace").exits(0).says("9 of 9 verdicts are green");
 
     // A claim that was there stays evidence beside one that came later.
     work.write(

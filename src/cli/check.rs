@@ -3,9 +3,10 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use super::console::Console;
 use super::output::unwritable;
-use super::{Reading, counted};
-use crate::error::{Error, Result};
+use super::{Reading, counted, experiment_files};
+use crate::error::{Diagnostic, Error, Result};
 use crate::experiment::{Experiment, LoadOptions, Registry, load};
 use crate::run::plan;
 
@@ -14,8 +15,8 @@ use crate::run::plan;
 /// Without `--setting`, every setting of a file is validated too.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Experiment files.
-    #[arg(required = true, value_name = "FILE")]
+    /// Experiment files, or folders of them.
+    #[arg(required = true, value_name = "FILE or DIR")]
     pub files: Vec<PathBuf>,
     /// How the files are read.
     #[command(flatten)]
@@ -28,25 +29,38 @@ pub(super) struct Args {
 /// The findings of all files together.
 pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
     let mut findings = Vec::new();
-    for path in &args.files {
+    for path in &experiment_files(&args.files)? {
         let options = args.reading.options();
         let load_setting = |setting: &String| {
             load(path, &LoadOptions { setting: Some(setting.clone()), ..options.clone() }, registry)
         };
         let checked = load(path, &options, registry).and_then(|experiment| {
-            plan(&experiment, registry)?;
             let others: &[String] = if options.setting.is_some() { &[] } else { &experiment.settings };
-            for setting in others {
-                plan(&load_setting(setting)?, registry)?;
+            let planned = |setting| plan(&load_setting(setting)?, registry);
+            let mut wrong: Vec<Diagnostic> = Vec::new();
+            for planned in std::iter::once(plan(&experiment, registry)).chain(others.iter().map(planned))
+            {
+                match planned {
+                    Err(Error::Input(more)) => {
+                        let new = |one: &Diagnostic| !wrong.contains(one);
+                        let more: Vec<Diagnostic> = more.into_iter().filter(new).collect();
+                        wrong.extend(more);
+                    }
+                    planned => drop(planned?),
+                }
             }
-            Ok(experiment)
+            if wrong.is_empty() { Ok(experiment) } else { Err(Error::Input(wrong)) }
         });
         match checked {
             Ok(experiment) => {
-                writeln!(out, "{}: ok, {}", path.display(), summary(&experiment)).map_err(unwritable)?;
+                let ok = Console::of_output().verdict("ok", true);
+                writeln!(out, "{}: {ok}, {}", path.display(), summary(&experiment))
+                    .map_err(unwritable)?;
             }
-            Err(Error::Input(more)) => findings.extend(more),
-            Err(other) => return Err(other),
+            Err(error) => match error.of_input("everything that an experiment reads must be there") {
+                Error::Input(more) => findings.extend(more),
+                other => return Err(other),
+            },
         }
     }
     if findings.is_empty() { Ok(()) } else { Err(Error::Input(findings)) }

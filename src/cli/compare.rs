@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use super::console::Console;
 use super::output::unwritable;
 use crate::error::{Error, Result};
 use crate::report::number::significant;
@@ -117,7 +118,8 @@ fn tell(compared: &Compared, args: &Args, out: &mut impl Write) -> std::io::Resu
         // Every row is of the same claim.
         let rows: Vec<Verdict> =
             shown.into_iter().map(|v| Verdict { claim: String::new(), ..v }).collect();
-        writeln!(out, "{}", verdict_table(&rows).to_text())?;
+        let console = Console::of_output();
+        writeln!(out, "{}", console.outcomes(&console.laid_out(&verdict_table(&rows))))?;
     }
     let all = compared.verdicts.len();
     let identical = compared.verdicts.iter().filter(|v| v.test == Some(TestKind::Identical)).count();

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 pub(super) const EXAMPLE: &str = r#"# One file is one experiment. Keys carry units; `scatterproof schema` prints
 # everything that a file may contain, `scatterproof check FILE` reports what is wrong with it.
 
-name = "furnace"                # also its folder under results/
+name = "first-sphere"           # also its folder under results/
 description = "A sphere without absorption in uniform light is indistinguishable from the light."
 seed = 2024                     # root of all random streams
 

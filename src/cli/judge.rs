@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use super::console::Console;
 use super::output::unwritable;
 use crate::error::{Error, Result};
 use crate::report::document::{FigureBlock, PictureFile};
@@ -292,7 +293,8 @@ fn tell(
     // Every row is of the same claim and cell.
     let blank = |v: &Verdict| Verdict { claim: String::new(), cell: String::new(), ..v.clone() };
     let rows: Vec<Verdict> = shown.map(blank).collect();
-    write!(out, "{}", verdict_table(&rows).to_text())?;
+    let console = Console::of_output();
+    write!(out, "{}", console.outcomes(&console.laid_out(&verdict_table(&rows))))?;
     for note in &answer.notes {
         writeln!(out, "note: {note}")?;
     }

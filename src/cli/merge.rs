@@ -49,6 +49,6 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
         return Ok(0);
     }
     let material = report::write(&ran.folder)?;
-    run::tell(&material, &ran.folder, out).map_err(unwritable)?;
+    run::tell(&material, &ran.folder, &args.file, &args.reading, &args.out, out).map_err(unwritable)?;
     Ok(0)
 }

@@ -3,6 +3,7 @@
 mod check;
 mod compare;
 mod completions;
+mod console;
 mod init;
 mod judge;
 mod list;
@@ -24,9 +25,9 @@ use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
-use crate::error::Error;
-use crate::experiment::LoadOptions;
+use crate::error::{Error, Result};
 use crate::experiment::registry::Registry;
+use crate::experiment::{LoadOptions, suggest};
 
 use output::{StandardOutput, say};
 
@@ -90,6 +91,9 @@ pub struct Working {
     /// Folder for the results, one subfolder per experiment.
     #[arg(long, value_name = "DIR", default_value = "results")]
     out: PathBuf,
+    /// Replace the record of another experiment of the same name.
+    #[arg(long)]
+    replace: bool,
     /// Number of threads; default: all cores.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -129,7 +133,7 @@ pub fn exit_code_of(registry: &Registry, arguments: impl IntoIterator<Item = OsS
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let program = arguments.first().and_then(|path| Path::new(path).file_stem()?.to_str());
     let program = program.unwrap_or("scatterproof").to_string();
-    let command = Command::parse_from(arguments); // usage errors exit with 2
+    let command = Command::try_parse_from(&arguments).unwrap_or_else(|error| usage(error));
     let out = &mut StandardOutput::new();
     let outcome = match &command.action {
         Action::Run(args) => run::run(args, registry, out),
@@ -150,10 +154,70 @@ pub fn exit_code_of(registry: &Registry, arguments: impl IntoIterator<Item = OsS
     match outcome {
         Ok(code) => code,
         Err(error) => {
-            say(&error);
+            match console::has_coloured_errors() {
+                true => say(error.to_coloured()),
+                false => say(&error),
+            }
             error.exit_code()
         }
     }
+}
+
+/// Tells what is wrong with the arguments, and which subcommand a misspelt one is near to; ends the
+/// process with 2, or with 0 after `--help`.
+fn usage(mut error: clap::Error) -> ! {
+    use clap::error::{ContextKind, ContextValue, ErrorKind};
+    let word = match error.get(ContextKind::InvalidSubcommand) {
+        Some(ContextValue::String(word)) => Some(word.clone()),
+        _ => None,
+    };
+    if let (ErrorKind::InvalidSubcommand, Some(word)) = (error.kind(), word)
+        && error.get(ContextKind::SuggestedSubcommand).is_none()
+    {
+        let command = Command::command();
+        let known: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+        if let Some(near) = suggest::nearest(&word, &known) {
+            let near = ContextValue::Strings(vec![near.into()]);
+            error.insert(ContextKind::SuggestedSubcommand, near);
+        }
+    }
+    error.exit()
+}
+
+/// The experiment files that paths name: files themselves, and those in folders, in the order of names.
+fn experiment_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for path in paths {
+        files.extend(files_of(path)?);
+    }
+    Ok(files)
+}
+
+/// A file itself, or the experiment files of a folder.
+fn files_of(path: &Path) -> Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_path_buf()]); // `load` reports what is wrong with it
+    }
+    let entries = std::fs::read_dir(path).map_err(Error::io(path, "read the folder"))?;
+    let paths = entries.filter_map(|entry| entry.ok().map(|entry| entry.path()));
+    let mut files: Vec<PathBuf> = paths.filter(|p| p.extension().is_some_and(|e| e == "toml")).collect();
+    files.sort();
+    if files.is_empty() {
+        let below = std::fs::read_dir(path).into_iter().flatten().flatten();
+        let mut folders: Vec<String> = below
+            .filter(|entry| entry.path().is_dir())
+            .map(|entry| entry.path().display().to_string())
+            .collect();
+        folders.sort();
+        return Err(Error::input_help(
+            format!("{} holds neither a record nor experiment files", path.display()),
+            match folders.is_empty() {
+                true => "name an experiment file, a folder of them, or a results folder".into(),
+                false => format!("name one of its folders: {}", folders.join(", ")),
+            },
+        ));
+    }
+    Ok(files)
 }
 
 /// `1 cell`, `2 cells`.
@@ -162,7 +226,7 @@ fn counted(count: usize, what: &str) -> String {
 }
 
 /// Signals, as the error that a user sees.
-fn listen() -> crate::error::Result<crate::run::interrupt::Interrupt> {
+fn listen() -> Result<crate::run::interrupt::Interrupt> {
     crate::run::interrupt::Interrupt::listen().map_err(|source| Error::Io {
         path: PathBuf::from("signals"),
         doing: "listen for signals".into(),
@@ -171,7 +235,7 @@ fn listen() -> crate::error::Result<crate::run::interrupt::Interrupt> {
 }
 
 /// For clap: a number above 0.
-fn positive(text: &str) -> Result<f64, String> {
+fn positive(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
         _ => Err("a number above 0 is needed".into()),
@@ -179,6 +243,6 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// For clap: a number between 0 and 1, both excluded.
-fn probability(text: &str) -> Result<f64, String> {
+fn probability(text: &str) -> std::result::Result<f64, String> {
     positive(text).ok().filter(|p| *p < 1.0).ok_or_else(|| "a number between 0 and 1 is needed".into())
 }

@@ -3,17 +3,19 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use super::console::Console;
 use super::output::unwritable;
 use super::{Reading, counted};
 use crate::error::Result;
 use crate::experiment::registry::Registry;
 use crate::experiment::schema::Budget;
-use crate::experiment::{Experiment, load};
+use crate::experiment::{Experiment, load, titled};
 use crate::report::table::Table;
 use crate::run::chi_square::Draws;
 use crate::run::job::{Job, Passes};
 use crate::run::memory::MemoryEstimate;
 use crate::run::memory_limits::{available, readable};
+use crate::run::progress::Progress;
 use crate::run::{self, Plan, estimate_seconds};
 
 /// Show what would run: cells, estimated time and memory, and where each value comes from.
@@ -84,7 +86,7 @@ fn tell_origins(origins: &[(String, String, String)], out: &mut impl Write) -> i
     for (key, value, origin) in origins {
         values.push([key, value, origin].map(|text| shortened(text)).into());
     }
-    writeln!(out, "{}", values.to_text())
+    writeln!(out, "{}", Console::of_output().laid_out(&values))
 }
 
 /// Longest text in a table of the terminal, characters.
@@ -125,14 +127,17 @@ fn tell_passes(
     let mut table =
         Table::new(&["cell", "estimator", "observables", "passes", "set-up", "CPU time", "memory"]);
     let mut total = 0.0;
-    for job in jobs {
+    let progress = Progress::new(jobs.len(), dry);
+    for (done, job) in jobs.into_iter().enumerate() {
+        let title = titled(&experiment.cells[job.cell].axes, &experiment.cells[job.cell].label);
+        progress.update(done as f64, format!("measuring {title} / {}", job.arm.name));
         let estimate = budget.filter(|_| !dry).and_then(|budget| estimate_seconds(job, budget));
         // After the estimate, which has prepared the estimator.
         let set_up = estimate.map(|_| job.set_up.seconds());
         total += estimate.map_or(0.0, |(_, seconds)| seconds) + set_up.unwrap_or(0.0);
         let time = |seconds: Option<f64>| seconds.map_or("-".into(), |s| format!("{s:.1} s"));
         table.push(vec![
-            experiment.cells[job.cell].label.clone(),
+            title,
             job.arm.name.clone(),
             job.layout.observables().len().to_string(),
             estimate.map_or("-".into(), |(passes, _)| passes.to_string()),
@@ -141,7 +146,9 @@ fn tell_passes(
             readable(job.estimator.held_bytes() + job.estimator.working_bytes()),
         ]);
     }
-    write!(out, "{}", table.to_text())?;
+    progress.finish();
+    let console = Console::of_output();
+    write!(out, "{}", console.fit(table, &[], &["memory", "observables", "set-up"]))?;
     Ok(total)
 }
 

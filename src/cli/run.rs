@@ -1,28 +1,31 @@
 //! `scatterproof run`.
 
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::console::Console;
 use super::output::{say, unwritable};
-use super::{Reading, Working, counted, listen};
+use super::{Reading, Working, counted, experiment_files, listen};
 use crate::error::Result;
-use crate::experiment::load;
 use crate::experiment::registry::Registry;
+use crate::experiment::{load, titled};
 use crate::report::ReportData;
+use crate::report::number::significant;
 use crate::report::{self, terminal};
 use crate::results::store::RecordFolder;
 use crate::run::live::Live;
 use crate::run::shard::{Shard, Sharded, run_shard};
 use crate::run::tev::Address;
+use crate::verify::verdict::Verdict;
 
 /// Run experiments; print progress, then a table and the path of the report.
 ///
 /// An interrupted run resumes where it stopped; a complete run is not repeated.
 #[derive(clap::Args, Debug)]
 pub(super) struct Args {
-    /// Experiment files.
-    #[arg(required = true, value_name = "FILE")]
+    /// Experiment files, or folders of them.
+    #[arg(required = true, value_name = "FILE or DIR")]
     files: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
@@ -51,7 +54,15 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
     let mut options = args.working.options();
     options.passes_of = args.passes_of.clone();
     let read = |file: &PathBuf| load(file, &args.reading.options(), registry);
-    let experiments = args.files.iter().map(read).collect::<Result<Vec<_>>>()?;
+    let experiments = experiment_files(&args.files)?.iter().map(read).collect::<Result<Vec<_>>>()?;
+    if !args.working.replace {
+        experiments.iter().try_for_each(|e| crate::run::refuse_to_replace(e, &options.out))?;
+    }
+    if let [_, _, ..] = experiments[..] {
+        experiments
+            .iter()
+            .try_for_each(|experiment| crate::run::plan(experiment, registry).map(drop))?;
+    }
     if let Some(address) = &args.tev {
         match Live::connect(address) {
             Ok(live) => options.live = Some(Arc::new(live)),
@@ -66,7 +77,8 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
         }
         let ran = crate::run::run(experiment, registry, &options, &interrupt)?;
         let material = report::write(&ran.folder)?;
-        tell(&material, &ran.folder, out).map_err(unwritable)?;
+        tell(&material, &ran.folder, &experiment.path, &args.reading, &args.working.out, out)
+            .map_err(unwritable)?;
     }
     Ok(0)
 }
@@ -81,15 +93,97 @@ fn tell_shard(shard: Shard, sharded: &Sharded, out: &mut impl Write) -> io::Resu
 pub(super) fn tell(
     material: &ReportData,
     folder: &RecordFolder,
+    file: &Path,
+    reading: &Reading,
+    results: &Path,
     out: &mut impl Write,
 ) -> io::Result<()> {
-    write!(out, "{}", terminal::run_table(material).to_text())?;
-    write!(out, "{}", terminal::sampler_table(material).to_text())?;
+    let console = Console::of_output();
+    let record = &material.stored.record;
+    let bands: Vec<String> = record.bands.iter().map(|band| band.name.clone()).collect();
+    let mut table = terminal::run_table(material);
+    for row in &mut table.rows {
+        if let Some(cell) = record.cells.iter().find(|cell| cell.label == row[0]) {
+            row[0] = titled(&cell.axes, &cell.label);
+        }
+    }
+    let less = ["observable", "paths/s/core", "CPU s"];
+    write!(out, "{}", console.fit(table, &bands, &less))?;
+    write!(out, "{}", console.laid_out(&terminal::sampler_table(material)))?;
     if let Some(block) = terminal::efficiency_table(material) {
-        writeln!(out, "\n{}\n\n{}", terminal::wrapped(&block.caption, 110), block.table.to_text())?;
+        let table = console.fit_rows(&block.table, &bands);
+        writeln!(out, "\n{}\n\n{table}", console.wrapped(&block.caption, 110))?;
     }
     for note in terminal::notes(material) {
-        writeln!(out, "note: {note}")?;
+        writeln!(out, "{}", console.wrapped(&format!("note: {note}"), usize::MAX))?;
     }
-    writeln!(out, "\nreport: {}", folder.root().join("report.html").display())
+    writeln!(out, "\nreport: {}", folder.root().join("report.html").display())?;
+    tell_claims(&material.verdicts, file, reading, results, console, out)?;
+    tell_ratios(material, console, out)
+}
+
+/// How the claims fare by this run, and what decides them.
+fn tell_claims(
+    verdicts: &[Verdict],
+    file: &Path,
+    reading: &Reading,
+    results: &Path,
+    console: Console,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    if verdicts.is_empty() {
+        return Ok(());
+    }
+    let mut others: Vec<(String, usize)> = Vec::new();
+    for verdict in verdicts.iter().filter(|v| !v.is_green()) {
+        let outcome = verdict.outcome.to_string();
+        match others.iter_mut().find(|(known, _)| *known == outcome) {
+            Some((_, count)) => *count += 1,
+            None => others.push((outcome, 1)),
+        }
+    }
+    let green = verdicts.iter().filter(|v| v.is_green()).count();
+    let others: String = others.iter().map(|(outcome, count)| format!(", {count} {outcome}")).collect();
+    let text = format!("claims: {green} of {} verdicts are green by this run{others}", verdicts.len());
+    let line = console.verdict(&text, green == verdicts.len());
+    let out_dir = match results.to_str() {
+        Some("results") => String::new(),
+        _ => format!(" --out {}", results.display()),
+    };
+    let command =
+        format!("scatterproof verify {}{}{out_dir}", file.display(), reading.arguments_without(""));
+    writeln!(out, "{line}; `verify` judges them, with second looks and an exit code:\n  {command}")
+}
+
+/// A line for each pair of estimators: between what its efficiency ratios are.
+fn tell_ratios(material: &ReportData, console: Console, out: &mut impl Write) -> io::Result<()> {
+    let rows = terminal::efficiency_rows(material);
+    let mut pairs: Vec<(&str, &str)> = Vec::new();
+    for row in &rows {
+        let pair = (row.candidate.as_str(), row.baseline.as_str());
+        if !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
+    }
+    for (candidate, baseline) in pairs {
+        let own = rows.iter().filter(|row| row.candidate == candidate && row.baseline == baseline);
+        let ratios: Vec<f64> = own.filter_map(|row| row.quoted()).map(|[ratio, ..]| ratio).collect();
+        if ratios.is_empty() {
+            continue;
+        }
+        // The better one first.
+        let log = |x: &f64| crate::math::ln(*x);
+        let is_better = ratios.iter().map(log).sum::<f64>() >= 0.0;
+        let (first, second) = if is_better { (candidate, baseline) } else { (baseline, candidate) };
+        let sided: Vec<f64> = ratios.iter().map(|x| if is_better { *x } else { 1.0 / x }).collect();
+        let [least, most] = [
+            sided.iter().copied().fold(f64::INFINITY, f64::min),
+            sided.iter().copied().fold(0.0, f64::max),
+        ]
+        .map(|x| significant(x, 2));
+        let times = if least == most { least } else { format!("{least} to {most}") };
+        let line = format!("{first} is {times} times as efficient as {second}");
+        writeln!(out, "{}", console.verdict(&line, true))?;
+    }
+    Ok(())
 }

@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::experiment::schema::{SamplerClaim, SamplerEntry};
-use crate::experiment::{Experiment, Registry};
+use crate::experiment::{Experiment, Registry, Sources};
 use crate::results::store::{RecordFolder, Stored};
 use crate::run::interrupt::Interrupt;
 use crate::run::{Options, Remeasured, retest, run};
@@ -188,6 +188,7 @@ fn experiment(name: &str, samples: u64, entries: &[(&str, &str, Value)]) -> Expe
         axes: Vec::new(),
         settings: Vec::new(),
         origins: Vec::new(),
+        sources: Sources::none(),
     }
 }
 

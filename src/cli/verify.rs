@@ -4,8 +4,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::console::Console;
 use super::output::{say, unwritable};
-use super::{Reading, Working, listen};
+use super::{Reading, Working, files_of, listen};
 use crate::error::{Error, Result};
 use crate::experiment::registry::Registry;
 use crate::experiment::schema::Budget;
@@ -94,6 +95,8 @@ struct Court<'a> {
     registry: &'a Registry,
     reading: LoadOptions,
     working: Options,
+    /// Whether the record of another experiment may be replaced.
+    replaces: bool,
     interrupt: Interrupt,
     /// Whether reports are written into the results folders.
     reports: bool,
@@ -108,6 +111,7 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
         registry,
         reading: args.reading.options(),
         working: args.working.options(),
+        replaces: args.working.replace,
         interrupt: listen()?,
         reports: !args.no_report,
     };
@@ -190,7 +194,7 @@ impl Court<'_> {
                 named.push(Named::Record(Box::new(Self::judged(RecordFolder::new(path), None, None)?)));
                 continue;
             }
-            for file in experiment_files(path)? {
+            for file in files_of(path)? {
                 match self.checked(&file) {
                     Ok(experiment) => named.push(Named::Experiment(Box::new(experiment))),
                     Err(Error::Input(findings)) => wrong.extend(findings),
@@ -234,6 +238,9 @@ impl Court<'_> {
     fn checked(&self, file: &Path) -> Result<Experiment> {
         let experiment = load(file, &self.reading, self.registry)?;
         if !crate::run::has_record(&experiment, &self.working.out) {
+            if !self.replaces {
+                crate::run::refuse_to_replace(&experiment, &self.working.out)?;
+            }
             plan(&experiment, self.registry)?;
         }
         Ok(experiment)
@@ -351,17 +358,21 @@ fn tell(
         .cloned()
         .collect();
     if !shown.is_empty() {
-        write!(out, "{}", verdict_table(&shown).to_text())?;
+        let console = Console::of_output();
+        let table = verdict_table(&shown);
+        write!(out, "{}", console.outcomes(&console.laid_out(&table)))?;
     }
     for group in &groups {
         writeln!(out, "{}; {}", group.sentence(), next_step(group, subjects, reading))?;
     }
-    writeln!(
-        out,
+    let console = Console::of_output();
+    let summary = format!(
         "{green} of {} verdicts are green; any of them fails by chance with probability at most \
          {FAMILY_LEVEL:e} (Holm over all; below {FIRST_LOOK:e} a second look on fresh streams decides)",
         verdicts.len()
-    )?;
+    );
+    let summary = console.wrapped(&summary, usize::MAX);
+    writeln!(out, "{}", console.verdict(&summary, green == verdicts.len()))?;
     tell_power(verdicts, out)
 }
 
@@ -418,22 +429,4 @@ fn tell_power(verdicts: &[Verdict], out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "largest defect that could have gone unseen (99 % power): {percent:.2} % {of}")?;
     }
     Ok(())
-}
-
-/// A file itself, or the experiment files of a folder in the order of their names.
-fn experiment_files(path: &Path) -> Result<Vec<PathBuf>> {
-    if !path.is_dir() {
-        return Ok(vec![path.to_path_buf()]); // `load` reports what is wrong with it
-    }
-    let entries = std::fs::read_dir(path).map_err(Error::io(path, "read the folder"))?;
-    let paths = entries.filter_map(|entry| entry.ok().map(|entry| entry.path()));
-    let mut files: Vec<PathBuf> = paths.filter(|p| p.extension().is_some_and(|e| e == "toml")).collect();
-    files.sort();
-    if files.is_empty() {
-        return Err(Error::input_help(
-            format!("{} holds neither a record nor experiment files", path.display()),
-            "name an experiment file, a folder of them, or a results folder",
-        ));
-    }
-    Ok(files)
 }

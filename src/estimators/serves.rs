@@ -142,6 +142,10 @@ impl Sensors {
                 ),
                 "use path or light_trace, or the sensor `flux`",
             ),
+            (Sensors::Receiving, _) => Error::input_help(
+                format!("{name} cannot serve this sensor: no photon hits a single ray or direction"),
+                format!("it serves {}", self.names()),
+            ),
             _ => Error::input_help(
                 format!("{name} cannot serve this sensor"),
                 format!("it serves {}", self.names()),

@@ -6,16 +6,21 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::direction::unit;
-use super::schema::{self, BoundaryEntry, LightEntry, NormalsEntry, ShapeEntry, Spectrum};
+use super::schema::{
+    self, BoundaryEntry, Environment, LengthUnit, LightEntry, NormalsEntry, ShapeEntry, Spectrum,
+    UpAxis, Upsampling,
+};
 use super::{CellSpec, Experiment, resolve, resolve_path};
 use crate::error::{Error, Result};
-use crate::geometry::{Shape, Side, load_obj, procedural};
+use crate::geometry::{Placement, Shape, Side, load_mesh, procedural};
 use crate::input;
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 use crate::optics::medium::Medium;
 use crate::optics::microfacet::Microfacets;
+use crate::optics::upsampling;
 use crate::results::exr_file::{ExrImage, read_exr};
+use crate::results::hdr_file::read_hdr;
 use crate::results::json::hash_hex;
 use crate::results::record::Band;
 use crate::scene::{Emission, LatLong, Light, Scene};
@@ -25,7 +30,7 @@ pub(crate) struct Builder<'a> {
     experiment: &'a Experiment,
     bands: Vec<Band>,
     shapes: BTreeMap<String, Arc<Shape>>,
-    maps: BTreeMap<(PathBuf, u64), Arc<LatLong>>,
+    maps: BTreeMap<(PathBuf, [u64; 2], bool), Arc<LatLong>>,
 }
 
 impl<'a> Builder<'a> {
@@ -51,35 +56,67 @@ impl<'a> Builder<'a> {
         self.shapes.values().map(|shape| shape.building_bytes()).max().unwrap_or(0)
     }
 
-    /// The scene of one cell.
+    /// The scene of the cell `index`.
     ///
     /// # Errors
-    /// A mesh or map that cannot be used, a sensor inside the body, a vertex outside.
-    pub(crate) fn scene(&mut self, cell: &CellSpec) -> Result<Scene> {
-        let shape = self.shape(&cell.object.shape)?;
-        let boundary = self.boundary(&cell.object.boundary)?;
-        let medium = cell.object.medium.per_band(&self.experiment.file.band_list());
-        let medium = medium.ok_or_else(|| Error::input("the medium has no coefficients"))?;
+    /// A mesh or map that cannot be used, a sensor inside the body, a vertex outside, a sensor that does
+    /// not see the body; each at its place in the file.
+    pub(crate) fn scene(&mut self, index: usize) -> Result<Scene> {
+        let experiment = self.experiment;
+        let cell = &experiment.cells[index];
+        let place = |key: &str| experiment.sources.place(index, key);
+        let shape = match &cell.object.shape {
+            words @ ShapeEntry::Mesh { .. } => {
+                self.shape(words).map_err(|error| error.at(place("object.shape.mesh.path")))?
+            }
+            words => self.shape(words).map_err(|error| error.at(place("object.shape")))?,
+        };
+        let boundary = self.boundary(&cell.object.boundary);
+        let boundary = boundary.map_err(|error| error.at(place("object.boundary")))?;
+        let medium = cell.object.medium.per_band(&experiment.file.band_list());
+        let no_medium = || Error::input("the medium has no coefficients").at(place("object.medium"));
+        let medium = medium.ok_or_else(no_medium)?;
         let emission = cell.object.medium.emission(medium.len());
         let medium = medium
             .iter()
             .zip(emission)
             .map(|(m, emission)| Medium { emission, ..Medium::new(m.sigma_a, m.sigma_s, m.g) });
         let medium = medium.collect();
-        let lights = cell.light.iter().enumerate();
-        let lights = lights.map(|(i, entry)| self.light(i, entry)).collect::<Result<Vec<Light>>>()?;
-        let sensor = cell.sensor.build(&shape)?;
+        let light = |(i, entry): (usize, &LightEntry)| {
+            let key = match entry.environment {
+                Some(_) => format!("light.{i}.environment.map"),
+                None => format!("light.{i}"),
+            };
+            self.light(i, entry).map_err(|error| error.at(place(&key)))
+        };
+        let lights = cell.light.iter().enumerate().map(light).collect::<Result<Vec<Light>>>()?;
+        let at_sensor = |error: Error| error.at(cell.sensor.key_of_position().and_then(place));
+        let sensor = cell.sensor.build(&shape).map_err(|error| error.at(place("sensor")))?;
         match sensor.position() {
-            Some((point, Side::Outside)) if shape.covers(point) => Err(Error::input_help(
-                format!("the sensor at {point} mm is inside or on the body (cell `{}`)", cell.label),
-                "move it outside",
-            )),
-            Some((point, Side::Inside)) if !shape.contains(point) => Err(Error::input_help(
-                format!("the vertex at {point} mm is not inside the body (cell `{}`)", cell.label),
-                "move it inside",
-            )),
-            _ => Ok(Scene { shape, boundary, medium, lights, sensor }),
+            Some((point, Side::Outside)) if shape.covers(point) => {
+                return Err(at_sensor(Error::input_help(
+                    format!("the sensor at {point} mm is inside or on the body"),
+                    format!("move it outside; {}", extent(&shape)),
+                )));
+            }
+            Some((point, Side::Inside)) if !shape.contains(point) => {
+                return Err(at_sensor(Error::input_help(
+                    format!("the vertex at {point} mm is not inside the body"),
+                    format!("move it inside; {}", extent(&shape)),
+                )));
+            }
+            _ => {}
         }
+        let scene = Scene { shape, boundary, medium, lights, sensor };
+        if !scene.is_seen() {
+            let what = match scene.sensor.pixels() {
+                Some(_) => "no ray of any pixel meets the body: every pixel would be 0",
+                None => "the ray passes the body by: the probe would measure 0",
+            };
+            let help = format!("aim the sensor at the body; {}", extent(&scene.shape));
+            return Err(Error::input_help(what, help).at(place("sensor")));
+        }
+        Ok(scene)
     }
 
     fn boundary(&self, words: &BoundaryEntry) -> Result<Vec<Boundary>> {
@@ -135,10 +172,7 @@ impl<'a> Builder<'a> {
                     let radiance = spectrum(radiance, 1.0);
                     Emission::Cap { frame: Frame::about(axis), height, radiance }
                 }
-                (None, map) => {
-                    let path = resolve_path(&self.experiment.path, map.as_deref().unwrap_or_default());
-                    Emission::Map(self.map(&path, words.scale.unwrap_or(1.0))?)
-                }
+                (None, _) => Emission::Map(self.map(words)?),
             }
         } else {
             return Err(Error::input(format!("light `{name}` has no kind")));
@@ -146,43 +180,96 @@ impl<'a> Builder<'a> {
         Ok(Light { name, emission })
     }
 
-    fn map(&mut self, path: &Path, scale: f64) -> Result<Arc<LatLong>> {
-        let name = (path.to_path_buf(), scale.to_bits());
+    fn map(&mut self, words: &Environment) -> Result<Arc<LatLong>> {
+        let path = resolve_path(&self.experiment.path, words.map.as_deref().unwrap_or_default());
+        let (scale, turns) = (words.scale.unwrap_or(1.0), words.rotate_deg.unwrap_or(0.0) / 360.0);
+        let name = (path.clone(), [scale, turns].map(f64::to_bits), words.upsampling.is_some());
         if let Some(map) = self.maps.get(&name) {
             return Ok(Arc::clone(map));
         }
-        let map = Arc::new(self.read_map(path, &read_exr(path)?, scale)?);
+        let map = Arc::new(self.read_map(&path, words.upsampling, scale, turns)?);
         self.maps.insert(name, Arc::clone(&map));
         Ok(map)
     }
 
-    fn read_map(&self, path: &Path, image: &ExrImage, scale: f64) -> Result<LatLong> {
+    fn read_map(
+        &self,
+        path: &Path,
+        upsampling: Option<Upsampling>,
+        scale: f64,
+        turns: f64,
+    ) -> Result<LatLong> {
+        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
+        let image =
+            if ["hdr", "rgbe", "pic"].contains(&&*ending) { read_hdr(path) } else { read_exr(path) };
+        let image = image.map_err(|error| {
+            error.of_input(
+                "a map is a latitude-longitude image, OpenEXR or Radiance HDR; its path is relative to the \
+                 folder of the experiment file, and `~` has no meaning in it",
+            )
+        })?;
+        // The columns of a turned map: azimuth grows towards the left edge.
+        let (width, shift) = (image.width, (turns - turns.floor()) * image.width as f64);
+        let column = |c: usize| (c + shift.round() as usize) % width;
+        let turned = |plane: Vec<f64>| -> Vec<f64> {
+            let texel = |k: usize| plane[k - k % width + column(k % width)];
+            (0..plane.len()).map(texel).collect()
+        };
         let planes = self.bands.iter().map(|band| {
-            let channels = &image.channels;
-            let channel = channels.get(&band.name).or_else(|| channels.get("Y")).ok_or_else(|| {
-                let known: Vec<&str> = channels.keys().map(String::as_str).collect();
-                Error::input_help(
-                    format!("{}: no channel for band `{}`", path.display(), band.name),
-                    format!(
-                        "a map needs a channel named like each band, or Y for all; it has {}",
-                        known.join(", ")
-                    ),
-                )
-            })?;
-            let bad = channel.iter().filter(|x| !x.is_finite() || **x < 0.0).count();
+            let plane = self.radiance(path, &image, band, upsampling)?;
+            let bad = plane.iter().filter(|x| !x.is_finite() || **x < 0.0).count();
             if bad > 0 {
                 return Err(Error::input_help(
                     format!(
-                        "{}: {bad} texels of band `{}` are negative or not finite",
+                        "`{}`: {bad} texels of band `{}` are negative or not finite",
                         path.display(),
                         band.name
                     ),
                     "repair the map; a radiance is a finite number that is not negative",
                 ));
             }
-            Ok(channel.iter().map(|&x| scale * f64::from(x)).collect())
+            Ok(turned(plane.into_iter().map(|x| scale * x).collect()))
         });
         Ok(LatLong::new(image.width, image.height, planes.collect::<Result<Vec<Vec<f64>>>>()?))
+    }
+
+    /// A map's radiance in a band: its channel, Y, or R, G and B upsampled.
+    fn radiance(
+        &self,
+        path: &Path,
+        image: &ExrImage,
+        band: &Band,
+        upsampling: Option<Upsampling>,
+    ) -> Result<Vec<f64>> {
+        let channels = &image.channels;
+        let colours: Option<Vec<&Vec<f32>>> = ["R", "G", "B"].iter().map(|c| channels.get(*c)).collect();
+        let own = channels.get(&band.name).or_else(|| channels.get("Y"));
+        match (own, upsampling, colours) {
+            (_, Some(Upsampling::Smooth), Some(colours)) => {
+                let weights = upsampling::band_weights(band.range_nm.unwrap_or([380.0, 780.0]));
+                let texel = |k: usize| -> f64 {
+                    weights.iter().zip(&colours).map(|(weight, c)| weight * f64::from(c[k])).sum()
+                };
+                Ok((0..image.width * image.height).map(texel).collect())
+            }
+            (Some(channel), ..) => Ok(channel.iter().map(|&x| f64::from(x)).collect()),
+            (None, _, colours) => {
+                let known: Vec<&str> = channels.keys().map(String::as_str).collect();
+                let known = known.join(", ");
+                Err(Error::input_help(
+                    format!("`{}`: no channel for band `{}`", path.display(), band.name),
+                    match colours.is_some() && band.range_nm.is_some() {
+                        true => format!(
+                            "add `upsampling = \"smooth\"` to make spectra of R, G and B; a map may also have a \
+                             channel named like each band, or Y for all; it has {known}"
+                        ),
+                        false => format!(
+                            "a map needs a channel named like each band, or Y for all; it has {known}"
+                        ),
+                    },
+                ))
+            }
+        }
     }
 }
 
@@ -216,6 +303,26 @@ pub(crate) fn bands(words: &schema::BandsEntry) -> Vec<Band> {
     words.list().into_iter().zip(words.display_rgb()).map(band).collect()
 }
 
+/// Where a body is, in words.
+fn extent(shape: &Shape) -> String {
+    match (shape, shape.bounds()) {
+        (_, Some(bounds)) => {
+            format!(
+                "it lies in the sphere of radius {} mm about {} mm",
+                short(bounds.radius),
+                bounds.center
+            )
+        }
+        (Shape::Slab { thickness }, None) => format!("it lies between z = -{thickness} and z = 0 mm"),
+        (_, None) => "it lies below z = 0".into(),
+    }
+}
+
+/// A length to four digits, for messages.
+fn short(length: f64) -> f64 {
+    format!("{length:.3e}").parse().unwrap_or(length)
+}
+
 fn build_shape(words: &ShapeEntry, experiment: &Experiment) -> Result<Shape> {
     let smooth = |words: &NormalsEntry| *words == NormalsEntry::Interpolated;
     let mesh = match words {
@@ -223,8 +330,15 @@ fn build_shape(words: &ShapeEntry, experiment: &Experiment) -> Result<Shape> {
         ShapeEntry::Slab { thickness_mm } => return Ok(Shape::Slab { thickness: *thickness_mm }),
         ShapeEntry::Box { size_mm } => return Ok(Shape::Box { half: 0.5 * DVec3::from(*size_mm) }),
         ShapeEntry::Sphere { radius_mm } => return Ok(Shape::Sphere { radius: *radius_mm }),
-        ShapeEntry::Mesh { path, longest_side_mm, normals } => {
-            load_obj(&resolve_path(&experiment.path, path), *longest_side_mm, smooth(normals))
+        ShapeEntry::Mesh { path, up, unit, longest_side_mm, rotate_deg, translate_mm, normals } => {
+            let placement = Placement {
+                is_y_up: *up == Some(UpAxis::Y),
+                unit_mm: unit.map_or(1.0, LengthUnit::mm),
+                longest_side_mm: *longest_side_mm,
+                rotate_deg: rotate_deg.unwrap_or_default(),
+                translate_mm: translate_mm.map_or(DVec3::ZERO, DVec3::from),
+            };
+            load_mesh(&resolve_path(&experiment.path, path), &placement, smooth(normals))
         }
         ShapeEntry::Icosphere { radius_mm, subdivisions, normals } => {
             procedural::icosphere(*radius_mm, *subdivisions, smooth(normals))

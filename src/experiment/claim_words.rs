@@ -49,6 +49,20 @@ pub struct ClaimEntry {
 }
 
 impl ClaimEntry {
+    /// The key of what it claims.
+    pub(crate) fn kind(&self) -> &'static str {
+        let kinds = [
+            ("equals", self.equals.is_some()),
+            ("agree", self.agree.is_some()),
+            ("differs", self.differs.is_some()),
+            ("mean_path_length", self.mean_path_length.is_some()),
+            ("reproduces", self.reproduces.is_some()),
+            ("faster", self.faster.is_some()),
+            ("not_slower", self.not_slower.is_some()),
+        ];
+        kinds.into_iter().find(|(_, is_there)| *is_there).map_or("sampler", |(kind, _)| kind)
+    }
+
     /// The comparison of efficiencies that the claim makes, if it makes one.
     pub fn duel(&self) -> Option<Faster> {
         let not_slower = || self.not_slower.as_ref().map(Faster::from);

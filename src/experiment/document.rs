@@ -163,10 +163,59 @@ impl Node {
 pub(crate) fn parse(name: &str, text: &str) -> Result<Node, Vec<Diagnostic>> {
     let reader = Reader { name: name.into(), text: text.into(), offset: 0, source: InputKind::File };
     let (table, errors) = DeTable::parse_recoverable(text);
+    if let (false, Some(open)) = (errors.is_empty(), unclosed(text)) {
+        let sign = &text[open..=open];
+        let close = if sign == "{" { "}" } else { "]" };
+        let rule = format!("this `{sign}` is not closed");
+        // What the parser makes of the text behind it helps nobody.
+        let help = Some(format!("end it with `{close}`"));
+        return Err(vec![Diagnostic { rule, place: Some(reader.place(open..open + 1)), help }]);
+    }
+    if let Some(finding) = errors.iter().find_map(|error| reader.single_bracket(error)) {
+        return Err(vec![finding]);
+    }
     let mut findings: Vec<Diagnostic> = errors.iter().map(|e| reader.syntax_error(e)).collect();
     let span = table.span();
     let root = reader.table(table.get_ref(), span, &mut findings);
     if findings.is_empty() { Ok(root) } else { Err(findings) }
+}
+
+/// The first bracket of a text that no bracket closes; comments and texts in quotes hold none.
+fn unclosed(text: &str) -> Option<usize> {
+    let bytes = text.as_bytes();
+    let mut open: Vec<usize> = Vec::new();
+    let mut at = 0;
+    while at < bytes.len() {
+        let rest = &text.as_bytes()[at..];
+        let long = [&b"\"\"\""[..], b"'''"].into_iter().find(|quotes| rest.starts_with(quotes));
+        match bytes[at] {
+            b'#' => at += rest.iter().position(|b| *b == b'\n').unwrap_or(rest.len()),
+            _ if long.is_some() => {
+                let quotes = long.unwrap_or_default();
+                let end = rest[3..].windows(3).position(|w| w == quotes).unwrap_or(rest.len());
+                at = (at + 3 + end + 3).min(bytes.len());
+                continue;
+            }
+            quote @ (b'"' | b'\'') => {
+                let mut end = 1;
+                while end < rest.len() && rest[end] != quote && rest[end] != b'\n' {
+                    end += if rest[end] == b'\\' && quote == b'"' { 2 } else { 1 };
+                }
+                at += end;
+            }
+            b'{' | b'[' => open.push(at),
+            close @ (b'}' | b']') => {
+                let wanted = if close == b'}' { b'{' } else { b'[' };
+                match open.pop() {
+                    Some(last) if bytes[last] == wanted => {}
+                    other => return other,
+                }
+            }
+            _ => {}
+        }
+        at += 1;
+    }
+    open.first().copied()
 }
 
 /// Parses `key=value`, the argument of `--set`, into the dotted key and the value; a value that is
@@ -223,6 +272,17 @@ impl Reader {
         let inline = self.text[(span.start + self.offset).min(self.text.len())..].starts_with('{');
         let origin = Origin { source: self.source.clone(), place: self.place(span) };
         Node { value, origin, key: None, inline }
+    }
+
+    /// A header `[light]` among headers `[[light]]`, which makes its keys those of another entry.
+    fn single_bracket(&self, error: &TomlError) -> Option<Diagnostic> {
+        let place = self.place(error.span()?);
+        let (key, begin) = (place.text(), place.span.start);
+        let before = self.text[..begin].rsplit('\n').next().unwrap_or("");
+        let is_header = before.trim() == "[" && self.text.contains(&format!("[[{key}]]"));
+        let rule = format!("`[{key}]` beside `[[{key}]]`");
+        let help = Some(format!("write `[[{key}]]`, with two brackets, before every entry of a list"));
+        is_header.then(|| Diagnostic { rule, place: Some(place.clone()), help })
     }
 
     fn syntax_error(&self, error: &TomlError) -> Diagnostic {

@@ -7,13 +7,14 @@ use serde::de::DeserializeOwned;
 use super::document::{self, Node, Value};
 use super::picture::PictureEntry;
 use super::registry::Registry;
-use super::rules::{self, At, CELL_KEYS, CellPoint, ExperimentParts, Findings, Known};
+use super::rules::{self, At, CELL_KEYS, CellPoint, ExperimentParts, Findings, Known, RUN_KEYS};
 use super::schema::{BandsEntry, BudgetShare, ClaimEntry, ExperimentFile};
 use super::schema_json::json_schema;
+use super::spectrum_csv;
 use super::sweep::{self, AxisPoint, SweepAxis};
 use super::validate::SchemaWalk;
 use super::validate::grammar::Grammar;
-use super::{Axis, CellSpec, Experiment, LoadOptions, origins, overrides, resolved};
+use super::{Axis, CellSpec, Experiment, LoadOptions, Sources, origins, overrides, resolved};
 use crate::error::{Diagnostic, Error, Place, Result};
 
 /// Reads, overrides and validates the experiment in `text`, which was read from `path`.
@@ -72,14 +73,15 @@ struct Loader<'a> {
 }
 
 impl Loader<'_> {
-    fn experiment(self, overridden: &[(String, Place)]) -> Result<Experiment> {
+    fn experiment(mut self, overridden: &[(String, Place)]) -> Result<Experiment> {
         let parts = rules::parts(At::new(&self.root, &self.findings), &self.root);
         let mut walk = SchemaWalk::new(&self.grammar, false);
         walk.root(&self.root, &CELL_KEYS, &parts.required());
         walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
-        let axes = sweep::axes(&self.root, self.path, overridden, &self.findings);
+        let mut axes = sweep::axes(&self.root, self.path, overridden, &self.findings);
         self.shared_rules(parts, axes.as_deref());
         let bands = self.bands();
+        self.read_spectra(bands.as_ref(), axes.as_deref_mut().unwrap_or_default());
         let Some(axes) = axes else {
             self.cell_rules(&self.root, bands.as_ref(), true);
             return Err(refusal(self.findings.into_sorted()));
@@ -100,11 +102,28 @@ impl Loader<'_> {
                 file.sweep = resolved::sweep(&axes);
                 file.setting.clear();
                 let origins = origins::list(&first, &file);
-                let axes = axes.iter().map(Axis::from).collect();
-                Ok(Experiment { path: self.path.to_path_buf(), file, cells, axes, settings, origins })
+                let (names, path) = (axes.iter().map(Axis::from).collect(), self.path.to_path_buf());
+                let sources = Sources::new(self.root, axes);
+                Ok(Experiment { path, file, cells, axes: names, settings, origins, sources })
             }
             (findings, ..) => Err(refusal(findings)),
         }
+    }
+
+    /// Puts numbers in the place of spectra from files.
+    fn read_spectra(&mut self, bands: Option<&BandsEntry>, axes: &mut [SweepAxis]) {
+        let bands = bands.map(BandsEntry::list);
+        let Loader { path, root, grammar, findings } = self;
+        let resolve =
+            |node: &mut Node| spectrum_csv::resolve(node, bands.as_deref(), path, grammar, findings);
+        if let Value::Table(entries) = &mut root.value {
+            entries
+                .iter_mut()
+                .filter(|(key, _)| CELL_KEYS.contains(&key.as_str()))
+                .for_each(|(_, n)| resolve(n));
+        }
+        let points = axes.iter_mut().flat_map(|axis| &mut axis.points);
+        points.flat_map(|point| &mut point.sets).for_each(|(_, value)| resolve(value));
     }
 
     /// The bands where nothing is wrong with them: otherwise their number may be absurd.
@@ -168,10 +187,12 @@ impl Loader<'_> {
         let emits = rules::emits(at.to("object"));
         let is_needed = |key: &&&str| **key != "light" || !emits || tree.get("light").is_some();
         CELL_KEYS.iter().filter(is_needed).for_each(|key| walk.entry(tree, key));
+        let swept = RUN_KEYS.iter().filter(|key| tree.get(key).is_some());
+        swept.for_each(|key| walk.entry(tree, key));
         walk.into_findings().into_iter().for_each(|finding| self.findings.add(finding));
         if let Some(bands) = bands {
             rules::object(at.to("object"), bands);
-            rules::lights(at.to("light"), bands.list().len(), emits);
+            rules::lights(at.to("light"), bands, emits);
         }
         if let Some(sensor) = at.typed("sensor") {
             let shape = at.to("object").typed("shape");
@@ -194,11 +215,15 @@ impl Loader<'_> {
         }
     }
 
-    /// Object, sensor and lights of the cell at `points`.
+    /// Object, sensor and lights of the cell at `points`, and what else its sweep sets.
     fn cell_tree(&self, points: &[&AxisPoint]) -> Node {
         let mut tree = Node { value: Value::Table(Default::default()), ..self.bare_root() };
         if let (Value::Table(entries), Value::Table(all)) = (&mut tree.value, &self.root.value) {
-            let kept = all.iter().filter(|(key, _)| CELL_KEYS.contains(&key.as_str()));
+            let sets = || points.iter().flat_map(|point| &point.sets);
+            let is_swept = |key: &str| sets().any(|(set, _)| set.split('.').next() == Some(key));
+            let is_own =
+                |key: &str| CELL_KEYS.contains(&key) || RUN_KEYS.contains(&key) && is_swept(key);
+            let kept = all.iter().filter(|(key, _)| is_own(key));
             entries.extend(kept.map(|(key, node)| (key.clone(), node.clone())));
         }
         for (key, value) in points.iter().flat_map(|point| &point.sets) {
@@ -247,6 +272,11 @@ fn typed<T: DeserializeOwned>(node: &Node) -> Option<T> {
     serde_json::from_value(node.to_json()).ok()
 }
 
+/// What the sweep sets of how a cell is measured; none within where it sets nothing.
+fn swept<T: DeserializeOwned>(tree: &Node, key: &str) -> Option<Option<T>> {
+    tree.get(key).map_or(Some(None), |node| typed(node).map(Some))
+}
+
 fn cell(tree: &Node, axes: &[SweepAxis], points: &[&AxisPoint]) -> Option<CellSpec> {
     let labels: Vec<&str> = points.iter().map(|point| point.label.as_str()).collect();
     let mut csv_row = std::collections::BTreeMap::new();
@@ -264,6 +294,8 @@ fn cell(tree: &Node, axes: &[SweepAxis], points: &[&AxisPoint]) -> Option<CellSp
         object: typed(tree.get("object")?)?,
         sensor: typed(tree.get("sensor")?)?,
         light: tree.get("light").map_or(Some(Vec::new()), typed)?,
+        estimator: swept(tree, "estimator")?,
+        budget: swept(tree, "budget")?,
         csv_row,
         csv_line: points.iter().find_map(|point| point.csv_line),
         sweep_values: sets.map(|(key, value)| (key.clone(), value.to_json())).collect(),

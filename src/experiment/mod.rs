@@ -14,6 +14,9 @@ pub(crate) mod build;
 /// Claims as they are written.
 mod claim_words;
 
+/// Kinds described by the schema.
+pub(crate) mod describe;
+
 /// Directions as they are written.
 mod direction;
 
@@ -56,6 +59,12 @@ pub(crate) mod schema_json;
 /// Sensors as they are written.
 mod sensor;
 
+/// Where values were written.
+mod sources;
+
+/// Spectra from CSV files.
+mod spectrum_csv;
+
 /// Suggestions of similar names ("did you mean").
 pub(crate) mod suggest;
 
@@ -75,12 +84,13 @@ pub(crate) mod validate;
 pub(crate) mod tests;
 
 pub use registry::Registry;
+pub(crate) use sources::Sources;
 pub(crate) use sweep::resolve_path;
 
-use schema::{ExperimentFile, LightEntry, Object, SensorEntry};
+use schema::{Budget, EstimatorEntry, ExperimentFile, LightEntry, Object, SensorEntry};
 
 /// A validated experiment.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Experiment {
     /// The file that it was read from.
     pub path: PathBuf,
@@ -97,6 +107,8 @@ pub struct Experiment {
     /// Dotted key, value and origin of everything in the first cell, sorted by key; an origin is a
     /// place, `--set ...`, or `default`.
     pub origins: Vec<(String, String, String)>,
+    /// Where values were written.
+    pub(crate) sources: Sources,
 }
 
 /// An axis of the sweep.
@@ -121,6 +133,10 @@ pub struct CellSpec {
     pub sensor: SensorEntry,
     /// Lights of the cell.
     pub light: Vec<LightEntry>,
+    /// The estimators of the cell, where the sweep sets options of one.
+    pub estimator: Option<Vec<EstimatorEntry>>,
+    /// The budget of the cell, where the sweep sets it.
+    pub budget: Option<Budget>,
     /// The columns of the rows that the cell took, as texts; where two axes have a column of one
     /// name, that of the first.
     pub csv_row: BTreeMap<String, String>,
@@ -151,6 +167,21 @@ pub fn load(path: &Path, options: &LoadOptions, registry: &Registry) -> Result<E
         )
     })?;
     load::load_text(path, &text, options, registry)
+}
+
+impl Experiment {
+    /// The estimator `entry` as the cell `cell` runs it.
+    pub(crate) fn estimator(&self, cell: usize, entry: usize) -> &EstimatorEntry {
+        let own = self.cells.get(cell).and_then(|cell| cell.estimator.as_ref());
+        own.and_then(|list| list.get(entry)).unwrap_or(&self.file.estimator[entry])
+    }
+}
+
+/// A cell by its place on the axes of the sweep, as `alpha = 0.1, g = 0.8`; the label itself where there is
+/// no sweep.
+pub(crate) fn titled(axes: &BTreeMap<String, String>, label: &str) -> String {
+    let words: Vec<String> = axes.iter().map(|(axis, label)| format!("{axis} = {label}")).collect();
+    if words.is_empty() { label.into() } else { words.join(", ") }
 }
 
 impl From<&sweep::SweepAxis> for Axis {

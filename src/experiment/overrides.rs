@@ -23,14 +23,23 @@ pub(super) fn set(root: &mut Node, key: &str, value: Node, grammar: &Grammar) ->
     if words.iter().any(|word| word.is_empty()) {
         return Err(refuse(format!("`{key}` is not a dotted key")));
     }
+    let indexed = indexed(root, key).map_err(|(rule, help)| Diagnostic { help, ..refuse(rule) })?;
+    let words: Vec<&str> = indexed.split('.').map(str::trim).collect();
     let mut node = &mut *root;
     for (i, word) in words.iter().enumerate() {
         let so_far = words[..i].join(".");
-        if i + 1 == words.len()
-            && let Value::Table(entries) = &mut node.value
-        {
-            let rivals = grammar.rivals(&words);
-            entries.retain(|key, _| !rivals.contains(&key.as_str()));
+        if let Value::Table(entries) = &mut node.value {
+            let rivals = grammar.rivals(&words[..=i]);
+            let is_rival = |key: &String| rivals.contains(&key.as_str());
+            if i + 1 == words.len() {
+                entries.retain(|key, _| !is_rival(key));
+            } else if let Some(there) = entries.keys().find(|key| is_rival(key))
+                && !entries.contains_key(*word)
+            {
+                let help = format!("set `{so_far}` as a whole, or give it as `{word}` in the file");
+                let rule = format!("`{so_far}` is `{there}` here: it has no `{}`", words[i..].join("."));
+                return Err(Diagnostic { help: Some(help), ..refuse(rule) });
+            }
         }
         let fresh = fresh(&value, words.get(i + 1).copied());
         node = child(node, word, fresh).map_err(|what| refuse(format!("`{so_far}` {what}")))?;
@@ -38,6 +47,48 @@ pub(super) fn set(root: &mut Node, key: &str, value: Node, grammar: &Grammar) ->
     let key = node.key.take();
     *node = Node { key: value.key.clone().or(key), ..value };
     Ok(())
+}
+
+/// A dotted key whose entries of lists are named by index where it names them by their `name`, as
+/// `light.sun.directional`; of a `light` without a name the default is its name. The key itself where it
+/// names none.
+///
+/// # Errors
+/// A name that no entry has, and those that there are.
+pub(super) fn indexed(root: &Node, key: &str) -> Result<String, (String, Option<String>)> {
+    let words: Vec<&str> = key.split('.').map(str::trim).collect();
+    let [list, word, ..] = words[..] else { return Ok(key.into()) };
+    let entries = root.get(list).map(Node::items).unwrap_or_default();
+    if entries.is_empty() || word.parse::<usize>().is_ok() {
+        return Ok(key.into());
+    }
+    let name = |(i, entry): (usize, &Node)| {
+        let given = entry.get("name").and_then(Node::as_str).map(String::from);
+        given.unwrap_or_else(|| format!("{list}_{}", i + 1))
+    };
+    let names: Vec<String> = entries.iter().enumerate().map(name).collect();
+    // Names may hold dots.
+    let rest = &key.trim_start()[list.len() + 1..];
+    let found = |name: &&String| {
+        rest.strip_prefix(name.as_str()).is_some_and(|r| r.starts_with('.') || r.is_empty())
+    };
+    match names.iter().filter(found).max_by_key(|name| name.len()) {
+        Some(name) => {
+            let index = names.iter().position(|known| known == name).unwrap_or_default();
+            Ok(format!("{list}.{index}{}", &rest[name.len()..]))
+        }
+        None => {
+            let known: Vec<&str> = names.iter().map(String::as_str).collect();
+            let help = match suggest::nearest(word, &known) {
+                Some(near) => format!("did you mean `{list}.{near}`?"),
+                None => {
+                    let numbered = names.iter().enumerate().map(|(i, name)| format!("{i} = `{name}`"));
+                    format!("by index or name: {}", numbered.collect::<Vec<_>>().join(", "))
+                }
+            };
+            Err((format!("no `[[{list}]]` is named `{word}`"), Some(help)))
+        }
+    }
 }
 
 /// The entries of `[setting.NAME]` as dotted keys and values. Tables written in braces are values,

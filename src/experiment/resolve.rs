@@ -2,10 +2,11 @@
 
 use super::schema::{
     BandsEntry, Coefficients, Eta, EtaFormula, ExperimentFile, MediumEntry, PresetMedium, Spectrum,
+    Upsampling,
 };
 use crate::optics::colour::{self, BandColours};
 use crate::optics::dispersion::{self, Dispersion};
-use crate::optics::materials;
+use crate::optics::{materials, upsampling};
 
 /// One wavelength band.
 #[derive(Clone, Debug, PartialEq)]
@@ -136,9 +137,21 @@ impl MediumEntry {
                 Some(BandMedium { sigma_a, sigma_s: reduced / (1.0 - g), g })
             };
             bands.iter().map(band).collect()
-        } else if let Some(PresetMedium { name, scale, g }) = &self.preset {
+        } else if let Some(PresetMedium { name, scale, g, upsampling }) = &self.preset {
             let material = materials::find(name)?;
             let g = g.unwrap_or(0.0);
+            if let (Some(Upsampling::Smooth), Some(_)) = (upsampling, bands.first()?.range_nm) {
+                let band = |band: &BandInterval| {
+                    let weights = upsampling::band_weights(band.range_nm?);
+                    let mean = |rgb: [f64; 3]| weights.iter().zip(rgb).map(|(w, x)| w * x).sum::<f64>();
+                    Some(BandMedium {
+                        sigma_a: mean(material.sigma_a) * scale,
+                        sigma_s: mean(material.reduced_sigma_s) * scale / (1.0 - g),
+                        g,
+                    })
+                };
+                return bands.iter().map(band).collect();
+            }
             let band = |(s, a): (&f64, &f64)| BandMedium {
                 sigma_a: a * scale,
                 sigma_s: s * scale / (1.0 - g),
@@ -212,7 +225,7 @@ mod tests {
             assert_eq!(medium.per_band(&two), Some(expected.clone()));
         }
         assert_eq!(none.per_band(2), None);
-        let preset = PresetMedium { name: "skin1".into(), scale: 2.0, g: Some(0.5) };
+        let preset = PresetMedium { name: "skin1".into(), scale: 2.0, g: Some(0.5), upsampling: None };
         let preset = MediumEntry { preset: Some(preset), ..MediumEntry::default() };
         let red = preset.per_band(&BandsEntry::Rgb {}.list()).unwrap()[0];
         assert_eq!(red, BandMedium { sigma_a: 0.064, sigma_s: 2.96, g: 0.5 });

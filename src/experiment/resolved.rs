@@ -8,10 +8,22 @@ use super::sweep::{AxisPoint, SweepAxis};
 use super::{CellSpec, Experiment};
 
 impl CellSpec {
-    /// Object, sensor and lights with sorted keys, every number of a continuous quantity as f64.
+    /// Object, sensor and lights, and what else the sweep sets, with sorted keys, every number of a continuous quantity as f64.
     /// Files (a mesh, a map) are in it by their path.
     pub fn content(&self) -> Json {
-        json!({ "object": json(&self.object), "sensor": json(&self.sensor), "light": json(&self.light) })
+        let mut content = json!({
+            "object": json(&self.object),
+            "sensor": json(&self.sensor),
+            "light": json(&self.light),
+        });
+        // Only where they are swept: cells that measure one scene in several ways have streams of their own.
+        if let Some(estimators) = &self.estimator {
+            content["estimator"] = json(estimators);
+        }
+        if let Some(budget) = &self.budget {
+            content["budget"] = json(budget);
+        }
+        content
     }
 
     /// The content without the values at the dotted `keys`: equal for cells that are paired over them.

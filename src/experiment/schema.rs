@@ -178,15 +178,29 @@ pub enum ShapeEntry {
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius_mm: f64,
     },
-    /// A closed triangle mesh from a Wavefront OBJ file.
+    /// A closed triangle mesh from a Wavefront OBJ or a PLY file.
     Mesh {
         /// Path, relative to the experiment file.
         path: String,
-        /// Scale the longest side of its bounding box to this, and centre the box at the origin;
-        /// without it the file's numbers are mm and stay where they are.
+        /// Axis of the file that points up, to +z; z without it.
+        ///
+        /// From y the mesh is turned about x: y becomes z, z becomes -y.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        up: Option<UpAxis>,
+        /// Unit of the file's numbers; mm without it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        unit: Option<LengthUnit>,
+        /// Scale the longest side of its bounding box to this, and centre the box at the origin; without it
+        /// the mesh keeps its size and place.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(extend("exclusiveMinimum" = 0))]
         longest_side_mm: Option<f64>,
+        /// Turns about x, then y, then z, degrees, counter-clockwise as seen from the tip of the axis.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        rotate_deg: Option<[f64; 3]>,
+        /// Shift after everything else, mm.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        translate_mm: Option<[f64; 3]>,
         /// Which normal the boundary sees.
         normals: NormalsEntry,
     },
@@ -273,6 +287,53 @@ pub enum ShapeEntry {
     },
 }
 
+/// Axis of a file that points up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum UpAxis {
+    /// As in most modelling programs.
+    Y,
+    /// As here.
+    Z,
+}
+
+/// Unit of a file's lengths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LengthUnit {
+    /// Micrometres.
+    Um,
+    /// Millimetres.
+    Mm,
+    /// Centimetres.
+    Cm,
+    /// Metres.
+    M,
+    /// Inches of 25.4 mm.
+    Inch,
+}
+
+impl LengthUnit {
+    /// Its length, mm.
+    pub(crate) fn mm(self) -> f64 {
+        match self {
+            LengthUnit::Um => 0.001,
+            LengthUnit::Mm => 1.0,
+            LengthUnit::Cm => 10.0,
+            LengthUnit::M => 1000.0,
+            LengthUnit::Inch => 25.4,
+        }
+    }
+}
+
+/// How R, G and B become values in bands of wavelengths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Upsampling {
+    /// Smooth weights over wavelength with sum 1; the spectrum shows as the colour that it is made of.
+    Smooth,
+}
+
 /// Which normal the boundary of a mesh sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -352,7 +413,7 @@ pub struct MediumEntry {
     /// Explicit coefficients.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coefficients: Option<Coefficients>,
-    /// A built-in measured material (`scatterproof list`), rgb bands only.
+    /// A built-in measured material (`scatterproof list`), for rgb bands, or for others by `upsampling`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub preset: Option<PresetMedium>,
     /// Skin by its constituents (Donner & Jensen 2006), spectral bands within 380 to 780 nm.
@@ -378,6 +439,9 @@ pub struct PresetMedium {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 1))]
     pub g: Option<f64>,
+    /// How bands of wavelengths take their coefficients from those of R, G and B; refused without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upsampling: Option<Upsampling>,
 }
 
 /// Coefficients: exactly one of the pairs (`sigma_t_per_mm`, `albedo`), (`sigma_a_per_mm`,
@@ -462,10 +526,17 @@ pub struct Environment {
     /// Only directions with a positive cosine to this axis shine (a slab lit on one face).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hemisphere: Option<[f64; 3]>,
-    /// Latitude-longitude OpenEXR map, relative to the experiment file; +z is up, the middle column
-    /// is +x. Channels R, G, B for rgb bands, Y for any bands, else a channel named like each band.
+    /// Latitude-longitude map, OpenEXR or Radiance HDR, relative to the experiment file; +z is up, the
+    /// middle column is +x. Channels R, G, B for rgb bands, Y for any bands, else a channel named like each
+    /// band, or `upsampling`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<String>,
+    /// Turns the map about z, degrees, counter-clockwise from above, to the nearest column.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate_deg: Option<f64>,
+    /// How bands of wavelengths take their radiance from R, G and B; refused without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upsampling: Option<Upsampling>,
     /// Factor on the radiance of the map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]

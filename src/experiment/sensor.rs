@@ -156,6 +156,16 @@ impl SensorEntry {
         matches!(self, SensorEntry::Orthographic { .. } | SensorEntry::Perspective { .. })
     }
 
+    /// The dotted key of the point at which its rays start, where they start at one point.
+    pub(crate) fn key_of_position(&self) -> Option<&'static str> {
+        match self {
+            SensorEntry::Perspective { .. } => Some("sensor.perspective.position_mm"),
+            SensorEntry::Probe { .. } => Some("sensor.probe.point_mm"),
+            SensorEntry::Vertex { .. } => Some("sensor.vertex.point_mm"),
+            _ => None,
+        }
+    }
+
     /// The sensor, for a body of this shape.
     ///
     /// # Errors

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::document::{InputKind, Node, Value};
-use super::overrides::{is_within, overlap, relabel};
-use super::rules::{CELL_KEYS, Findings};
+use super::overrides::{indexed, is_within, overlap, relabel};
+use super::rules::{CELL_KEYS, Findings, RUN_KEYS};
 use super::suggest;
 use super::sweep_csv;
 pub(crate) use super::sweep_point::{AxisPoint, RowField, SweepAxis};
@@ -28,14 +28,14 @@ pub(crate) fn axes(
     findings: &Findings,
 ) -> Option<Vec<SweepAxis>> {
     let entries = root.get("sweep").map(Node::items).unwrap_or_default();
-    let read = entries.iter().map(|entry| axis(entry, experiment, findings));
+    let read = entries.iter().map(|entry| by_index(root, axis(entry, experiment, findings)?, findings));
     let axes: Vec<Option<SweepAxis>> = read.collect();
     let axes: Option<Vec<SweepAxis>> = axes.into_iter().collect();
     let axes = axes?;
     let sound = [
         unique_axes(&axes, entries, findings),
         keys_apart(&axes, findings),
-        not_overridden(&axes, overridden, findings),
+        not_overridden(root, &axes, overridden, findings),
         few_cells(&axes, entries, findings),
     ];
     sound.iter().all(|ok| *ok).then_some(axes)
@@ -68,6 +68,51 @@ fn axis(entry: &Node, experiment: &Path, findings: &Findings) -> Option<SweepAxi
     }
     let known_keys = cell_keys_only(&points, findings);
     (unique_labels(&points, findings) && known_keys).then_some(SweepAxis { name, points })
+}
+
+/// Keys that name a light or an estimator, by its index.
+fn by_index(root: &Node, mut axis: SweepAxis, findings: &Findings) -> Option<SweepAxis> {
+    let mut sound = true;
+    for (key, value) in axis.points.iter_mut().flat_map(|point| &mut point.sets) {
+        match indexed(root, key) {
+            Ok(by_index) => {
+                *key = by_index;
+                if let Some((rule, help)) = other_estimator(root, key) {
+                    sound = false;
+                    findings.at(value.key.as_ref().unwrap_or(&value.origin.place), rule, Some(help));
+                }
+            }
+            Err((rule, help)) => {
+                sound = false;
+                findings.at(value.key.as_ref().unwrap_or(&value.origin.place), rule, help);
+            }
+        }
+    }
+    sound.then_some(axis)
+}
+
+/// Why a key cannot be swept that is about an estimator: a sweep changes its options and neither its name
+/// nor its kind, by which claims and tables know it.
+fn other_estimator(root: &Node, key: &str) -> Option<(String, String)> {
+    let words: Vec<&str> = key.split('.').collect();
+    let ["estimator", rest @ ..] = &words[..] else { return None };
+    let entry = rest.first().and_then(|index| root.at(&["estimator", index]))?;
+    let is_kind = |word: &&&str| **word != "name" && entry.get(word).is_some();
+    if rest.get(1).filter(is_kind).is_some() {
+        return None;
+    }
+    let name = entry.get("name").and_then(Node::as_str).unwrap_or_default();
+    let kind = match &entry.value {
+        Value::Table(entries) => entries.keys().find(|key| *key != "name").cloned(),
+        _ => None,
+    };
+    let kind = kind.unwrap_or_else(|| "KIND".into());
+    Some((
+        format!("`{key}` cannot be swept: a sweep changes options of an estimator"),
+        format!(
+            "an option of `{name}` is `estimator.{name}.{kind}.OPTION` (`scatterproof list {kind}`)"
+        ),
+    ))
 }
 
 enum AxisForm {
@@ -152,7 +197,8 @@ fn setting(key: &Node, value: &Node) -> Option<(String, Node)> {
 
 fn not_empty(list: &Node, findings: &Findings) -> Option<()> {
     if list.items().is_empty() {
-        findings.at(list.place(), "empty sweep", None);
+        let help = "give the list at least one entry, or remove the sweep";
+        findings.at(list.place(), "empty sweep", Some(help.into()));
         return None;
     }
     Some(())
@@ -169,11 +215,13 @@ fn unique_labels(points: &[AxisPoint], findings: &Findings) -> bool {
 
 fn cell_keys_only(points: &[AxisPoint], findings: &Findings) -> bool {
     let sets = points.first().map(|point| &point.sets[..]).unwrap_or_default();
-    let is_foreign = |key: &str| !key.split('.').next().is_some_and(|word| CELL_KEYS.contains(&word));
+    let known = |word: &str| CELL_KEYS.contains(&word) || RUN_KEYS.contains(&word);
+    let is_foreign = |key: &str| !key.split('.').next().is_some_and(known);
     let foreign: Vec<_> = sets.iter().filter(|(key, _)| is_foreign(key)).collect();
     for (key, value) in &foreign {
         let place = value.key.as_ref().unwrap_or(&value.origin.place);
-        let help = "a sweep sets keys that begin with `object`, `sensor` or `light`";
+        let help =
+            "a sweep sets keys that begin with `object`, `sensor`, `light`, `estimator` or `budget`";
         findings.at(place, format!("`{key}` cannot be swept"), Some(help.into()));
     }
     foreign.is_empty()
@@ -213,7 +261,12 @@ fn keys_apart(axes: &[SweepAxis], findings: &Findings) -> bool {
     sound
 }
 
-fn not_overridden(axes: &[SweepAxis], overridden: &[(String, Place)], findings: &Findings) -> bool {
+fn not_overridden(
+    root: &Node,
+    axes: &[SweepAxis],
+    overridden: &[(String, Place)],
+    findings: &Findings,
+) -> bool {
     let swept: Vec<(&str, &str)> = axes
         .iter()
         .filter_map(|axis| Some((axis, axis.points.first()?)))
@@ -221,6 +274,7 @@ fn not_overridden(axes: &[SweepAxis], overridden: &[(String, Place)], findings: 
         .collect();
     let mut sound = true;
     for (key, place) in overridden {
+        let key = &indexed(root, key).unwrap_or_else(|_| key.clone());
         if let Some((axis, _)) = swept.iter().find(|(_, swept)| is_within(key, swept)) {
             sound = false;
             let rule = format!("`{key}` has no effect: the sweep `{axis}` sets it in every cell");

@@ -7,12 +7,15 @@ mod analytic;
 mod audit;
 mod body_surface;
 mod clearance;
+mod imported;
 mod lines;
 mod measure;
 mod mesh;
+mod mesh_file;
 mod node;
 mod normals;
 mod obj;
+mod ply;
 pub mod procedural;
 mod surface;
 #[cfg(test)]
@@ -26,8 +29,8 @@ mod triangle;
 pub use body_surface::{BodyPoint, BodySampler, FaceChoice};
 pub use lines::{Line, Lines, Met};
 pub use mesh::Mesh;
+pub use mesh_file::{Placement, load_mesh};
 pub use normals::Normals;
-pub use obj::load_obj;
 pub use surface::{SurfacePoint, SurfaceSampler, Triangle};
 
 use crate::math::{DVec3, Frame};

@@ -35,3 +35,4 @@ pub mod materials;
 
 /// The spectrum of skin.
 pub mod skin;
+pub(crate) mod upsampling;

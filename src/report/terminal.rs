@@ -7,6 +7,7 @@ use super::summary;
 use super::table::Table;
 use crate::results::measurements::Measurement;
 use crate::results::record::CostMeasure;
+use crate::verify::comparisons::EfficiencyRow;
 use crate::verify::verdict::{TestKind, Verdict};
 
 /// One row per cell and estimator: the sensor's first observable in every band, passes, CPU time, speed.
@@ -73,6 +74,13 @@ pub(crate) fn sampler_table(data: &ReportData) -> Table {
 pub(crate) fn efficiency_table(data: &ReportData) -> Option<TableBlock> {
     let by = |cost| summary::efficiency(&data.stored, &data.comparisons, cost);
     by(CostMeasure::Cpu).or_else(|| by(CostMeasure::Counters))
+}
+
+/// The rows of that table.
+pub(crate) fn efficiency_rows(data: &ReportData) -> Vec<&EfficiencyRow> {
+    let by = |cost| summary::chosen(&data.stored, &data.comparisons, cost);
+    let has_ratio = |rows: &Vec<&EfficiencyRow>| rows.iter().any(|row| row.quoted().is_some());
+    Some(by(CostMeasure::Cpu)).filter(has_ratio).unwrap_or_else(|| by(CostMeasure::Counters))
 }
 
 /// A text in lines of at most `width` characters, broken at blanks.

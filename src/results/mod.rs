@@ -11,6 +11,7 @@ pub mod counted_work;
 pub mod csv_text;
 /// OpenEXR files.
 pub mod exr_file;
+pub(crate) mod hdr_file;
 /// A run's image, and the PNG that shows it.
 pub mod image;
 /// Canonical JSON and content hashes.

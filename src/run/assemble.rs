@@ -154,7 +154,7 @@ fn estimator_run(
     arrays: &mut Arrays,
 ) -> EstimatorRun {
     let (observables, bands) = (job.layout.observables().len(), job.layout.bands());
-    let entry = &experiment.file.estimator[job.entry];
+    let entry = experiment.estimator(job.cell, job.entry);
     let total = finished.total();
     let batches = &finished.batches;
     let shape = vec![batches.len(), observables, bands, 5];

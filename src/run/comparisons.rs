@@ -3,11 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Refusals, Result};
 use crate::experiment::schema::{
     Agree, ClaimEntry, Differs, Equals, Expect, Faster, MeanPathLength, SamplerClaim,
 };
-use crate::experiment::{CellSpec, Experiment};
+use crate::experiment::{CellSpec, Experiment, suggest};
 use crate::results::record::{
     self, Against, Band, Claim, ClaimKind, Comparison, ExpectedOutcome, Observable, Quantity,
     SamplerComparison,
@@ -31,8 +31,14 @@ pub(crate) fn expand(
 ) -> Result<Vec<Comparison>> {
     let claims = experiment.file.claim.iter().enumerate();
     let scope = Scope { experiment, bands, observables, scenes };
-    let lists = claims.map(|(index, claim)| scope.claim(index, claim)).collect::<Result<Vec<_>>>()?;
-    Ok(lists.into_iter().flatten().collect())
+    let mut refusals = Refusals::default();
+    let mut comparisons = Vec::new();
+    for (index, claim) in claims {
+        let of_claim = scope.claim(index, claim).map_err(|error| error.at(scope.place(index, "")));
+        comparisons.extend(refusals.keep("", of_claim)?.into_iter().flatten());
+    }
+    refusals.none_in(0)?;
+    Ok(comparisons)
 }
 
 /// The claims on samplers, for each of the samplers that were drawn from.
@@ -109,6 +115,13 @@ struct Scope<'a> {
 }
 
 impl Scope<'_> {
+    /// Where a claim states a word, or the claim itself where it does not.
+    fn place(&self, claim: usize, word: &str) -> Option<Place> {
+        let kind = self.experiment.file.claim.get(claim).map_or("", ClaimEntry::kind);
+        let key = format!("claim.{claim}.{kind}.{word}");
+        self.experiment.sources.place(0, key.trim_end_matches('.'))
+    }
+
     fn claim(&self, index: usize, claim: &ClaimEntry) -> Result<Vec<Comparison>> {
         if let Some(equals) = &claim.equals {
             return self.equals(index, equals);
@@ -211,26 +224,24 @@ impl Scope<'_> {
         if duel.observable.as_deref() != Some(record::PIXELS) {
             return self.observable(claim, cell, &duel.observable, &duel.class);
         }
-        let place = || {
-            format!(
-                "claim {} is about `{}` in cell `{}`",
-                claim + 1,
-                record::PIXELS,
-                self.experiment.cells[cell].label
-            )
+        let refuse = |word: &str, rule: String, help: &str| {
+            Err(Error::input_help(rule, help).at(self.place(claim, word)))
         };
+        let pixels = record::PIXELS;
         if !self.experiment.cells[cell].sensor.has_pixels() {
-            return Err(Error::input_help(
-                format!("{}, whose sensor has none", place()),
+            return refuse(
+                "observable",
+                format!("the sensor has no `{pixels}`"),
                 "leave `observable` out, or take an `orthographic` or a `perspective` sensor",
-            ));
+            );
         }
         match duel.class.as_deref() {
             None | Some("all") => Ok(Observable::pixels()),
-            Some(class) => Err(Error::input_help(
-                format!("{} and class `{class}`: images are not kept by class", place()),
+            Some(class) => refuse(
+                "class",
+                format!("`{pixels}` of class `{class}`: images are not kept by class"),
                 "leave `class` out, or compare the image's mean: `observable = \"mean\"`",
-            )),
+            ),
         }
     }
 
@@ -334,18 +345,35 @@ impl Scope<'_> {
         let known = &self.observables[cell];
         let name = name.as_deref().unwrap_or(&known[0].name);
         let class = class.as_deref().unwrap_or("all");
-        let found = known.iter().find(|o| o.name == name && o.class == class);
-        found.cloned().ok_or_else(|| {
-            let list: Vec<String> = known.iter().map(|o| format!("{} ({})", o.name, o.class)).collect();
-            Error::input_help(
-                format!("claim {} names observable `{name}` of class `{class}`", claim + 1),
-                format!(
-                    "the sensor of cell `{}` has {}",
-                    self.experiment.cells[cell].label,
-                    list.join(", ")
-                ),
-            )
-        })
+        if let Some(found) = known.iter().find(|o| o.name == name && o.class == class) {
+            return Ok(found.clone());
+        }
+        let unique = |words: Vec<&'_ str>| {
+            let mut unique: Vec<String> = Vec::new();
+            for word in words {
+                if !unique.iter().any(|known| known == word) {
+                    unique.push(word.into());
+                }
+            }
+            unique
+        };
+        let names = unique(known.iter().map(|o| o.name.as_str()).collect());
+        let of_name = || known.iter().filter(|o| o.name == name);
+        let classes = unique(of_name().map(|o| o.class.as_str()).collect());
+        let help = |word: &str, known: &[String], what: &str| {
+            suggest::help(word, &known.iter().map(String::as_str).collect::<Vec<_>>(), what)
+        };
+        let (word, rule, help) = match classes.is_empty() {
+            true => {
+                let has = "observables of this sensor";
+                ("observable", format!("unknown observable `{name}`"), help(name, &names, has))
+            }
+            false => {
+                let has = format!("classes of `{name}`");
+                ("class", format!("unknown class `{class}`"), help(class, &classes, &has))
+            }
+        };
+        Err(Error::input_help(rule, help).at(self.place(claim, word)))
     }
 }
 

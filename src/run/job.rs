@@ -10,6 +10,7 @@ use super::chi_square::Draws;
 use super::clock::thread_cpu_time;
 use super::keys::Stage;
 use crate::estimators::{Anomaly, BandUse, Cost, Estimator, Layout, Scores};
+use crate::experiment::schema::Budget;
 use crate::sampling::stream::StreamKey;
 use crate::stats::moments::{ImageMoments, Moments};
 use crate::stats::tree::{Counter, Merge};
@@ -18,6 +19,8 @@ use crate::stats::tree::{Counter, Merge};
 pub(crate) struct Job {
     /// Label in messages: cell and estimator, or the sampler.
     pub label: String,
+    /// The same for progress, the cell by its place on the axes: `alpha = 0.1 / mis`.
+    pub title: String,
     /// Hash of all that its result depends on except the number of passes, hex: its state is kept under
     /// it.
     pub identity: String,
@@ -132,6 +135,9 @@ pub(crate) struct BudgetTerms {
     pub targets: Vec<usize>,
     /// PassRange of the budget's passes or seconds.
     pub share: f64,
+    /// The budget itself, where the sweep sets one for the cell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<Budget>,
 }
 
 /// Bands that one call runs together.

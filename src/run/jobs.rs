@@ -9,15 +9,16 @@ use serde_json::{Value, json};
 use super::chi_square::Draws;
 use super::clock::thread_cpu_time;
 use super::comparisons;
+use super::decidable;
 use super::job::{Arm, BudgetTerms, Group, Job, Passes, SetUp, Task, band_groups};
 use super::keys::{KEY_VERSION, Stage, StreamName};
 use super::memory::MemoryEstimate;
-use crate::error::{Error, Result};
+use crate::error::{Error, Refusals, Result};
 use crate::estimators::Layout;
 use crate::experiment::build::{self, Builder};
 use crate::experiment::registry::Registry;
 use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure, Faster, SamplerEntry};
-use crate::experiment::{CellSpec, Experiment};
+use crate::experiment::{CellSpec, Experiment, titled};
 use crate::results::json::{canonical, hash_bytes, hash_json};
 use crate::results::provenance;
 use crate::results::record::{Against, Band, Comparison, Observable};
@@ -73,38 +74,49 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
     let cells = cells(experiment, &mut builder)?;
     let observables: Vec<Vec<Observable>> = cells.iter().map(|cell| named(&cell.layout)).collect();
     let scenes: Vec<&Scene> = cells.iter().map(|cell| &*cell.scene).collect();
-    let comparisons = comparisons::expand(experiment, &bands, &observables, &scenes)?;
+    let mut refusals = Refusals::default();
+    let comparisons = comparisons::expand(experiment, &bands, &observables, &scenes);
+    let comparisons = refusals.keep("", comparisons)?;
+    let are_claims_sound = comparisons.is_some();
+    let comparisons = comparisons.unwrap_or_default();
     let inputs = json!(build::inputs(experiment));
     let planner = Planner { experiment, registry, bands: &bands, inputs, stage };
     let arms = Duels::new(experiment);
     let mut jobs = Vec::new();
     for (index, cell) in cells.iter().enumerate() {
-        let wanted = claimed(experiment, index, &comparisons);
+        let wanted = claimed(experiment, index, &comparisons).filter(|_| are_claims_sound);
         for (entry, words) in experiment.file.estimator.iter().enumerate() {
             if wanted.as_ref().is_some_and(|names| !names.contains(words.name.as_str())) {
                 continue;
             }
             let targets = targets(index, &words.name, &comparisons, &observables[index]);
             let share = share(experiment, cell.spec, &words.name);
-            let terms = BudgetTerms { targets, share };
+            let terms = BudgetTerms { targets, share, budget: cell.spec.budget.clone() };
             for arm in arms.of(cell.spec, &words.name) {
-                jobs.push(planner.passes(index, cell, entry, arm, terms.clone())?);
+                let job = planner.passes(index, cell, entry, arm, terms.clone());
+                jobs.extend(refusals.keep(&cell.spec.label, job)?);
             }
         }
     }
+    for index in 0..experiment.file.sampler.len() {
+        jobs.extend(refusals.keep("", planner.draws(index))?);
+    }
+    refusals.none_in(cells.len())?;
     if jobs.is_empty() && experiment.file.only_claimed {
-        return Err(Error::input_help(
+        let error = Error::input_help(
             "no claim names an estimator, and `only_claimed` leaves nothing to run",
             "claim something, or leave `only_claimed` out",
-        ));
+        );
+        return Err(error.at(experiment.sources.place(0, "only_claimed")));
     }
-    for index in 0..experiment.file.sampler.len() {
-        jobs.push(planner.draws(index)?);
-    }
-    let passes = match experiment.file.budget {
-        Some(Budget::Passes(passes)) => Some(passes),
+    decidable::check(experiment, &comparisons, &jobs)?;
+    let budgets =
+        experiment.cells.iter().map(|cell| cell.budget.as_ref().or(experiment.file.budget.as_ref()));
+    let passes = budgets.map(|budget| match budget {
+        Some(Budget::Passes(passes)) => Some(*passes),
         _ => None,
-    };
+    });
+    let passes = passes.collect::<Option<Vec<u64>>>().and_then(|passes| passes.into_iter().max());
     let scene_bytes = [builder.memory_bytes(), builder.building_bytes()];
     Ok(Plan { jobs, comparisons, stage, scene_bytes, passes, bands })
 }
@@ -120,24 +132,31 @@ struct BuiltCell<'a> {
 fn cells<'a>(experiment: &'a Experiment, builder: &mut Builder) -> Result<Vec<BuiltCell<'a>>> {
     let mut known: BTreeMap<String, &str> = BTreeMap::new();
     let mut cells = Vec::new();
-    for spec in &experiment.cells {
+    let mut refusals = Refusals::default();
+    for (index, spec) in experiment.cells.iter().enumerate() {
         if let Some(twin) = known.insert(hash_json(&spec.content()), &spec.label) {
-            return Err(Error::input_help(
+            let error = Error::input_help(
                 format!("cells `{twin}` and `{}` are the same scene", spec.label),
                 "equal scenes run on equal streams, so neither is evidence about the other: drop one",
-            ));
+            );
+            refusals.keep::<()>("", Err(error.at(experiment.sources.place(index, "sweep.0"))))?;
         }
-        let scene = Arc::new(builder.scene(spec)?);
+        let Some(scene) = refusals.keep(&spec.label, builder.scene(index).map(Arc::new))? else {
+            continue;
+        };
         let layout = Layout::new(&scene);
         let count = layout.observables().len();
         if count > MOST_OBSERVABLES {
-            return Err(Error::input_help(
-                format!("cell `{}` has {count} observables", spec.label),
+            let error = Error::input_help(
+                format!("the sensor has {count} observables"),
                 format!("a record holds at most {MOST_OBSERVABLES}; lower the number of bins"),
-            ));
+            );
+            refusals
+                .keep::<()>(&spec.label, Err(error.at(experiment.sources.place(index, "sensor"))))?;
         }
         cells.push(BuiltCell { spec, scene, layout });
     }
+    refusals.none_in(experiment.cells.len())?;
     Ok(cells)
 }
 
@@ -161,19 +180,26 @@ impl Planner<'_> {
         arm: Arm,
         terms: BudgetTerms,
     ) -> Result<Job> {
-        let words = &self.experiment.file.estimator[entry];
+        let words = self.experiment.estimator(index, entry);
         let no_kind = || Error::input(format!("estimator `{}` has no kind", words.name));
         let (kind, options) = words.choice().ok_or_else(no_kind)?;
         let unknown = || Error::input(format!("estimator `{}`: unknown kind `{kind}`", words.name));
         let registered = self.registry.get(kind).ok_or_else(unknown)?;
         let before = thread_cpu_time();
-        let estimator = (registered.build)(options, Arc::clone(&cell.scene))?;
+        let estimator = (registered.build)(options, Arc::clone(&cell.scene)).map_err(|error| {
+            let place = self.experiment.sources.place(index, &format!("estimator.{entry}.{kind}"));
+            error.about(&format!("estimator `{}`", words.name)).at(place)
+        })?;
         let set_up = SetUp::built(thread_cpu_time().saturating_sub(before));
         let groups = band_groups(estimator.band_use(), self.bands.len()).into_iter();
         let groups = groups.map(|group| self.group(cell.spec, &arm.name, group)).collect();
         let label = match cell.spec.label.as_str() {
             "" => arm.name.clone(),
             cell => format!("{cell} / {}", arm.name),
+        };
+        let title = match cell.spec.axes.is_empty() {
+            true => arm.name.clone(),
+            false => format!("{} / {}", titled(&cell.spec.axes, &cell.spec.label), arm.name),
         };
         let file = &self.experiment.file;
         let identity = json!({
@@ -203,7 +229,8 @@ impl Planner<'_> {
             groups,
             terms,
         };
-        Ok(Job { label, identity: hash_json(&identity), task: Task::Estimate(Box::new(passes)) })
+        let task = Task::Estimate(Box::new(passes));
+        Ok(Job { label, title, identity: hash_json(&identity), task })
     }
 
     /// Bands that run together, with their streams.
@@ -227,7 +254,10 @@ impl Planner<'_> {
     fn draws(&self, index: usize) -> Result<Job> {
         let file = &self.experiment.file;
         let words = &file.sampler[index];
-        let (kind, sampler) = build_sampler(words, self.registry)?;
+        let (kind, sampler) = build_sampler(words, self.registry).map_err(|error| {
+            let place = self.experiment.sources.place(0, &format!("sampler.{index}"));
+            error.about(&format!("sampler `{}`", words.name)).at(place)
+        })?;
         // Intentionally absent: the number of draws, claims, threads, the order of the file.
         let mut name = json!({
             "version": KEY_VERSION,
@@ -252,7 +282,7 @@ impl Planner<'_> {
             key: StreamKey::new(hash_bytes(canonical(&name).as_bytes())),
         };
         let (label, identity) = (words.name.clone(), hash_json(&identity));
-        Ok(Job { label, identity, task: Task::Draw(Box::new(draws)) })
+        Ok(Job { title: label.clone(), label, identity, task: Task::Draw(Box::new(draws)) })
     }
 }
 

@@ -20,6 +20,7 @@ pub(crate) mod tev;
 pub(crate) mod workers;
 
 mod assemble;
+mod decidable;
 mod jobs;
 mod merge;
 mod replay;
@@ -246,6 +247,83 @@ fn replays(
     replays.ok_or_else(|| {
         Error::Interrupted("all passes are done and kept; the same command resumes from there".into())
     })
+}
+
+/// Parts of an experiment that leave its measurements what they are: a record of other values of these may be
+/// replaced, by more passes of the same streams for example.
+const NO_OTHER_EXPERIMENT: [&str; 7] =
+    ["budget", "budget_share", "description", "display", "fresh", "only_claimed", "samples"];
+
+/// Refuses to run where the folder holds the record of another experiment.
+///
+/// # Errors
+/// What differs between the two, and how both are kept.
+pub(crate) fn refuse_to_replace(experiment: &Experiment, out: &Path) -> Result<()> {
+    let folder = RecordFolder::new(out.join(&experiment.file.name));
+    if !folder.exists() {
+        return Ok(());
+    }
+    // A record that cannot be read holds nothing to lose.
+    let Ok(stored) = folder.read() else { return Ok(()) };
+    let differences = differences(&stored.record.resolved, &experiment.resolved());
+    let Some((key, [there, here])) = differences.first() else { return Ok(()) };
+    let more = match differences.len() {
+        1 => String::new(),
+        n => format!(", and {} more", n - 1),
+    };
+    let date = folder.read_provenance().ok().flatten().map(|provenance| provenance.date);
+    let date = date.map_or(String::new(), |date| format!(" of {date}"));
+    Err(Error::input_help(
+        format!(
+            "{} holds a record{date} of another experiment of this name: `{key}` is {there} there and {here} \
+             here{more}",
+            folder.root().display()
+        ),
+        "to keep both, give another `name` (`--set name=...`) or another folder (`--out DIR`); `--replace` \
+         gives up the one that is there",
+    ))
+}
+
+/// The dotted keys at which two experiments differ, with both values.
+fn differences(there: &serde_json::Value, here: &serde_json::Value) -> Vec<(String, [String; 2])> {
+    fn walk(key: &str, pair: [&serde_json::Value; 2], found: &mut Vec<(String, [String; 2])>) {
+        use serde_json::Value::{Array, Null, Object};
+        let inner = |word: &str| if key.is_empty() { word.into() } else { format!("{key}.{word}") };
+        match pair {
+            [a, b] if a == b => {}
+            [Object(a), Object(b)] => {
+                let keys: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+                for word in keys {
+                    let value =
+                        |side: &'_ serde_json::Map<_, _>| side.get(word).cloned().unwrap_or(Null);
+                    walk(&inner(word), [&value(a), &value(b)], found);
+                }
+            }
+            [Array(a), Array(b)] if a.len() == b.len() && a.iter().any(|item| item.is_object()) => {
+                for (i, (a, b)) in a.iter().zip(b).enumerate() {
+                    walk(&inner(&i.to_string()), [a, b], found);
+                }
+            }
+            pair => {
+                let short = |value: &serde_json::Value| match value {
+                    Null => "not given".to_string(),
+                    value => {
+                        let text = value.to_string();
+                        match text.char_indices().nth(40) {
+                            Some((end, _)) => format!("{}...", &text[..end]),
+                            None => text,
+                        }
+                    }
+                };
+                found.push((key.into(), pair.map(short)));
+            }
+        }
+    }
+    let mut found = Vec::new();
+    walk("", [there, here], &mut found);
+    let is_other = |key: &str| !NO_OTHER_EXPERIMENT.contains(&key.split('.').next().unwrap_or(key));
+    found.retain(|(key, _)| is_other(key));
+    found
 }
 
 /// Whether the folder holds a record of exactly this experiment, its claims and pictures included, by

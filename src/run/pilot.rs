@@ -18,7 +18,7 @@ pub(crate) fn passes(job: &Passes, budget: &Budget, stop: &dyn Fn() -> bool) -> 
     if job.count.is_some() {
         return job.count;
     }
-    match budget {
+    match job.terms.budget.as_ref().unwrap_or(budget) {
         // A share of 1 leaves any number of passes as it is.
         Budget::Passes(passes) => Some(((*passes as f64 * job.terms.share).round() as u64).max(2)),
         Budget::CpuSeconds(seconds) => for_seconds(job, seconds * job.terms.share, stop),

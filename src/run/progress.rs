@@ -11,6 +11,7 @@ const STEPS: u64 = 1000;
 /// A bar on standard error, or nothing where that is no terminal.
 pub(crate) struct Progress {
     bar: ProgressBar,
+    jobs: usize,
 }
 
 impl Progress {
@@ -19,16 +20,19 @@ impl Progress {
         let shown = !quiet && std::io::stderr().is_terminal();
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(jobs as u64 * STEPS), target);
-        let style = "{wide_msg} [{bar:20}] {percent:>3}%  {elapsed}, {eta} left";
+        let style = "{prefix}: {wide_msg} [{bar:16}] {percent:>3}%  {elapsed}, {eta} left";
         if let Ok(style) = ProgressStyle::with_template(style) {
             bar.set_style(style.progress_chars("=> "));
         }
         bar.enable_steady_tick(Duration::from_millis(250));
-        Progress { bar }
+        let progress = Progress { bar, jobs };
+        progress.update(0.0, String::new());
+        progress
     }
 
     /// Jobs finished, the fraction of those under way, and what is being done.
     pub(crate) fn update(&self, jobs_done: f64, message: String) {
+        self.bar.set_prefix(format!("job {} of {}", (jobs_done as usize + 1).min(self.jobs), self.jobs));
         self.bar.set_message(message);
         self.bar.set_position((jobs_done * STEPS as f64) as u64);
     }

@@ -611,8 +611,8 @@ impl<'a> Collector<'a> {
         };
         let under_way: f64 = self.under_way.values().map(share).sum();
         let message = match self.under_way.get(&job) {
-            Some(running) => format!("{}: {} passes", self.jobs[job].label, running.start.passes),
-            None => self.jobs[job].label.clone(),
+            Some(running) => format!("{}: {} passes", self.jobs[job].title, running.start.passes),
+            None => self.jobs[job].title.clone(),
         };
         self.settings.progress.update(self.completed.len() as f64 + under_way, message);
     }

@@ -11,7 +11,7 @@ pub use sensor::Sensor;
 
 use std::sync::Arc;
 
-use crate::geometry::Shape;
+use crate::geometry::{Shape, Side};
 use crate::optics::boundary::Boundary;
 use crate::optics::medium::Medium;
 
@@ -33,6 +33,28 @@ pub struct Scene {
 impl Scene {
     /// Name of the medium's emission among the sources of light, as in `mean@emission`.
     pub const EMISSION: &str = "emission";
+
+    /// Whether a ray of the sensor meets the body: of an image every pixel's, up to some millions, and
+    /// never fewer than some ten thousand; of a probe the one that it has. All other sensors look at the
+    /// body from where it is.
+    pub(crate) fn is_seen(&self) -> bool {
+        const LEAST: usize = 1 << 16;
+        const MOST: usize = 1 << 22;
+        /// Steps of a sequence that fills the square evenly (Roberts 2018).
+        const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+        let rays = match self.sensor {
+            Sensor::Probe(_) => 1,
+            _ if self.sensor.pixels().is_some() => self.sensor.rays_per_pass().clamp(LEAST, MOST),
+            _ => return true,
+        };
+        let per_pass = self.sensor.rays_per_pass();
+        (0..rays).any(|k| {
+            let [x, y] = STEPS.map(|step| (step * k as f64).fract());
+            let index = (k as u128 * per_pass as u128 / rays as u128) as usize;
+            let ray = self.sensor.ray(index, [x, y, y, x]).ray;
+            self.shape.intersect(&ray, Side::Outside, None, f64::INFINITY).is_some()
+        })
+    }
 
     /// Number of bands.
     pub fn bands(&self) -> usize {

@@ -43,6 +43,9 @@ fn range(at: At, band: &ExplicitBand) {
 
 fn upwards(at: At, from: f64, to: f64) {
     if from >= to {
-        at.report(format!("`from_nm` must be less than `to_nm`, is {from} and {to}"));
+        at.report_help(
+            format!("`from_nm` must be less than `to_nm`, is {from} and {to}"),
+            "wavelengths run upwards: exchange the two",
+        );
     }
 }

@@ -119,6 +119,9 @@ pub(crate) fn budget_share(at: At, entry: &BudgetShare, budget: Option<&Budget>,
 /// The first words of keys that cells may differ in.
 pub(crate) const CELL_KEYS: [&str; 3] = ["object", "sensor", "light"];
 
+/// The first words of further keys that a sweep may set: how a cell is measured.
+pub(crate) const RUN_KEYS: [&str; 2] = ["estimator", "budget"];
+
 /// The keys of `pair.over` lead somewhere in object, sensor or light.
 pub(crate) fn pair(at: At, over: &Node, grammar: &Grammar) {
     for (i, key) in over.items().iter().enumerate() {

@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 
 use super::sensor::direction;
 use super::{At, nonzero, spectrum};
-use crate::experiment::schema::{Environment, LightEntry, SolidAngle, Spectrum};
+use crate::experiment::schema::{BandsEntry, Environment, LightEntry, SolidAngle, Spectrum};
 use crate::scene::Scene;
 
-/// The rules of all lights in so many bands, beside a medium that `emits` or does not.
-pub(crate) fn lights(at: At, bands: usize, emits: bool) {
+/// The rules of all lights in these bands, beside a medium that `emits` or does not.
+pub(crate) fn lights(at: At, entry: &BandsEntry, emits: bool) {
+    let bands = entry.list().len();
     let mut names = BTreeSet::new();
     for i in 0..at.count() {
         let Some(light) = at.typed::<LightEntry>(&i.to_string()) else { continue };
@@ -33,7 +34,7 @@ pub(crate) fn lights(at: At, bands: usize, emits: bool) {
             solid_angle(at.to("solid_angle"), disc, bands);
         }
         if let Some(sky) = &light.environment {
-            environment(at.to("environment"), sky, bands);
+            environment(at.to("environment"), sky, entry);
         }
     }
 }
@@ -58,14 +59,34 @@ fn solid_angle(at: At, disc: &SolidAngle, bands: usize) {
     }
 }
 
-fn environment(at: At, sky: &Environment, bands: usize) {
+fn environment(at: At, sky: &Environment, entry: &BandsEntry) {
+    let bands = entry.list();
     if let Some(radiance) = &sky.radiance {
-        radiometric(at.to("radiance"), radiance, bands);
+        radiometric(at.to("radiance"), radiance, bands.len());
     }
     if let Some(axis) = sky.hemisphere {
         nonzero(at.to("hemisphere"), axis);
     }
     if sky.scale.is_some() && sky.map.is_none() {
         at.to("scale").report("`scale` multiplies a `map`, and there is none");
+    }
+    if sky.rotate_deg.is_some() && sky.map.is_none() {
+        at.to("rotate_deg").report_help(
+            "`rotate_deg` turns a `map`, and there is none",
+            "a constant sky has no direction; `hemisphere` takes any axis",
+        );
+    }
+    if sky.upsampling.is_some() {
+        let at = at.to("upsampling");
+        match entry {
+            _ if sky.map.is_none() => {
+                at.report_help("`upsampling` is about a `map`, and there is none", "leave it out");
+            }
+            BandsEntry::Rgb {} => at.report_help(
+                "`upsampling` is for bands of wavelengths, and these are R, G and B",
+                "leave it out",
+            ),
+            _ => super::object::wavelengths(at, &bands),
+        }
     }
 }

@@ -21,8 +21,8 @@ mod sensor;
 pub(super) use bands::bands;
 pub(super) use claims::{Known, claim};
 pub(super) use entries::{
-    CELL_KEYS, ExperimentParts, SAMPLER_KEYS, SCENE_KEYS, budget_share, experiment_name, names, pair,
-    parts,
+    CELL_KEYS, ExperimentParts, RUN_KEYS, SAMPLER_KEYS, SCENE_KEYS, budget_share, experiment_name,
+    names, pair, parts,
 };
 pub(super) use invariants::{CellPoint, mean_path_length};
 pub(super) use lights::lights;
@@ -144,7 +144,10 @@ fn spectrum(at: At, spectrum: &Spectrum, bands: usize, must: &str, holds: fn(f64
 
 fn value_rule(at: At, value: f64, must: &str, holds: fn(f64) -> bool) {
     if !holds(value) {
-        at.report(format!("must be {must}, is {value}"));
+        at.report_help(
+            format!("must be {must}, is {value}"),
+            "give another number; `scatterproof list KIND` states what a kind takes",
+        );
     }
 }
 
@@ -152,7 +155,10 @@ fn value_rule(at: At, value: f64, must: &str, holds: fn(f64) -> bool) {
 fn nonzero(at: At, vector: [f64; 3]) -> bool {
     let is_zero = vector == [0.0; 3];
     if is_zero {
-        at.report("a direction must not be the zero vector");
+        at.report_help(
+            "a direction must not be the zero vector",
+            "give a vector of any length above 0, as [0, 0, -1] for straight down",
+        );
     }
     !is_zero
 }

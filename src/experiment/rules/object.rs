@@ -38,6 +38,12 @@ fn shape(at: At, shape: &ShapeEntry) {
     match shape {
         ShapeEntry::Box { size_mm } => positive(at.to("box").to("size_mm"), size_mm),
         ShapeEntry::DrilledBox { size_mm, .. } => positive(at.to("drilled_box").to("size_mm"), size_mm),
+        ShapeEntry::Mesh { longest_side_mm: Some(_), unit: Some(_), .. } => {
+            at.to("mesh").to("unit").report_help(
+                "`unit` has no effect: `longest_side_mm` states the size of the mesh",
+                "leave one of the two out",
+            );
+        }
         ShapeEntry::Torus { major_radius_mm, minor_radius_mm, .. } => {
             let at = at.to("torus").to("minor_radius_mm");
             less(at, *minor_radius_mm, "major_radius_mm", *major_radius_mm);
@@ -109,19 +115,39 @@ fn medium(at: At, medium: &MediumEntry, bands: &BandsEntry) {
     if let Some(words) = &medium.skin {
         skin(at.to("skin"), words, &bands.list());
     }
-    if let Some(PresetMedium { name, .. }) = &medium.preset {
+    if let Some(PresetMedium { name, upsampling, .. }) = &medium.preset {
         let at = at.to("preset");
         if materials::find(name).is_none() {
             let help = suggest::help(name, &materials::names(), "materials");
             at.to("name").report_help(format!("unknown material `{name}`"), help);
         }
-        if !matches!(bands, BandsEntry::Rgb {}) {
-            let help = "use `bands = { rgb = {} }`, or `medium.coefficients` with numbers per band";
-            at.report_help("built-in materials are measured in rgb bands only", help);
+        let is_rgb = matches!(bands, BandsEntry::Rgb {});
+        match upsampling {
+            None if !is_rgb => at.report_help(
+                "built-in materials are measured in rgb bands only",
+                "use `bands = { rgb = {} }`, add `upsampling = \"smooth\"` here, or give \
+                 `medium.coefficients` with numbers per band",
+            ),
+            Some(_) if is_rgb => at.to("upsampling").report_help(
+                "`upsampling` is for bands of wavelengths, and these are R, G and B",
+                "leave it out",
+            ),
+            Some(_) => wavelengths(at.to("upsampling"), &bands.list()),
+            None => {}
         }
     }
     if let Some(values) = &medium.emission_per_mm {
         spectrum(at.to("emission_per_mm"), values, count, "at least 0", |x| x >= 0.0);
+    }
+}
+
+/// Every band has wavelengths, as upsampling needs.
+pub(super) fn wavelengths(at: At, bands: &[BandInterval]) {
+    if let Some(band) = bands.iter().find(|band| band.range_nm.is_none()) {
+        at.report_help(
+            format!("`upsampling` needs wavelengths, and band `{}` has none", band.name),
+            "use `bands.spectral`, or explicit bands with `from_nm` and `to_nm`",
+        );
     }
 }
 

@@ -85,6 +85,9 @@ fn edges(at: At, edges: &[f64]) {
 
 fn upright(at: At, up: [f64; 3], view: DVec3) {
     if nonzero(at, up) && unit(up).cross(view).abs().max_element() <= PARALLEL {
-        at.report("`up` must not be parallel to the view");
+        at.report_help(
+            "`up` must not be parallel to the view",
+            "take another direction, as [0, 1, 0] for a view along z",
+        );
     }
 }

@@ -16,7 +16,7 @@ const LIGHT: &str = "directional = { toward = [1, 1, 1], irradiance = 1.0 }";
 fn scene(old: &str, new: &str) -> Scene {
     assert!(GOOD.contains(old));
     let experiment = good(&GOOD.replace(old, new));
-    Builder::new(&experiment).scene(&experiment.cells[0]).unwrap_or_else(|error| panic!("{error}"))
+    Builder::new(&experiment).scene(0).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Irradiance of band 1 on a plane with this normal, int L(w) cos dw: midpoints in cosine and azimuth.
@@ -148,4 +148,41 @@ fn pixels_of_parallel_rays_look_where_they_have_to() {
             assert!((sin2 - 0.75 * share).abs() < 1e-12, "{share}: {found:?}");
         }
     }
+}
+
+/// A sky whose only bright column is that of azimuths from 0 to 90 degrees: turned by a quarter
+/// counter-clockwise it shines from 90 to 180 degrees; upsampled, in the band of its colour alone.
+#[test]
+fn skies_are_turned_and_upsampled() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("sky.hdr");
+    let mut bytes = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n".to_vec();
+    for pixel in 0..8 {
+        bytes.extend(if pixel % 4 == 1 { [128, 0, 0, 129] } else { [0, 0, 0, 0u8] });
+    }
+    std::fs::write(&path, bytes).expect("a sky");
+    let lit = |more: &str, bands: &str| {
+        let light =
+            format!("environment = {{ map = {:?}, scale = 2.0{more} }}", path.display().to_string());
+        let text = GOOD.replace(LIGHT, &light).replace("bands = { rgb = {} }", bands);
+        let experiment = good(&text);
+        Builder::new(&experiment).scene(0).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let at = |scene: &Scene, band: usize, degrees: f64| {
+        let azimuth = degrees.to_radians();
+        let toward = DVec3::new(cos(azimuth), sin(azimuth), 0.3).normalize();
+        scene.lights[0].eval(band, toward).0
+    };
+    let of = |scene: &Scene, band: usize| [45.0, 135.0, 225.0, 315.0].map(|d| at(scene, band, d));
+    let rgb = "bands = { rgb = {} }";
+    assert_eq!(of(&lit("", rgb), 0), [2.0, 0.0, 0.0, 0.0]);
+    assert_eq!(of(&lit(", rotate_deg = 90", rgb), 0), [0.0, 2.0, 0.0, 0.0]);
+    assert_eq!(of(&lit(", rotate_deg = -90", rgb), 0), [0.0, 0.0, 0.0, 2.0]);
+    assert_eq!(of(&lit(", rotate_deg = 100", rgb), 0), [0.0, 2.0, 0.0, 0.0], "the nearest column");
+    assert_eq!(of(&lit("", rgb), 1), [0.0; 4]);
+    let spectral = "bands = { spectral = { from_nm = 400, to_nm = 700, count = 3 } }";
+    let upsampled = lit(", upsampling = \"smooth\"", spectral);
+    let [blue, green, red] = [0, 1, 2].map(|band| at(&upsampled, band, 45.0));
+    assert!(red > 1.8 && blue < 0.1 && green < 0.6, "{blue} {green} {red}");
+    assert_eq!(at(&upsampled, 2, 135.0), 0.0);
 }

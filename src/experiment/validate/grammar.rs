@@ -27,6 +27,8 @@ pub(crate) struct Variant<'a> {
     pub content: Option<&'a Json>,
     /// The first line of its documentation.
     pub doc: &'a str,
+    /// The schema that documents it.
+    pub about: &'a Json,
 }
 
 impl Grammar {
@@ -57,6 +59,11 @@ impl Grammar {
             return SchemaForm::Variants(bare_variants(schema));
         }
         if schema.get("type").is_none() { SchemaForm::Anything } else { SchemaForm::Plain(schema) }
+    }
+
+    /// A definition of the schema by its name.
+    pub(crate) fn definition(&self, name: &str) -> Option<&Json> {
+        self.root["$defs"].get(name)
     }
 
     /// The schema at a path of keys and indices, if the grammar knows it.
@@ -133,6 +140,12 @@ pub(crate) fn doc(schema: &Json) -> &str {
     schema.get("description").and_then(Json::as_str).unwrap_or("").lines().next().unwrap_or("")
 }
 
+/// The first paragraph of a schema's documentation, on one line.
+pub(crate) fn paragraph(schema: &Json) -> String {
+    let text = schema.get("description").and_then(Json::as_str).unwrap_or("");
+    text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
 /// The strings of an array in a schema.
 pub(crate) fn strings(list: Option<&Json>) -> Vec<&str> {
     let list = list.and_then(Json::as_array);
@@ -154,12 +167,12 @@ fn tagged(schema: &Json) -> Vec<Variant<'_>> {
     let content = |name| schema["properties"].get(name);
     keys(schema)
         .into_iter()
-        .map(|name| Variant { name, content: content(name), doc: doc(schema) })
+        .map(|name| Variant { name, content: content(name), doc: doc(schema), about: schema })
         .collect()
 }
 
 fn bare_variants(schema: &Json) -> Vec<Variant<'_>> {
     let single = schema.get("const").and_then(Json::as_str);
     let names = strings(schema.get("enum")).into_iter().chain(single);
-    names.map(|name| Variant { name, content: None, doc: doc(schema) }).collect()
+    names.map(|name| Variant { name, content: None, doc: doc(schema), about: schema }).collect()
 }

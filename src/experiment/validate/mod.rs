@@ -122,18 +122,51 @@ impl<'a> SchemaWalk<'a> {
     }
 
     fn wrong_type(&mut self, node: &Node, schema: &Json) {
-        let types: Vec<&str> =
-            self.types(schema).into_iter().filter(|t| *t != "null").map(article).collect();
-        let rule = format!("expected {}, found {}", suggest::join(&types, "or"), found(node));
-        let doc = grammar::doc(schema);
-        self.report(node.place(), rule, (!doc.is_empty()).then(|| doc.to_string()));
+        let mut types: Vec<&str> = Vec::new();
+        for name in self.types(schema).into_iter().filter(|t| *t != "null").map(article) {
+            types.extend((!types.contains(&name)).then_some(name));
+        }
+        let mut rule = format!("expected {}, found {}", suggest::join(&types, "or"), found(node));
+        let mut help = Some(grammar::doc(schema).to_string()).filter(|doc| !doc.is_empty());
+        match (&node.value, types[..].contains(&"an integer")) {
+            (Value::Float(number), true) if number.fract() == 0.0 && number.abs() < 1e15 => {
+                rule = format!("expected an integer, found `{}`", node.origin.place.text());
+                help = Some(format!("write {number}: an integer has neither a point nor an exponent"));
+            }
+            (Value::Table(_), _) if types == ["an array"] && self.holds_tables(schema) => {
+                let key = node.key.as_ref().map_or("entry", |key| key.text());
+                let of = if node.inline {
+                    format!(
+                        "write `[[{key}]]` and its keys below it, or put the table in an array: `[{{ ... }}]`"
+                    )
+                } else {
+                    format!("write `[[{key}]]`, with two brackets")
+                };
+                help = Some(help.map_or(of.clone(), |doc| format!("{of}. {doc}")));
+            }
+            _ => {}
+        }
+        self.report(node.place(), rule, help);
+    }
+
+    /// Whether an array is one of tables.
+    fn holds_tables(&self, schema: &Json) -> bool {
+        schema.get("items").is_some_and(|items| self.types(items).contains(&"object"))
     }
 
     fn missing(&mut self, node: &Node, key: &str, path: &str) {
         let path = join_path(path, key);
         let words: Vec<&str> = path.split('.').collect();
-        let doc = self.grammar.at(&words).map(grammar::doc).filter(|doc| !doc.is_empty());
-        let help = doc.map(|doc| format!("`{key}`: {doc}"));
+        let schema = self.grammar.at(&words);
+        let doc = schema.map(grammar::doc).filter(|doc| !doc.is_empty());
+        let kinds = match schema.map(|schema| self.grammar.form(schema)) {
+            Some(SchemaForm::Variants(variants)) => variants.iter().map(|v| v.name).collect(),
+            _ => Vec::new(),
+        };
+        let help = doc.map(|doc| match kinds.is_empty() {
+            true => format!("`{key}`: {doc}"),
+            false => format!("`{key}`: {doc} One of {}", suggest::quoted(&kinds)),
+        });
         self.report(node.place(), format!("missing key `{path}`"), help);
     }
 
@@ -174,13 +207,15 @@ impl<'a> SchemaWalk<'a> {
             [_] => {}
             [] if self.lenient || keys.iter().any(|key| meant.contains(key)) => {}
             [] => {
-                self.report(node.place(), format!("exactly one of {needed} is needed, found none"), None)
+                let rule = format!("exactly one of {needed} is needed, found none");
+                let help = format!("add one of them; `scatterproof list {}` shows how", keys[0]);
+                self.report(node.place(), rule, Some(help));
             }
             [.., last] => {
                 let place = entries[last].key.clone().unwrap_or_else(|| node.place().clone());
                 let rule =
                     format!("exactly one of {needed} is needed, found {}", suggest::quoted(&given));
-                self.report(&place, rule, None);
+                self.report(&place, rule, Some("keep one of those found, and remove the others".into()));
             }
         }
     }
