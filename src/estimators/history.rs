@@ -51,6 +51,12 @@ impl History {
         self.medium_vertices = self.medium_vertices.saturating_add(1);
     }
 
+    /// The path scattered as often in the medium.
+    #[inline]
+    pub(super) fn scatter_often(&mut self, times: u64) {
+        self.medium_vertices = self.medium_vertices.saturating_add(times.min(u32::MAX.into()) as u32);
+    }
+
     /// The path was reflected at the boundary from inside.
     #[inline]
     pub fn reflect_internally(&mut self) {

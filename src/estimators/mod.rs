@@ -16,6 +16,7 @@ mod crossing;
 mod emergence;
 mod estimator;
 mod field;
+mod flights;
 mod guidance;
 mod history;
 mod illumination;

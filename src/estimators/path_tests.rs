@@ -1,8 +1,10 @@
 //! Identities, closed forms and published numbers for the path tracer.
 
-use super::super::Layout;
+use super::super::bands::WalkBands;
+use super::super::field::Field;
 use super::super::roulette::roulette;
 use super::super::testing;
+use super::super::{Cost, Layout};
 use super::*;
 use crate::geometry::{Ray, Shape, procedural};
 use crate::math::{DVec3, Frame};
@@ -282,4 +284,62 @@ fn scaled_scenes_give_the_same_bits() {
             }
         }
     }
+}
+
+/// A plain walk whose flights are traced one by one.
+#[derive(Clone)]
+struct OneByOne;
+
+impl WalkBands for OneByOne {
+    fn flight(&mut self, _: &[Medium], _: f64, _: bool) {}
+
+    fn turn(&mut self, _: &[Medium], _: DVec3, _: DVec3, _: DVec3) {}
+
+    fn density(&self) -> f64 {
+        1.0
+    }
+}
+
+/// Flights that surely end in the medium are traced together: scores, counters, anomalies and random numbers are those of
+/// flights one by one, to the last bit.
+#[test]
+fn flights_at_once_are_flights_one_by_one() {
+    let sky = || vec![environment(1.0, DVec3::Z, 0.5, "half")];
+    let rough =
+        Boundary::Rough { eta: 1.4, facets: Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.3 } };
+    let mesh = || Shape::Mesh(procedural::icosphere(1.0, 2, true).expect("closed"));
+    let shapes: [fn() -> Shape; 4] = [
+        || SPHERE,
+        || Shape::Box { half: DVec3::new(0.5, 0.8, 0.4) },
+        || Shape::Slab { thickness: 0.7 },
+        || Shape::HalfSpace,
+    ];
+    let shapes = shapes.into_iter().map(|shape| shape()).chain([mesh()]);
+    let mut events = 0;
+    for shape in shapes {
+        for (boundary, g) in
+            [(Boundary::Smooth { eta: 1.3 }, 0.0), (rough, 0.7), (Boundary::Matched, 0.2)]
+        {
+            for roulette in ROULETTES {
+                let scene = scene(shape.clone(), boundary, medium(8.0, 0.95, g), sky(), off_axis());
+                let layout = Layout::new(&scene);
+                let field = Field::new(Arc::new(scene), roulette);
+                let key = StreamKey::named("flights_at_once_are_flights_one_by_one").pass(0);
+                let mut both = [Scores::new(layout.clone()), Scores::new(layout)];
+                let [at_once, one_by_one] = &mut both;
+                for index in 0..300 {
+                    let path = Path { field: &field, band: 0, index, key: &key };
+                    let draws = CameraWalk::trace(path, at_once, Unrivalled, OneBand);
+                    assert_eq!(draws, CameraWalk::trace(path, one_by_one, Unrivalled, OneByOne));
+                }
+                let bits =
+                    |scores: &Scores| scores.observables.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+                assert_eq!(bits(at_once), bits(one_by_one));
+                assert_eq!(at_once.cost, one_by_one.cost);
+                assert_eq!(at_once.anomalies, one_by_one.anomalies);
+                events += at_once.cost[Cost::MediumEvents as usize];
+            }
+        }
+    }
+    assert!(events > 50_000, "{events} events");
 }

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::sampling::stream::Stream;
+
 /// Russian roulette: when a path is ended by chance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -17,6 +19,34 @@ pub enum Roulette {
 impl Default for Roulette {
     fn default() -> Self {
         Roulette::Below(0.25)
+    }
+}
+
+impl Roulette {
+    /// At a medium vertex: multiplies a path's weights, of which the second is what roulette sees, by `factor`, or ends the
+    /// path (`None`). A threshold is compared with the weight times `importance`.
+    #[inline]
+    pub(super) fn survive(
+        self,
+        [throughput, survival]: [&mut f64; 2],
+        factor: f64,
+        importance: f64,
+        stream: &mut Stream,
+    ) -> Option<()> {
+        match self {
+            Roulette::Analog {} => (stream.draw() < factor).then_some(()),
+            Roulette::Below(threshold) => {
+                *throughput *= factor;
+                *survival *= factor;
+                let expected = *survival * importance;
+                if expected < threshold {
+                    let probability = roulette(expected, threshold, || stream.draw())?;
+                    *throughput /= probability;
+                    *survival /= probability;
+                }
+                Some(())
+            }
+        }
     }
 }
 

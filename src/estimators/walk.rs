@@ -20,7 +20,8 @@ use super::bands::{ScorePlace, WalkBands};
 use super::choice::choose_light;
 use super::crossing::{other, radiance_scale};
 use super::field::Path;
-use super::roulette::{Roulette, roulette};
+use super::flights::{Flights, clear_flights};
+use super::roulette::Roulette;
 use super::vertices::{Unscattered, WalkExit};
 use super::{Anomaly, Cost, History, Scores, TransportClass};
 use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Side};
@@ -34,6 +35,9 @@ use crate::scene::sensor::PathMeasure;
 
 /// Techniques beside unidirectional sampling.
 pub(super) trait Rivals: Sized {
+    /// Nothing happens at a medium vertex.
+    const IS_SILENT: bool = false;
+
     /// At a medium vertex that roulette has spared, before its direction is drawn; the walk's ray holds
     /// the vertex and the direction of arrival. Draws samples and scores them.
     fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>);
@@ -81,6 +85,8 @@ pub(super) trait Rivals: Sized {
 pub(super) struct Unrivalled;
 
 impl Rivals for Unrivalled {
+    const IS_SILENT: bool = true;
+
     #[inline]
     fn call<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>) {}
 
@@ -309,9 +315,17 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         if !self.matched() {
             R::depart(self);
         }
+        let is_plain =
+            R::IS_SILENT && B::IS_PLAIN && !self.matched() && !self.emits && self.measure.is_off();
         loop {
-            let t = self.flight();
-            match self.end_of_flight(t) {
+            let (t, end) = if is_plain {
+                let t = self.fly_clear()?;
+                (t, self.scene.shape.end_of_unclear(&self.ray, self.from, t))
+            } else {
+                let t = self.flight();
+                (t, self.end_of_flight(t))
+            };
+            match end {
                 Some(hit) => {
                     let drawn_before = self.bands.density();
                     self.bands.flight(&self.scene.medium, hit.t, false);
@@ -333,6 +347,29 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                 None => self.scatter(t)?,
             }
         }
+    }
+
+    /// The length of the first flight that may meet the boundary, after those that surely do not; `None` where the path ends.
+    fn fly_clear(&mut self) -> Option<f64> {
+        let (roulette, albedo) = (self.roulette, self.medium.albedo);
+        let (mut throughput, mut survival) = (self.throughput, self.survival);
+        let survives = |stream: &mut Stream| {
+            roulette.survive([&mut throughput, &mut survival], albedo, 1.0, stream).is_some()
+        };
+        let Flights { vertices, next } = clear_flights(
+            &self.scene.shape,
+            &self.medium,
+            &mut self.ray,
+            &mut self.stream,
+            self.scores,
+            survives,
+        );
+        (self.throughput, self.survival) = (throughput, survival);
+        if vertices > 0 {
+            (self.from, self.unscattered) = (None, Unscattered::No);
+            self.history.scatter_often(vertices);
+        }
+        next
     }
 
     /// The length of the next flight in the medium, if no boundary ends it.
@@ -412,20 +449,12 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Multiplies the path's weight by `factor`, or ends the path by roulette.
     #[inline]
     fn survive(&mut self, factor: f64) -> Option<()> {
-        match self.roulette {
-            Roulette::Analog {} => (self.stream.draw() < factor).then_some(()),
-            Roulette::Below(threshold) => {
-                self.throughput *= factor;
-                self.survival *= factor;
-                let expected = self.survival * self.bands.importance(self.ray.origin);
-                if expected < threshold {
-                    let probability = roulette(expected, threshold, || self.stream.draw())?;
-                    self.throughput /= probability;
-                    self.survival /= probability;
-                }
-                Some(())
-            }
-        }
+        let importance = match self.roulette {
+            Roulette::Analog {} => 1.0,
+            Roulette::Below(_) => self.bands.importance(self.ray.origin),
+        };
+        let weights = [&mut self.throughput, &mut self.survival];
+        self.roulette.survive(weights, factor, importance, &mut self.stream)
     }
 
     /// Continues outside; scores the lights where nothing occludes them.

@@ -162,32 +162,37 @@ impl Shape {
         hit.filter(|hit| hit.t <= t_max)
     }
 
-    /// What [`Self::intersect`] finds for a flight of length `t` inside the body: most flights of a walk
-    /// end in the medium, and for a convex shape the end shows that.
+    /// What [`Self::intersect`] finds for a flight of length `t` inside the body.
     #[inline]
     pub fn end_of_flight(&self, ray: &Ray, from: Option<FaceId>, t: f64) -> Option<Hit> {
-        if self.surely_holds(ray.origin, ray.at(t)) {
-            return None;
-        }
-        self.intersect(ray, Side::Inside, from, t)
+        if self.is_clear(ray, ray.at(t), t) { None } else { self.end_of_unclear(ray, from, t) }
     }
 
-    /// Whether a flight from a point of a convex shape (on or in it, but for rounding) to `end` has met
-    /// nothing. The end must be farther inside than the rounding of what [`Self::intersect`] computes: a
-    /// crossing of a plane is known to some 2^-53 of the shape's size (of the half-space: of the depth
-    /// of the start). On a sphere of radius 1 a chord that reaches a depth of 5e-10 is at least 6e-5
-    /// long, so that the square root that its ends are found by has lost no more than 1e-11.
+    /// The same of a flight that is not clear.
     #[inline]
-    fn surely_holds(&self, start: DVec3, end: DVec3) -> bool {
+    pub(crate) fn end_of_unclear(&self, ray: &Ray, from: Option<FaceId>, t: f64) -> Option<Hit> {
+        match self {
+            Shape::Mesh(mesh) => mesh.search(ray, Side::Inside, from, t),
+            _ => self.intersect(ray, Side::Inside, from, t),
+        }
+    }
+
+    /// Whether a flight of length `t` from a point of the body (on or in it, but for rounding) to `end` surely has met nothing:
+    /// most flights of a walk end in the medium. In a mesh the start shows that, in a convex shape the end. That end must be
+    /// farther inside than the rounding of what [`Self::intersect`] computes: a crossing of a plane is known to some 2^-53 of
+    /// the shape's size (of the half-space: of the depth of the start). On a sphere of radius 1 a chord that reaches a depth of
+    /// 5e-10 is at least 6e-5 long, so that the square root that its ends are found by has lost no more than 1e-11.
+    #[inline]
+    pub(crate) fn is_clear(&self, ray: &Ray, end: DVec3, t: f64) -> bool {
         const MARGIN: f64 = 1e-9;
         match *self {
-            Shape::HalfSpace => end.z < MARGIN * start.z,
+            Shape::HalfSpace => end.z < MARGIN * ray.origin.z,
             Shape::Slab { thickness } => {
                 end.z < -MARGIN * thickness && end.z > -(1.0 - MARGIN) * thickness
             }
             Shape::Box { half } => end.abs().cmplt(half * (1.0 - MARGIN)).all(),
             Shape::Sphere { radius } => end.length_squared() < radius * radius * (1.0 - MARGIN),
-            Shape::Mesh(_) => false,
+            Shape::Mesh(ref mesh) => t <= mesh.clearance(ray.origin),
         }
     }
 

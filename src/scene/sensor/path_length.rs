@@ -114,6 +114,12 @@ struct PathSoFar {
 }
 
 impl PathMeasure {
+    /// Nothing is measured.
+    #[inline]
+    pub fn is_off(&self) -> bool {
+        self.0.is_none()
+    }
+
     /// The path flies in the medium from the ray's origin to the distance `t`.
     #[inline]
     pub fn fly(&mut self, ray: &Ray, t: f64) {
