@@ -15,12 +15,12 @@
 pub const FACTORS: [(&str, f64); 8] = [
     ("path", 1.2),
     ("snee", 2.6),
-    ("bidirectional", 3.0),
+    ("bidirectional", 3.4),
     ("light_trace", 1.7),
-    ("point_cloud", 5.2),
+    ("point_cloud", 6.8),
     ("bssrdf_probe", 7.8),
-    ("bssrdf_rays", 3.2),
-    ("bssrdf_density", 6.3),
+    ("bssrdf_rays", 3.4),
+    ("bssrdf_density", 7.2),
 ];
 
 /// The factor by which a ratio of counted work between two kinds may be off: between runs of one kind

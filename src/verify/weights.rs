@@ -27,9 +27,9 @@ use crate::results::store::Stored;
 ///
 /// prints them.
 pub const WEIGHTS: [(&str, f64); 10] = [
-    ("paths", 36.0),
-    ("rays", 50.0),
-    ("shadow_rays", 290.0),
+    ("paths", 75.0),
+    ("rays", 45.0),
+    ("shadow_rays", 350.0),
     ("medium_events", 0.0),
     ("boundary_events", 0.0),
     ("cloud_points", 500.0),
