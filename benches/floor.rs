@@ -1,14 +1,16 @@
 //! How far path tracing is from the least that its physics costs, and what a mesh adds.
 //!
 //!   cargo bench -p benches --bench floor
-//!   cargo bench -p benches --bench floor -- --csv results/published/speed/floor.csv
+//!   cargo bench -p benches --bench floor -- --csv floor.csv
 //!
 //! The floor is a loop that does nothing but the walk: unit sphere, smooth boundary, one band, isotropic
 //! scattering, a sky of radiance 1, the same roulette, the same random streams and elementary functions as the
-//! estimator, in scalar double precision, and no scores by class or region, moments, counters or choice of scene. The
-//! last line compares its mean with the estimator's. The other rows are `path` on meshes of the same size. Rounds visit the rows in turn, every other one backwards, after one that is not counted; a figure is the median
-//! over the rounds, a ratio the median of the ratios within a round, with the smallest and the largest, in CPU time of the
-//! calling thread.
+//! estimator, in scalar double precision, and no scores by class or region, moments, counters or choice of scene.
+//! The last line compares its mean with the estimator's. The other rows are `path` on meshes of the same size.
+//!
+//! Rounds visit the rows in turn, every other one backwards; the first round is not counted. A figure is the median
+//! over the rounds, a ratio the median of the ratios within a round, with the smallest and the largest, in CPU time
+//! of the calling thread.
 
 use std::fmt::Write as _;
 use std::hint::black_box;
