@@ -1,4 +1,4 @@
-//! Signals. Door for `signal-hook`.
+//! Signals. The only module that uses `signal-hook`.
 //!
 //! Ctrl-C (SIGINT), SIGTERM, SIGHUP (a terminal that was closed) and SIGXCPU (a limit of CPU time) ask for the end. While
 //! passes run, what is done is kept first. Everywhere else, as in loading a mesh or writing a report, the process ends at

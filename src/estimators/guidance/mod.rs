@@ -1,11 +1,11 @@
-//! Walks that know where the light is.
+//! Guided walks.
 //!
-//! At every medium vertex a walk turns and flies either as the medium does, or drawn towards where importance grows
-//! ([`crate::optics::guided`]): the second with the share q, and both weighted by the balance heuristic over direction and
-//! distance together, so that no event has a weight above albedo / (1 - q). Importance comes from a diffusion solution in
-//! the body ([`importance`]), or grows along the normal where the walk came in (Dwivedi's sampling as production has it:
-//! Krivanek & d'Eon 2014), or is what earlier walks have found ([`learned`]). Whatever it is, results are unbiased; only their
-//! variance changes.
+//! At every medium vertex, direction and distance are drawn either from phase function and transmittance or, with
+//! probability q, towards growing importance ([`crate::optics::guided`]). Both are weighted by the balance heuristic over
+//! direction and distance together, so that no event has a weight above albedo / (1 - q). Importance comes from a diffusion
+//! solution in the body ([`importance`]), or grows along the normal at which the walk entered (Dwivedi sampling as in
+//! production renderers: Krivanek & d'Eon 2014), or is learned from earlier walks ([`learned`]). Results are unbiased
+//! whatever the importance; only their variance changes.
 //!
 //! ```text
 //! lights, boundary, medium, body -> Importance -> Guidance (one per band) -> GuidedBand (state of a walk)
