@@ -40,7 +40,7 @@ pub use super::Roulette;
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PathOptions {
-    /// When a path is ended by chance; both ways are unbiased.
+    /// Russian roulette; all choices are unbiased.
     #[serde(default)]
     pub roulette: Roulette,
     /// How walks are drawn inside the body; all ways are unbiased.

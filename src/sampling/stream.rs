@@ -23,7 +23,7 @@ pub enum Purpose {
     Hero = 5,
     /// Points of a surface with the light that enters there.
     Cloud = 6,
-    /// Positions on the sensor from which lights are looked for.
+    /// Positions on the sensor at which lights are scored by expectation.
     View = 7,
 }
 

@@ -87,7 +87,7 @@ pub struct ConnectionOptions {
     /// How a vertex is connected to a light through the boundary.
     #[serde(default = "complete")]
     pub method: ConnectionMethod,
-    /// When a path is ended by chance; both ways are unbiased.
+    /// Russian roulette; all choices are unbiased.
     #[serde(default)]
     pub roulette: Roulette,
 }

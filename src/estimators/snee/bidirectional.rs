@@ -38,7 +38,7 @@ use crate::scene::Scene;
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct BidirectionalOptions {
-    /// When a path is ended by chance; both ways are unbiased.
+    /// Russian roulette; all choices are unbiased.
     #[serde(default)]
     roulette: Roulette,
 }

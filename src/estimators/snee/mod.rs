@@ -69,7 +69,7 @@ struct BandSetup {
     sigma: f64,
     joint: JointDirections,
     specular: Option<Specular>,
-    /// Rays of the sensor per walk from which lights are looked for; 1 where none is scored by expectation.
+    /// Number of sensor rays per walk at which lights are scored by expectation; 1 where none is.
     views: u32,
 }
 
