@@ -45,7 +45,7 @@ pub struct DensityOptions {
     /// Points of the surface per pass.
     #[schemars(range(min = 2, max = 16777216))]
     pub samples: usize,
-    /// Radius of the discs over which irradiance is averaged, mm; biased. Without it none is averaged.
+    /// Radius of the discs over which irradiance is averaged, mm; biased. By default nothing is averaged.
     #[serde(rename = "radius_mm")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,

@@ -37,9 +37,9 @@ pub struct RayOptions {
     #[serde(default = "super::kind::one")]
     #[schemars(range(min = 1, max = 65536))]
     pub rays: usize,
-    /// How far under the exit the rays start, mm; the reduced mean free path by default.
+    /// Depth below the exit at which the rays start, mm; by default the reduced mean free path.
     ///
-    /// Of bands that share a path the geometric mean of the least and the largest. At most half way to
+    /// For bands that share a path, the geometric mean of the smallest and the largest. At most half way to
     /// the opposite side.
     #[serde(rename = "depth_mm")]
     #[schemars(extend("exclusiveMinimum" = 0))]

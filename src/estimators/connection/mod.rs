@@ -100,13 +100,13 @@ fn complete() -> ConnectionMethod {
 /// 0.4 pi sr.
 const LEAST_CONCENTRATION: f64 = 10.0;
 
-/// What connections share.
+/// Data that all connections share.
 #[derive(Debug)]
 struct ConnectionSetup {
     solver: Solver,
     /// Per band: probability of choosing each light; 0 for those that are left to the walk.
     shares: Vec<Vec<f64>>,
-    /// Whether the method knows the density of what it finds.
+    /// Whether the density of the method's roots is known.
     is_density_known: bool,
 }
 
@@ -224,7 +224,7 @@ impl Estimator for SpecularConnection {
     }
 }
 
-/// What no connection through one boundary point finds of parallel light.
+/// Note on parallel light that no connection through one boundary point finds.
 pub(super) fn missing_notes(scene: &Scene) -> Vec<String> {
     let is_smooth = scene.boundary.iter().any(Boundary::is_delta);
     let lights = scene.lights.iter().filter(|light| is_smooth && light.is_directional());

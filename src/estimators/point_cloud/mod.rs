@@ -58,10 +58,10 @@ pub enum AcceptanceRule {
     MeanOfExponentials {},
     /// max(e^(-m d), this), m the mean of sigma_tr.
     Floor(#[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))] f64),
-    /// In proportion to the kernel.
+    /// Proportional to the kernel.
     ///
-    /// That is to the mean over the bands of the kernel over its integral; as many as the mean of
-    /// exponentials accepts over a disc as wide as the body.
+    /// More precisely, to the mean over the bands of kernel over integral, scaled to accept as many points as
+    /// the mean of exponentials on a disc as wide as the body.
     Kernel {},
 }
 
@@ -90,7 +90,7 @@ pub struct PointCloudOptions {
     /// The probability p(d) with which a point at distance d is evaluated; its weight is 1/p.
     #[serde(default)]
     pub acceptance: AcceptanceRule,
-    /// How accepted points are found; both have the same law.
+    /// How accepted points are found; both choices have the same distribution.
     #[serde(default)]
     pub search: Search,
     /// Whether single scattering is added by sampling; by default where the model leaves it out.
