@@ -1,5 +1,5 @@
 //! The one user-facing error: what is wrong, where, and what to do about it.
-//! Door for `annotate-snippets`.
+//! The only module that uses `annotate-snippets`.
 
 use std::fmt;
 use std::ops::Range;

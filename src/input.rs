@@ -1,5 +1,5 @@
-//! Files that are read as input: regular ones up to a stated size. A device or a pipe would be read for ever, or block
-//! before a signal is asked for.
+//! Files that are read as input: regular files up to a stated size. Reading a device or a pipe might never end, or might
+//! block before signals are checked.
 
 use std::fs::{self, File};
 use std::io::{self, Read};

@@ -1,4 +1,4 @@
-//! `scatterproof completions`: prints a completion script for a shell. Door for `clap_complete`.
+//! `scatterproof completions`: prints a completion script for a shell. The only module that uses `clap_complete`.
 
 use std::io::Write;
 

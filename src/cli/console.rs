@@ -1,5 +1,5 @@
-//! What a terminal shows: tables that fit its width, and colour where it has any. Where the output is no
-//! terminal, everything is printed, without colour. Door for `console`.
+//! Output on a terminal: tables that fit its width, and colour if it has any. If the output is not a terminal,
+//! everything is printed, without colour. The only module that uses `console`.
 
 use console::{Style, Term, colors_enabled};
 

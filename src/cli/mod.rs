@@ -1,4 +1,4 @@
-//! The command line: one file a subcommand, no logic of their own. Door for `clap`.
+//! The command line: one file per subcommand, without logic of their own. The only module that uses `clap`.
 
 mod check;
 mod compare;

@@ -1,5 +1,5 @@
-//! Experiments on samplers, from the file to verdicts: what is right passes, and each planted defect is
-//! found by the test that is there for it.
+//! Experiments on samplers, from the file to verdicts: correct samplers pass, and each planted defect is
+//! found by the test that is meant to find it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,8 @@
-//! How a walk is drawn, and the state that it keeps for it: none of a plain walk that traces one band alone; of a walk
-//! that all bands share, what each band would have made of it; of a guided walk (`guidance`), its density.
+//! How a walk is drawn, and the state that this needs. A plain walk that traces one band needs none; a walk that is
+//! shared by all bands keeps the value and density of each band; a guided walk (`guidance`) keeps its density.
 //!
-//! Shared walks (hero wavelengths, Wilkie et al. 2014). The hero h, drawn with probability 1/n, steers:
-//! its extinction draws the flights, its phase function the directions. With f_b and p_b the integrand
+//! Shared walks (hero wavelengths, Wilkie et al. 2014). The hero h is drawn with probability 1/n; flights are drawn
+//! from its extinction, and directions from its phase function. With f_b and p_b the integrand
 //! and the density of the walk in band b, the walk carries
 //!   value_b = f_b / (p_h w),   rho_b = p_b / p_h,
 //! w being the hero's throughput without its albedos. Step by step, relative to the hero,

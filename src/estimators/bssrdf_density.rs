@@ -5,10 +5,10 @@
 //! irradiance that goes in, T12 L cos / pdf. A point carries the flux Phi_q = E_q A / (M - 1) when
 //! another one asks, and
 //!   E'_p = sum over q != p within r of Phi_q / (pi r^2),   L_r = A/M sum over p of K E'_p.
-//! Dividing by pi r^2 makes an irradiance of flux; it is in place there and nowhere else: a sum of K
-//! over points that carry flux themselves divides by nothing. The point itself is left out of its disc,
-//! or its own flux would count with certainty; of M - 1 others a disc holds its share, so that the
-//! mean of E'_p is E over the disc.
+//! Dividing by pi r^2 turns flux into irradiance. It is correct only there: a sum of K over points that carry
+//! flux themselves needs no division. The point itself is left out of its disc, since its own flux would
+//! count with certainty. The disc contains its share of the M - 1 other points, so that the mean of E'_p is
+//! the mean of E over the disc.
 //!
 //! Distances are straight, between points whose normals are less than a right angle apart (else light
 //! leaked through thin bodies). On planes and spheres exactly pi r^2 of the surface lies within r;
@@ -45,7 +45,7 @@ pub struct DensityOptions {
     /// Points of the surface per pass.
     #[schemars(range(min = 2, max = 16777216))]
     pub samples: usize,
-    /// Radius of the discs over which irradiance is averaged, mm; biased. Without it none is averaged.
+    /// Radius of the discs over which irradiance is averaged, mm; biased. By default nothing is averaged.
     #[serde(rename = "radius_mm")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,

@@ -47,7 +47,7 @@ pub struct ProbeOptions {
     /// Whether light that goes straight through the body is followed.
     #[serde(default = "super::kind::on")]
     pub straight: bool,
-    /// Light that enters farther from the exit is left out, mm; biased. Without it none is.
+    /// Light that enters farther from the exit than this is left out, mm; biased. By default none is left out.
     #[serde(rename = "reach_mm")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub reach: Option<f64>,

@@ -1,15 +1,15 @@
-//! BSSRDF integration by rays from inside: one goes under the surface, shoots rays in all directions,
-//! and looks at the illumination where they meet the surface.
+//! BSSRDF integration by rays from inside: rays start below the surface in all directions, and the
+//! illumination is evaluated where they hit the surface.
 //!
 //! The rays start from a point on the normal below the exit, at most half way to the opposite side, in
 //! uniform directions w. The first surface point that each meets from inside is an entry; its density is
 //!   pdf_area = |n_i . w| / (4 pi d^2),
 //! d being the ray's length. From a depth h below a plane that is h / (4 pi (r^2 + h^2)^(3/2)), the
-//! shape of a dipole's source without absorption, which keeps the weights bounded for every h. (From the
-//! exit itself nothing would be seen of the plane or the face that it lies on.)
+//! shape of a dipole's source without absorption, which keeps the weights bounded for every h. (Rays from the
+//! exit itself would miss the plane or the face that the exit lies on.)
 //!
-//! What such rays cannot see: entries that the body's own boundary hides from the point below the exit.
-//! There are none in a convex body.
+//! Such rays miss entries that the boundary of the body hides from the point below the exit. There are none
+//! in a convex body.
 
 use std::sync::Arc;
 
@@ -37,9 +37,9 @@ pub struct RayOptions {
     #[serde(default = "super::kind::one")]
     #[schemars(range(min = 1, max = 65536))]
     pub rays: usize,
-    /// How far under the exit the rays start, mm; the reduced mean free path by default.
+    /// Depth below the exit at which the rays start, mm; by default the reduced mean free path.
     ///
-    /// Of bands that share a path the geometric mean of the least and the largest. At most half way to
+    /// For bands that share a path, the geometric mean of the smallest and the largest. At most half way to
     /// the opposite side.
     #[serde(rename = "depth_mm")]
     #[schemars(extend("exclusiveMinimum" = 0))]

@@ -3,9 +3,9 @@
 //!
 //! Inside, the radiance that arrives at the exit along the refracted ray is
 //!   L = int_0^t_max sigma_s e^(-sigma_t t) int p(w12 . wo') L'(w12) dw12 dt,
-//! and of L' the part that comes straight through the boundary is T12 eta^2 L_i e^(-sigma_t s'), s'
-//! being the way from the boundary. On its own way out L loses eta^2 again. So, in directions outside,
-//! where lights are sampled,
+//! and the part of L' that comes straight through the boundary is T12 eta^2 L_i e^(-sigma_t s'), where s' is
+//! the distance from the boundary. When L leaves the body, it loses eta^2 again. In terms of directions
+//! outside, where lights are sampled, this gives
 //!   dw12 = cos_i / (eta^2 cos_i') dw_i
 //!   L_o / T21 = int int sigma_s e^(-sigma_t (t + s')) p T12 L_i cos_i / (eta^2 cos_i') dw_i dt.
 //! (Taken over directions outside without that factor, eq. 6 is too bright by eta^2 cos_i' / cos_i.) On

@@ -1,4 +1,4 @@
-//! Events at the boundary, common to camera and light tracing.
+//! Events at the boundary, shared by camera and light tracing.
 
 use crate::geometry::Side;
 use crate::optics::boundary::Boundary;

@@ -1,17 +1,17 @@
 //! Camera paths over a body whose inside is a BSSRDF: reflection or refraction at every hit of the
 //! surface by roulette with the Fresnel reflectance, and at a refraction (point-cloud note, phase two)
 //!   L_o = L_e + L_t + L_r
-//! with L_e what the medium emits along the refracted ray, L_t the light that goes straight through, and
-//! L_r gathered from the surface by whoever walks.
+//! where L_e is the emission of the medium along the refracted ray, L_t the light that passes straight
+//! through, and L_r the light that the estimator gathers from the surface.
 //!
-//! The branch of refraction is taken with probability T21, so that what is gathered there must leave T21
-//! out. L_t follows the refracted ray to the other side with transmittance exp(-sigma_t* t), leaves with
-//! the transmittance of the boundary as a weight (the model accounts for what is reflected there) and
-//! continues outside as the same path.
+//! Refraction is chosen with probability T21, so that gathered light must leave T21 out. L_t follows the
+//! refracted ray to the other side with transmittance exp(-sigma_t* t), leaves with the transmittance of the
+//! boundary as a weight (the model accounts for light that is reflected there) and continues outside as the
+//! same path.
 //!
 //! L_e follows the same ray: over its length t inside, radiance epsilon (1 - e^(-sigma_t* t)) / sigma_t*
-//! arrives at the exit, and loses eta^2 on its way out. Emission that is scattered, or reflected inside,
-//! before it leaves is no part of it: a BSSRDF carries light from surface to surface only.
+//! arrives at the exit, and loses eta^2 when it leaves. Emission that is scattered or reflected inside before
+//! it leaves is not included, because a BSSRDF describes transport from surface to surface only.
 //!
 //! Bands that refract alike share a path; with dispersion each index has its own.
 

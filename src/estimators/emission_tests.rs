@@ -1,4 +1,4 @@
-//! Media that emit: closed forms, energy, equilibrium, and who counts emission.
+//! Media that emit: closed forms, energy, equilibrium, and which estimators score emission.
 
 use std::f64::consts::PI;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What the walks of an estimator share, and which of them one is.
+//! Data that all walks of an estimator share, and the kind of its walks.
 
 use std::sync::Arc;
 

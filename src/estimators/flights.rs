@@ -1,4 +1,4 @@
-//! Flights inside a body that surely meet no boundary, traced together.
+//! Flights inside a body that are certain not to reach the boundary, traced together.
 
 use super::{Cost, Scores};
 use crate::geometry::{Ray, Shape};

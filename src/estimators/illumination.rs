@@ -1,5 +1,5 @@
-//! Light that reaches a point of the surface, and the part of it that enters and leaves elsewhere: the
-//! part that all ways of choosing the point share.
+//! Light that reaches a point of the surface, and the part of it that enters and leaves elsewhere. All
+//! techniques for choosing the point share this code.
 
 use super::choice::{choose_light, light_shares};
 use super::{Anomaly, Cost, Scores};

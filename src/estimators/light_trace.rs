@@ -5,9 +5,9 @@
 //! probability 1 - albedo at every scattering event or turned by the phase function, and enters again
 //! where a body is not convex, until it leaves for good. Then the sensor receives it
 //! ([`Sensor::receive`](crate::scene::Sensor::receive)). No connection to a light or to the sensor is
-//! made, so it samples every boundary under every light, a smooth one under parallel light included,
-//! which no path from the sensor finds; in exchange it needs a sensor that photons hit. Its walk is
-//! written apart from the path tracer's, so that a slip in one of them shows as a difference.
+//! made, so it samples every boundary under every light, including parallel light through a smooth boundary,
+//! which paths from the sensor cannot find; in exchange it needs a sensor that photons can hit. Its walk is
+//! implemented independently of the path tracer, so that an error in one of them shows as a difference.
 //!
 //! Power of a photon. Light of radiance L(w) from directions w towards it, drawn with density p(w) from
 //! a light that was chosen with probability P, carries in one of N photons
@@ -188,7 +188,7 @@ struct Photon<'a> {
     from: Option<FaceId>,
     power: f64,
     history: History,
-    /// What a sensor of path lengths scores.
+    /// The score of a sensor of path lengths.
     measure: PathMeasure,
     stream: Stream,
     scores: &'a mut Scores,
@@ -354,7 +354,7 @@ impl<'a> Photon<'a> {
         }
     }
 
-    /// The length of the first flight that may meet the boundary, after those that surely do not; `None` where the photon is
+    /// The length of the first flight that may reach the boundary, after those that certainly do not; `None` where the photon is
     /// absorbed.
     fn fly_clear(&mut self) -> Option<f64> {
         let albedo = self.medium.albedo;

@@ -1,4 +1,4 @@
-//! Energy, closed forms, scaling and the path tracer's word for the light tracer.
+//! Tests of the light tracer: energy, closed forms, scaling, and agreement with the path tracer.
 
 use std::f64::consts::PI;
 

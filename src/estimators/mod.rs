@@ -1,9 +1,10 @@
-//! The one open trait and the estimators, one file each, named as the literature names them.
+//! The trait of estimators, which is the only open trait, and the estimators, one file each, with their names
+//! in the literature.
 //!
-//! An estimator is built for one cell and runs passes: it turns a pass's random streams into scores
-//! and knows no file, thread or statistic. The runner folds scores into moments, zeros included.
-//! Its file also states under which name and with which options an experiment asks for it, and which
-//! scenes it serves (`EstimatorKind`); `KINDS` lists them all.
+//! An estimator is built for one cell and runs passes: it turns the random streams of a pass into scores,
+//! and knows no file, thread or statistic. The runner accumulates scores, including zeros, into moments.
+//! The file of an estimator also states its name and options in experiment files, and the scenes that it
+//! serves (`EstimatorKind`); `KINDS` lists all estimators.
 
 mod bands;
 pub mod bssrdf_density;

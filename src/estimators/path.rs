@@ -40,14 +40,14 @@ pub use super::Roulette;
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PathOptions {
-    /// When a path is ended by chance; both ways are unbiased.
+    /// Russian roulette; all choices are unbiased.
     #[serde(default)]
     pub roulette: Roulette,
-    /// How walks are drawn inside the body; all ways are unbiased.
+    /// How walks are sampled inside the body; all choices are unbiased.
     #[serde(default)]
     pub walk: WalkDraw,
-    /// Whether lights that are even, 4 pi int L^2 / (int L)^2 < 2, are sampled as well as found by the directions that the
-    /// boundary draws; by default where walks are not guided.
+    /// Whether even lights, with 4 pi int L^2 / (int L)^2 < 2, are also light-sampled, beside BSDF sampling at the boundary;
+    /// by default they are if walks are not guided.
     pub sample_even_lights: Option<bool>,
 }
 

@@ -1,4 +1,4 @@
-//! Which scenes an estimator serves: by sensor, boundary, body and medium.
+//! The scenes that an estimator serves: by sensor, boundary, body and medium.
 
 use crate::error::{Error, Result};
 use crate::optics::boundary::Boundary;

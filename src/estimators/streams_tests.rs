@@ -1,4 +1,4 @@
-//! Random streams as estimators use them: no number serves two purposes.
+//! Random streams as estimators use them: no number is used for two purposes.
 
 use std::collections::HashSet;
 use std::sync::Arc;

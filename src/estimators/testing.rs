@@ -1,4 +1,4 @@
-//! What tests of several estimators measure.
+//! Measurements that tests of several estimators share.
 
 use super::{Estimator, Layout, Scores};
 use crate::sampling::stream::StreamKey;

@@ -1,4 +1,4 @@
-//! Vertices and exits of a camera walk, as techniques beside its own see them.
+//! Vertices and exits of a camera walk, as additional techniques see them.
 
 use crate::geometry::Hit;
 use crate::math::{DVec3, Frame};

@@ -1,4 +1,4 @@
-//! What a walk's connections see: other points of the body, and the light.
+//! Visibility of a walk's connections: to other points of the body, and to the light.
 
 use super::Cost;
 use super::bands::WalkBands;

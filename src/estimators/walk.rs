@@ -1,20 +1,20 @@
-//! A camera walk through the body, with whatever techniques beside unidirectional sampling its ends may
-//! have.
+//! A camera walk through the body, with optional techniques beside unidirectional sampling.
 //!
 //! The walk is that of [`super::path`]; an estimator that adds techniques implements [`Rivals`]: it is
 //! called at every medium vertex, and states at every exit how densely its techniques draw the same
 //! path. Weights are those of the balance heuristic over all techniques. Their densities are written
 //! relative to U, the density with which the walk draws its medium vertices and the flight to the exit,
 //! so that U itself, which underflows in thick media, is never formed: a light sample has density p_L, a
-//! BSDF sample p_B, a rival p_R / U. Roulette is in no density: each walk divides by its own survival,
-//! and weights without it still sum to 1.
+//! BSDF sample p_B, a rival p_R / U. Russian roulette is not part of any density: each walk divides by its
+//! survival probability, and weights without roulette still sum to 1.
 //!
-//! Emission. What the medium emits along a flight is no end of a path that anything else samples: each
-//! flight inside, from its vertex to the boundary whatever the distance drawn, scores
+//! Emission. No other technique samples the emission of the medium along a flight. Each flight inside
+//! therefore scores, from its vertex to the boundary and independently of the distance drawn,
 //!   throughput * emission (1 - e^(-sigma_t t_b)) / sigma_t,
-//! t_b being the distance of the boundary: the mean, over the distance, of scoring at collisions
-//! (emission / sigma_t) and by track length (emission times length), and exact for a ray that is not
-//! scattered. It is radiance inside; the throughput holds the 1 / eta^2 of its way out.
+//! where t_b is the distance of the boundary. This is the mean over the drawn distance both of the collision
+//! estimator (emission / sigma_t) and of the track-length estimator (emission times length), and it is exact
+//! for a ray that is not scattered. It is radiance inside; the throughput contains the factor 1 / eta^2 of
+//! leaving the body.
 
 use super::bands::{ScorePlace, WalkBands};
 use super::choice::choose_light;
@@ -38,14 +38,14 @@ pub(super) trait Rivals: Sized {
     /// Nothing happens at a medium vertex.
     const IS_SILENT: bool = false;
 
-    /// At a medium vertex that roulette has spared, before its direction is drawn; the walk's ray holds
+    /// Called at a medium vertex that survived roulette, before its direction is drawn; the walk's ray holds
     /// the vertex and the direction of arrival. Draws samples and scores them.
     fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>);
 
-    /// A boundary that bends light is behind the walk, which goes on inside: its ray is the next flight.
+    /// Called after the walk was refracted or reflected into the body; its ray is the next flight.
     fn depart<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>);
 
-    /// From how many rays of the sensor a walk looks for lights before it goes on with one of them: [`Self::look`].
+    /// Number of sensor rays per walk at which [`Self::look`] scores lights; the walk continues with one of them.
     fn views(&self) -> u32 {
         1
     }
@@ -80,7 +80,7 @@ pub(super) trait Rivals: Sized {
     ) -> f64;
 }
 
-/// No techniques except the walk's own.
+/// No additional techniques.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Unrivalled;
 
@@ -141,12 +141,12 @@ pub(super) struct CameraWalk<'a, R, B> {
     pub ray: Ray,
     from: Option<FaceId>,
     pub throughput: f64,
-    /// Share of the next look in what is seen from here.
+    /// Share of the next [`Rivals::look`] in the mean over all sensor rays of this walk.
     pub look_share: f64,
     /// The throughput without radiance's eta^2, which roulette compares with its threshold.
     survival: f64,
     pub history: History,
-    /// What a sensor of path lengths scores.
+    /// The score of a sensor of path lengths.
     measure: PathMeasure,
     drawn: DirectionDraw,
     exit: Option<WalkExit>,
@@ -236,9 +236,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
     }
 
-    /// Looks for lights from further rays of the sensor. What is seen without scattering takes a ray or two, a walk
-    /// many; what one ray sees of a small light is the light or nothing. Each look, the walk's own included, has its
-    /// share of the mean.
+    /// Scores lights that are seen without scattering at further rays of the sensor. This takes one or two rays, where a
+    /// walk takes many, and reduces variance, because a single ray either sees a small light or misses it. All sensor
+    /// rays, the first ray of the walk included, have equal shares of the mean.
     fn look_around(&mut self, path: Path<'_>) {
         let views = self.rivals.views();
         if views == 1 || self.matched() || !self.boundary.is_delta() {
@@ -291,8 +291,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
     }
 
-    /// Follows what a first hit reflects, then what it refracts, each with its share of the weight. What is reflected
-    /// mostly takes a ray, a walk inside many; chosen by chance, the two differ by more than guided walks do.
+    /// Follows the reflected ray of a first hit, then the refracted one, each with its share of the weight. Reflection
+    /// usually takes one ray, a walk inside takes many. Choosing one of the two at random would cause more variance than
+    /// guided walks do.
     fn follow_both(&mut self, hit: &Hit) {
         let Some((frame, wo)) = self.meet(hit, Side::Outside) else { return };
         let samples = self.boundary.sample_both(wo, self.stream.draw3());
@@ -338,7 +339,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                     return Some(hit);
                 }
                 None if t == f64::INFINITY => {
-                    // Without extinction a half-space swallows the path; a finite body lets none go.
+                    // Without extinction, a path may fly to infinity in a half-space; in a finite body the ray is lost.
                     if self.bounds.is_some() {
                         self.scores.note(Anomaly::LostRay);
                     }
@@ -349,7 +350,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
     }
 
-    /// The length of the first flight that may meet the boundary, after those that surely do not; `None` where the path ends.
+    /// The length of the first flight that may reach the boundary, after those that certainly do not; `None` where the
+    /// path ends.
     fn fly_clear(&mut self) -> Option<f64> {
         let (roulette, albedo) = (self.roulette, self.medium.albedo);
         let (mut throughput, mut survival) = (self.throughput, self.survival);
@@ -379,8 +381,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         self.bands.draw_flight(&self.medium, self.stream.draw())
     }
 
-    /// Where the boundary ends a flight of length `t`, if it does; scores what the medium emits on the
-    /// way to the boundary, which is then asked for however far it is.
+    /// Where the boundary ends a flight of length `t`, if it does. Scores the emission of the medium up to the
+    /// boundary; for this the boundary is found however far it is.
     #[inline]
     fn end_of_flight(&mut self, t: f64) -> Option<Hit> {
         let shape = &self.scene.shape;
@@ -392,7 +394,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             return None; // a lost ray, which `arrive` counts
         }
         let reach = hit.map_or(f64::INFINITY, |hit| hit.t);
-        // Emission has come in nowhere: of rings it counts in no ring, which is the slot of the ray.
+        // Emission has no point of entry: it counts in no ring, but in the slot of the ray.
         let (slot, band, light) = (self.slot, self.band, self.scene.lights.len());
         let place = ScorePlace { slot, band, class: self.history.class(), light };
         let factor = self.throughput / self.bands.density();
@@ -407,7 +409,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         Some(())
     }
 
-    /// A new medium vertex at distance `t`, with what connects from it; `None` where the path ends.
+    /// A new medium vertex at distance `t`, with the connections from it; `None` where the path ends.
     #[inline]
     fn arrive(&mut self, t: f64) -> Option<()> {
         self.measure.fly(&self.ray, t);
@@ -484,7 +486,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         self.leave(hit, side, &frame, sample)
     }
 
-    /// A point of the boundary is where the path is.
+    /// Moves the path to a point of the boundary.
     #[inline]
     fn arrive_at(&mut self, hit: &Hit, side: Side) {
         self.from = Some(hit.face);
@@ -492,8 +494,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         self.ray.origin = hit.point;
     }
 
-    /// Meets a boundary that bends light: what light sampling finds there, and the path's direction in the frame of the
-    /// shading normal. `None` where the path ends.
+    /// Meets a boundary that reflects or refracts: scores light samples there, and returns the path's direction in the
+    /// frame of the shading normal. `None` where the path ends.
     fn meet(&mut self, hit: &Hit, side: Side) -> Option<(Frame, DVec3)> {
         self.arrive_at(hit, side);
         self.scores.count(Cost::BoundaryEvents);
@@ -585,7 +587,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         if self.exit.is_some() { self.rivals.unidirectional() } else { [1.0, 1.0] }
     }
 
-    /// Adds a contribution of the walk to what its sensor slot counts; its light has come in at `entry`.
+    /// Adds a contribution of the walk to its sensor slot; its light entered the body at `entry`.
     #[inline]
     fn score(&mut self, class: TransportClass, light: usize, entry: DVec3, value: f64) {
         let slot = self.scene.sensor.slot_of(self.slot, entry);
@@ -595,15 +597,15 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
     }
 
-    /// The same for a path that has left the walk, with what the bands made of it since. Where it ends
-    /// is not known here: sensors that ask are not served by techniques that score so.
+    /// The same for a path that has left the walk, with the changes of the bands since then. Its end is not known
+    /// here: sensors that depend on it are not served by techniques that score in this way.
     #[inline]
     pub(super) fn score_with(&mut self, bands: &B, class: TransportClass, light: usize, value: f64) {
         let place = ScorePlace { slot: self.slot, band: self.band, class, light };
         bands.score(self.scores, place, value);
     }
 
-    /// With which probability light sampling chooses a light.
+    /// The probability with which light sampling chooses a light.
     #[inline]
     pub(super) fn choice(&self, light: usize) -> f64 {
         self.choice[light]
@@ -621,8 +623,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         Some(WalkExit { hit, frame, wo })
     }
 
-    /// How far the walk may fly from the boundary point where it is; `None` and counted where it meets
-    /// nothing.
+    /// The distance from the present boundary point to the next hit of the boundary; infinite where an unbounded
+    /// body has none, `None` (and counted) where a finite one has none.
     pub(super) fn reach(&mut self) -> Option<f64> {
         self.scores.count(Cost::Rays);
         let hit = self.scene.shape.intersect(&self.ray, Side::Inside, self.from, f64::INFINITY);

@@ -1,5 +1,5 @@
-//! A walk that a test leads along a path of its choice: what random numbers would decide, the test
-//! does; everything else is the walk's own code.
+//! A walk that a test leads along a path of its choice: the test makes the decisions that random numbers make
+//! otherwise; all other code is that of the walk.
 
 use super::*;
 

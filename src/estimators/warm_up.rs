@@ -1,9 +1,10 @@
-//! What walks learn before the first pass.
+//! Training of learned walks, before the first pass.
 //!
-//! Paths are traced as `path` traces them, on streams that no pass draws from, each lesson guided by what the lesson before
-//! has found and twice as long. A turn at a medium vertex found what its path scores afterwards: the throughput up to the
-//! vertex, the phase function and the light that arrives along the direction, over the density of the path. So the sum over
-//! paths is in proportion to the product of the three, averaged over the walks that come by, however the paths were drawn.
+//! Paths are traced as in `path`, on streams that no pass uses. Each training round (lesson) is guided by the result of the
+//! round before and is twice as long. A turn (a scattering event at a medium vertex) records the score of its path after the
+//! vertex: the throughput up to the vertex, times the phase function, times the light that arrives along the direction, over
+//! the density of the path. The sum over paths is thus proportional to the product of the three, averaged over the walks that
+//! pass by, however the paths were drawn.
 //!
 //! ```text
 //! field, lessons -> Lesson (a walk that takes notes) -> found per cell -> LearnedPulls -> field with guided walks

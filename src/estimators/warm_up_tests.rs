@@ -1,4 +1,4 @@
-//! Walks that learn.
+//! Tests of learned walks.
 
 use super::*;
 use crate::estimators::path::{PathOptions, PathTracer};

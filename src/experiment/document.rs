@@ -1,4 +1,4 @@
-//! A TOML text as a tree in which every value knows its place. Door for `toml`.
+//! A TOML text as a tree in which every value knows its place. The only module that uses `toml`.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -1,8 +1,8 @@
-//! What an experiment file may contain. The types below are the single source: `scatterproof schema`
-//! prints the JSON Schema that they generate, and `validate` walks a file along that same schema.
-//! Keys carry units. Physics has no defaults; run control has.
+//! The content of experiment files. The types below are the only definition: `scatterproof schema` prints the
+//! JSON Schema that they generate, and `validate` checks a file against the same schema. Keys contain units.
+//! Physical quantities have no defaults; options of a run have.
 //!
-//! A file has a scene with estimators, or samplers, or both; `rules` states which keys belong together.
+//! A file has a scene with estimators, or samplers, or both; `rules` defines which keys belong together.
 
 use std::collections::BTreeMap;
 
@@ -30,15 +30,15 @@ pub struct ExperimentFile {
     /// What the experiment shows, for reports.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub description: Option<String>,
-    /// Root of all random streams, where another sample is wanted; without it the experiment's name and
-    /// content alone name its streams.
+    /// Root of all random streams, to draw another sample; by default the streams depend on the name and
+    /// content of the experiment alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 9223372036854775807u64))]
     pub seed: Option<u64>,
     /// A text that enters the name of every stream, as `verify --fresh-seed` sets it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fresh: Option<String>,
-    /// The wavelength bands; each is rendered by itself.
+    /// The wavelength bands; each is rendered separately.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bands: Option<BandsEntry>,
     /// The body: shape, boundary and medium.
@@ -47,7 +47,7 @@ pub struct ExperimentFile {
     /// The sensor, which defines what is measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor: Option<SensorEntry>,
-    /// The lights, all shining at once; none are needed where the medium emits.
+    /// The lights, all switched on; none is needed if the medium emits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(min = 1))]
     pub light: Vec<LightEntry>,
@@ -56,7 +56,7 @@ pub struct ExperimentFile {
     #[schemars(length(min = 1))]
     pub estimator: Vec<EstimatorEntry>,
     /// Whether an estimator runs only in the cells in which a claim names it; by default it runs in all.
-    /// Cells that no claim is about stay empty.
+    /// Cells without a claim stay empty.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub only_claimed: bool,
     /// Axes of the sweep; they multiply.
@@ -86,10 +86,10 @@ pub struct ExperimentFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub picture: Vec<PictureEntry>,
     /// Named sets of overrides, chosen by `--setting NAME`: dotted key -> value. Tables in braces are
-    /// values, others only group keys.
+    /// values; other tables only group keys.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub setting: BTreeMap<String, BTreeMap<String, Value>>,
-    /// How pictures are shown; never changes a number.
+    /// How pictures are displayed; never changes a number.
     #[serde(default)]
     pub display: Display,
 }
@@ -182,15 +182,15 @@ pub enum ShapeEntry {
     Mesh {
         /// Path, relative to the experiment file.
         path: String,
-        /// Axis of the file that points up, to +z; z without it.
+        /// Axis of the file that points up, to +z; by default z.
         ///
         /// From y the mesh is turned about x: y becomes z, z becomes -y.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         up: Option<UpAxis>,
-        /// Unit of the file's numbers; mm without it.
+        /// Unit of the file's numbers; by default mm.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         unit: Option<LengthUnit>,
-        /// Scale the longest side of its bounding box to this, and centre the box at the origin; without it
+        /// Scales the longest side of the bounding box to this, and centres the box at the origin; by default
         /// the mesh keeps its size and place.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -201,7 +201,7 @@ pub enum ShapeEntry {
         /// Shift after everything else, mm.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         translate_mm: Option<[f64; 3]>,
-        /// Which normal the boundary sees.
+        /// Normals with which the boundary reflects and refracts.
         normals: NormalsEntry,
     },
     /// A sphere of 20 * 4^subdivisions triangles.
@@ -212,7 +212,7 @@ pub enum ShapeEntry {
         /// Number of subdivisions of the icosahedron.
         #[schemars(range(min = 0, max = 9))]
         subdivisions: u32,
-        /// Which normal the boundary sees.
+        /// Normals with which the boundary reflects and refracts.
         normals: NormalsEntry,
     },
     /// A sphere displaced along its radius by amplitude * sin(kx) sin(ky) sin(kz) of the unit vector.
@@ -229,7 +229,7 @@ pub enum ShapeEntry {
         /// Wavenumber k per radius.
         #[schemars(range(min = 0.0, max = 1000.0))]
         wavenumber: f64,
-        /// Which normal the boundary sees.
+        /// Normals with which the boundary reflects and refracts.
         normals: NormalsEntry,
     },
     /// A sphere displaced along its radius by irregular hollows and lumps of four scales, like a scan.
@@ -243,7 +243,7 @@ pub enum ShapeEntry {
         /// Bound of the displacement as a fraction of the radius.
         #[schemars(range(min = 0.0, max = 0.5))]
         amplitude: f64,
-        /// Which normal the boundary sees.
+        /// Normals with which the boundary reflects and refracts.
         normals: NormalsEntry,
     },
     /// A torus about the z axis.
@@ -257,7 +257,7 @@ pub enum ShapeEntry {
         /// Segments around the ring and around the tube.
         #[schemars(inner(range(min = 3, max = 4096)))]
         segments: [u32; 2],
-        /// Which normal the boundary sees.
+        /// Normals with which the boundary reflects and refracts.
         normals: NormalsEntry,
     },
     /// A sphere with a concentric empty cavity.
@@ -271,7 +271,7 @@ pub enum ShapeEntry {
         /// Number of subdivisions of both icosahedra.
         #[schemars(range(min = 0, max = 9))]
         subdivisions: u32,
-        /// Which normal the boundary sees.
+        /// Normals with which the boundary reflects and refracts.
         normals: NormalsEntry,
     },
     /// A box with square holes through it along z.
@@ -291,9 +291,9 @@ pub enum ShapeEntry {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum UpAxis {
-    /// As in most modelling programs.
+    /// The convention of most modelling programs.
     Y,
-    /// As here.
+    /// The convention of this program.
     Z,
 }
 
@@ -330,7 +330,7 @@ impl LengthUnit {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Upsampling {
-    /// Smooth weights over wavelength with sum 1; the spectrum shows as the colour that it is made of.
+    /// Smooth weights over wavelength with sum 1; the spectrum is displayed as the colour from which it is made.
     Smooth,
 }
 
@@ -416,10 +416,10 @@ pub struct MediumEntry {
     /// A built-in measured material (`scatterproof list`), for rgb bands, or for others by `upsampling`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub preset: Option<PresetMedium>,
-    /// Skin by its constituents (Donner & Jensen 2006), spectral bands within 380 to 780 nm.
+    /// Skin defined by its constituents (Donner & Jensen 2006), for spectral bands within 380 to 780 nm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinFractions>,
-    /// Radiance that a ray gains per length by emission, W/(mm^2 sr) per mm; none without it.
+    /// Radiance that a ray gains per length by emission, W/(mm^2 sr) per mm; by default 0.
     ///
     /// The same in every direction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -435,11 +435,11 @@ pub struct PresetMedium {
     /// Multiplies both coefficients: 2 is a body twice as large.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub scale: f64,
-    /// Mean cosine; sigma_s = sigma_s' / (1 - g). Without it g = 0 and sigma_s = sigma_s'.
+    /// Mean cosine; sigma_s = sigma_s' / (1 - g). By default g = 0 and sigma_s = sigma_s'.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 1))]
     pub g: Option<f64>,
-    /// How bands of wavelengths take their coefficients from those of R, G and B; refused without it.
+    /// How bands of wavelengths take their coefficients from those of R, G and B; required for such bands.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub upsampling: Option<Upsampling>,
 }
@@ -523,7 +523,7 @@ pub struct Environment {
     /// Constant radiance, W/(mm^2 sr).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radiance: Option<Spectrum>,
-    /// Only directions with a positive cosine to this axis shine (a slab lit on one face).
+    /// Light comes only from directions with a positive cosine to this axis (a slab lit on one face).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hemisphere: Option<[f64; 3]>,
     /// Latitude-longitude map, OpenEXR or Radiance HDR, relative to the experiment file; +z is up, the
@@ -534,7 +534,8 @@ pub struct Environment {
     /// Turns the map about z, degrees, counter-clockwise from above, to the nearest column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate_deg: Option<f64>,
-    /// How bands of wavelengths take their radiance from R, G and B; refused without it.
+    /// How bands of wavelengths take their radiance from R, G and B; required for such bands if the map has
+    /// no channel of each band.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub upsampling: Option<Upsampling>,
     /// Factor on the radiance of the map.
@@ -639,7 +640,7 @@ pub struct SweepCsv {
     pub path: String,
     /// Column -> dotted key that it sets; numbers become numbers, other texts strings.
     pub columns: BTreeMap<String, String>,
-    /// Rows to leave out: those that have, in each of these columns, one of its numbers or texts.
+    /// Rows to leave out: those that have, in each of these columns, one of the listed numbers or texts.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub except: BTreeMap<String, Vec<Scalar>>,
 }
@@ -648,25 +649,25 @@ pub struct SweepCsv {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PairEntry {
-    /// Dotted keys left out of the streams' key, as `object.shape`.
+    /// Dotted keys that do not enter the key of the streams, as `object.shape`.
     #[schemars(length(min = 1))]
     pub over: Vec<String>,
 }
 
-/// How much work; exactly one key.
+/// The amount of work; exactly one key.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Budget {
     /// Passes per estimator and cell.
     Passes(#[schemars(range(min = 2, max = 1099511627776u64))] u64),
-    /// CPU seconds per estimator and cell; a pilot turns them into passes.
+    /// CPU seconds per estimator and cell; a pilot run converts them into passes.
     CpuSeconds(#[schemars(extend("exclusiveMinimum" = 0))] f64),
-    /// Relative standard error of the observables that claims name; a pilot turns it into passes.
+    /// Relative standard error of the observables that claims name; a pilot run converts it into passes.
     RelativeError(RelativeError),
 }
 
-/// Runs that take a share of the budget: where one estimator, or one cell, needs fewer passes than
-/// another for the same error. The shares of several entries that match a run multiply.
+/// Runs that take a share of the budget, for estimators or cells that need fewer passes than others for the
+/// same error. If several entries match a run, their shares are multiplied.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BudgetShare {
@@ -705,7 +706,7 @@ pub struct SmallValues {
     pub at_most: f64,
 }
 
-/// How pictures are shown.
+/// How pictures are displayed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Display {

@@ -1,4 +1,4 @@
-//! "Did you mean": the help for a name that is not known. Door for `strsim`.
+//! "Did you mean": the help for a name that is not known. The only module that uses `strsim`.
 
 use strsim::normalized_damerau_levenshtein;
 

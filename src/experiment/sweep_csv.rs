@@ -1,4 +1,4 @@
-//! Rows of a sweep from a CSV file. Door for `csv`.
+//! Rows of a sweep from a CSV file, read with `csv`.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -1,6 +1,6 @@
 //! Shapes: exact half-space, slab, box and sphere, and closed triangle meshes, behind one interface.
-//! All lengths in mm, all arithmetic that a result sees in f64; scaling a scene by a power of two
-//! scales every result exactly (no absolute epsilon anywhere).
+//! All lengths are in mm, and all arithmetic that a result depends on is in f64. Scaling a scene by a power
+//! of two scales every result exactly (there is no absolute epsilon).
 
 mod analytic;
 #[cfg(test)]

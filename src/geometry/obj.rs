@@ -1,4 +1,4 @@
-//! Wavefront OBJ files. Door for `tobj`.
+//! Wavefront OBJ files. The only module that uses `tobj`.
 
 use std::path::Path;
 

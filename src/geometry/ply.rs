@@ -1,4 +1,4 @@
-//! PLY files, as text or binary. Door for `ply_rs_bw`.
+//! PLY files, as text or binary. The only module that uses `ply_rs_bw`.
 
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};

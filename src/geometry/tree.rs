@@ -1,4 +1,4 @@
-//! The border between f32 culling and f64 intersection. Door for `obvhs`.
+//! The interface between f32 culling and f64 intersection. Only this module and `node` use `obvhs`.
 //!
 //! The tree only rules triangles out; every number a result sees is computed in f64 by the caller.
 //! Culling is conservative, so results do not depend on the tree.

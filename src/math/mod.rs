@@ -1,5 +1,6 @@
 //! Vectors, frames, and every transcendental function that results use.
-//! Doors for `glam` and `libm`: the C library chooses its sine by CPU, libm's is the same everywhere.
+//! The only module that uses `glam` and `libm`: the C library chooses its sine by CPU; that of `libm` is the
+//! same everywhere.
 
 pub use glam::{DVec2, DVec3, UVec2, Vec3};
 

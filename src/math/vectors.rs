@@ -1,4 +1,4 @@
-//! Loops over lanes, compiled for the vector instructions of the machine. Door for `pulp`.
+//! Loops over lanes, compiled for the vector instructions of the machine. The only module that uses `pulp`.
 
 /// Work for [`vectorized`]. `call` and what its loops call are `inline(always)`: what is not inlined is compiled for the
 /// least machine.

@@ -1,8 +1,8 @@
 //! The refractive surface as a whole: a lobe of reflection and a lobe of refraction.
 //!
 //! Local frame: +z is the outward normal; `wo` points towards the sensor, `wi` towards the light, both
-//! away from the surface; a direction with z > 0 is outside. `eta` is inside over outside. What flows
-//! is radiance from `wi` to `wo`: refraction changes it by the squared index of the receiving side over
+//! away from the surface; a direction with z > 0 is outside. `eta` is inside over outside. Radiance is
+//! transported from `wi` to `wo`: refraction multiplies it by the squared index of the receiving side over
 //! that of the sending side.
 //!
 //! Rough surface (Walter, Marschner, Li & Torrance 2007), index n_o on the side of wo, n_i on that of
@@ -74,7 +74,7 @@ pub struct BoundarySample {
 
 impl Boundary {
     /// Draws `wi` for `wo`; `u[0]` chooses the lobe. `None`: the microfacet sends the light into the
-    /// surface, the sample scores 0 (what multiple scattering between facets would carry is lost).
+    /// surface, and the sample scores 0 (light of multiple scattering between facets is lost).
     #[inline]
     pub fn sample(&self, wo: DVec3, u: [f64; 3]) -> Option<BoundarySample> {
         let Some((h, relative)) = self.facet(wo, [u[1], u[2]]) else {
@@ -132,11 +132,10 @@ impl Boundary {
         }
     }
 
-    /// Draws the direction on the other side for `from`, refraction forced: h from the visible normals
-    /// of
-    /// `from`, then Snell about h, without a choice of lobe. `None` is a failed sample and scores 0: the
-    /// facet reflects totally, or it sends the light to the side it came from. A delta surface gives
-    /// [`Self::refract`].
+    /// Draws the direction on the other side for `from`, with forced refraction: h is drawn from the visible
+    /// normals of `from` and followed by Snell's law about h, without a choice of lobe. `None` is a failed
+    /// sample and scores 0: the facet reflects totally, or sends the light back to its own side. A delta
+    /// surface gives [`Self::refract`].
     #[inline]
     pub fn sample_refraction(&self, from: DVec3, u: [f64; 2]) -> Option<DVec3> {
         let Boundary::Rough { eta, facets } = self else { return self.refract(from) };

@@ -1,4 +1,4 @@
-//! Directions out of several facets.
+//! Directions by several facets.
 //!
 //! One facet of a rough surface, drawn from the visible normals, gives a direction whose weight is G1, or none where the
 //! direction is on the wrong side: from inside a body of index 1.4 and GGX roughness 0.2 that is 5 % of the light, and the

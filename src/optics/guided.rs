@@ -1,37 +1,38 @@
-//! Turns and flights of a walk that is drawn towards where importance grows.
+//! Turns (scattered directions) and flights (distances) of guided walks, which prefer directions of growing importance.
 //!
 //! Let phi(x) > 0 be an importance, n = grad phi / |grad phi| and s = |grad phi| / (sigma_t phi) < 1 its growth per mean
 //! free path. In a half-space with isotropic scattering and albedo a, transport has the solution phi = e^{s sigma_t x.n} /
-//! (1 - s m), m = w.n, with s / tanh^-1(s) = a (Dwivedi 1982, Krivanek & d'Eon 2014). Taken as importance it gives
-//! the walk of least variance:
+//! (1 - s m), m = w.n, with s / tanh^-1(s) = a (Dwivedi 1982, Krivanek & d'Eon 2014). Used as the importance, this
+//! solution gives the walk of least variance:
 //!   turn     p(w') ~ 1 / (1 - s m')
 //!   flight   rate sigma' = sigma_t (1 - s m).
 //! For a phase function that is not isotropic the angular factor is multiplied by the phase function,
 //!   p(w') = HG(w.w') f(m') / N(m),   f(m') = (1 + b s m') / (1 - s m'),   b = a g / (1 - a g),
-//! b being the first moment of the collision density of the growing solution in the diffusion limit, and N the integral of
-//! the numerator. With f = -b + (1 + b) / (1 - s m') and
+//! where b is the first moment of the collision density of the growing solution in the diffusion limit, and N the integral
+//! of the numerator. With f = -b + (1 + b) / (1 - s m') and
 //!   1 / (1 - s m') = nu / (nu - m') = nu sum_l (2l+1) Q_l(nu) P_l(m'),   nu = 1 / s,
 //! where Q_l are Legendre functions of the second kind, the convolution with HG multiplies the l-th term by g^l:
 //!   N(m) = -b + (1 + b) nu sum_l (2l+1) g^l Q_l(nu) P_l(m).
-//! For g = 0 that is its first term, the logarithm of Dwivedi's density, and f has its closed form. Otherwise the series of f
-//! itself, which falls off as (nu - sqrt(nu^2 - 1))^l, is cut where the rest is below `REST` of its least value: a
-//! polynomial guides as well, and its N has as few terms, without an error. Where more than `TERMS` were needed, the turn
-//! has the f of a smaller s. s is rounded to one of `LEVELS` values, closer to each other where they are small, each with
-//! its own series; any s gives an exact density, so that this rounding is no error.
+//! For g = 0 only the first term remains, the logarithm of Dwivedi's density, and f has a closed form. Otherwise the series
+//! of f, which falls off as (nu - sqrt(nu^2 - 1))^l, is truncated where the rest is below `REST` of the least value of f. The
+//! truncated f is a polynomial that guides as well, and its N has the same few terms, without an error. Where more than
+//! `TERMS` terms would be needed, the turn uses the f of a smaller s. s is rounded to one of `LEVELS` values, which are closer
+//! to each other where they are small and have a series each; any s gives an exact density, so that rounding adds no error.
 //!
-//! What a walk needs is the ratio to the plain walk: f / N for a turn; for a flight of length t with the pull p = s m,
+//! A walk needs the ratio of its density to that of the plain walk: f / N for a turn; for a flight of length t with the
+//! pull p = s m,
 //!   (1 - p) e^{p sigma_t t} where it ends in the medium, e^{p sigma_t t} where it reaches the boundary.
 //!
-//! Near a boundary a guided step may be an *escape*, with a chance c: its direction is uniform in the cone of those that the
-//! boundary lets out, of solid angle W, and it meets the boundary; no distance is drawn. Over a plain step its density is
-//! e^{sigma_t t} c / (W HG).
+//! Near a boundary a guided step is an *escape* with probability c: its direction is uniform in the cone, of solid angle W,
+//! of directions that are refracted out, and it reaches the boundary; no distance is drawn. Relative to a plain step its
+//! density is e^{sigma_t t} c / (W HG).
 //!
-//! The guide alone is not safe: where it is wrong, weights have no bound. With a share q of guided steps, turn and flight
-//! together, and both weighted by the balance heuristic, no step weighs more than 1 / (1 - q) of a plain one. A step that
-//! ends in the medium, and one that reaches the boundary, have the ratios
+//! The guide alone is not safe: where it is wrong, weights are unbounded. If a share q of steps is guided, turn and flight
+//! together, and both are weighted by the balance heuristic, the weight of a step is at most 1 / (1 - q) times that of a plain
+//! one. A step that ends in the medium, and one that reaches the boundary, have the ratios
 //!   (1 - q) + q (1 - c) (f / N) (1 - p) e^{p sigma_t t},
 //!   (1 - q) + q (1 - c) (f / N) e^{p sigma_t t} + q c / (W HG) e^{sigma_t t},
-//! whose parts `Heading` keeps when the direction is known and the flight is not.
+//! whose parts `Heading` keeps while the direction is known and the flight is not.
 
 use std::f64::consts::TAU;
 
@@ -40,7 +41,7 @@ use crate::math::{DVec3, Frame, exp, exp_m1, increasing_root, ln, ln_1p, renorma
 use crate::sampling::discrete::choose;
 use crate::sampling::distance::sample_exponential;
 
-/// Values of the growth per mean free path that are told apart, 0 included.
+/// Number of distinct values of the growth per mean free path, including 0.
 pub const LEVELS: usize = 256;
 
 /// The largest growth per mean free path.
@@ -94,7 +95,7 @@ impl Pull {
     }
 }
 
-/// The way out near a boundary.
+/// The escape near a boundary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Escape {
     /// Unit normal of the boundary, outwards: the axis of the cone.

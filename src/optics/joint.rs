@@ -7,11 +7,11 @@
 //!   target(w) = phase(w_in.w) (pi - theta) / sin(theta),     theta the angle between w and b,
 //! and the distance equiangular (joint importance sampling: Georgiev, Krivanek, Hachisuka,
 //! Nowrouzezahrai & Jarosz 2013; Kulla & Fajardo 2012; the phase function of the next vertex is left
-//! out). Beside the isotropic density iso(w) = (pi - theta) / (pi^3 sin theta), which its own map
-//! realises exactly, only phase(w_in.w) is left to tabulate, and it is bounded: a table of it over
-//! (theta, azimuth) for each angle alpha between `w_in` and b, piecewise constant, gives
+//! out). The isotropic density iso(w) = (pi - theta) / (pi^3 sin theta) is sampled exactly by its own map, so
+//! that only phase(w_in.w) is tabulated, and it is bounded. A piecewise constant table over (theta, azimuth)
+//! for each angle alpha between `w_in` and b gives
 //!   pdf(w) = iso(w) P(texel) / I(texel),     I(texel) = the isotropic probability of the texel,
-//! which is the density of what is drawn to the last bit, however coarse the texels.
+//! which is the density of the draws to the last bit, however coarse the texels are.
 //!
 //! How close: the mean of target / pdf over the target (both normalised) is 1 where they are the same,
 //! and its excess over 1 is the relative variance of a sample's weight. By the angle alpha (test

@@ -1,4 +1,4 @@
-//! Fresnel, microfacets, boundaries, phase functions, media, spectra and materials: scalar, one band.
+//! Fresnel, microfacets, boundaries, phase functions, media, spectra and materials: scalar, for one band.
 
 /// Light that diffuses from one point of a surface to another.
 pub mod bssrdf;

@@ -9,8 +9,8 @@
 //! /10 per mm, linear between the 2 nm of its table.
 //!   sigma_a = m (b eu + (1 - b) pheo) + h (o HbO2 + (1 - o) Hb) + (1 - m - h) baseline
 //! with the volume fractions m of melanosomes and h of blood, the share b of eumelanin, and the
-//! oxygenation o. Real skin has its melanin above its blood; mixing them in one layer keeps the colours
-//! and loses the layers' order.
+//! oxygenation o. In real skin, melanin lies above the blood; mixing them in one layer keeps the colours and
+//! ignores the order of the layers.
 
 use std::sync::LazyLock;
 

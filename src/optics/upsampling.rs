@@ -1,4 +1,4 @@
-//! From three numbers of a colour, R, G and B, to wavelengths.
+//! Upsampling of a colour R, G and B to wavelengths.
 //!
 //! Three weights over wavelength, positive and with sum 1 everywhere (Mallett & Yuksel 2019 propose such a
 //! partition), here the softmax of quadratics in x = (lambda - 560 nm) / 100 nm:

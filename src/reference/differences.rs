@@ -1,4 +1,4 @@
-//! Densities of maps between directions by central differences, for closed forms to be held against.
+//! Densities of maps between directions by central differences, with which tests compare closed forms.
 
 use crate::math::{DVec3, Frame};
 

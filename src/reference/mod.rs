@@ -1,4 +1,4 @@
-//! Oracles: a value and its stated error, from closed forms and quadrature. They never use estimators.
+//! Oracles: values with stated errors, from closed forms and quadrature. Oracles never use estimators.
 
 /// Semi-infinite, index-matched, isotropically scattering media.
 pub(crate) mod chandrasekhar;

@@ -1,4 +1,4 @@
-//! Light that the plane z = 0 refracts into the body below: one ray a point, in closed form.
+//! Light that the plane z = 0 refracts into the body below: one ray per point, in closed form.
 //!
 //! Parallel light from the direction w_L (unit, z = cl > 0) travels inside along -w with w = (w_L + (eta
 //! ct - cl) z) / eta, eta ct = sqrt(eta^2 - 1 + cl^2). An irradiance E across the light becomes T E cl /

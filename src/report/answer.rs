@@ -1,5 +1,5 @@
 //! The head of a page: a badge for the verdicts, a sentence for each pair of estimators, and a split picture
-//! of the most telling pair.
+//! of the most informative pair.
 
 use super::data::ReportData;
 use super::document::{BadgeKind, FigureBlock, PageBlock};

@@ -1,4 +1,5 @@
-//! The page as one HTML file: no network, pictures as data URIs, light and dark, readable on a phone.
+//! The page as one HTML file: without network access, with pictures as data URIs, in light and dark colours,
+//! and readable on a phone.
 
 use super::base64;
 use super::document::{BadgeKind, Document, FigureBlock, PageBlock, PictureFile, TableBlock, slug};

@@ -1,5 +1,5 @@
-//! Tables and images for people, made from a record and its timing alone; they can be made again at any
-//! time.
+//! Tables and images for readers, made from a record and its timing alone, so that they can be made again at
+//! any time.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! Numbers with their uncertainty, and no number without it.
+//! Numbers with their uncertainty; no number is shown without it.
 
 /// `1.234(5)`: the digits in brackets are one standard error in units of the last digit shown. The
 /// error has one digit, or two where the first is 1. `1.234(5)e-7` where plain digits would not show

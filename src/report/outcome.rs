@@ -1,4 +1,4 @@
-//! A page for verdicts without a record of their own: of `judge` and `compare`.
+//! A page for verdicts that belong to no single record: those of `judge` and `compare`.
 
 use super::answer::badges;
 use super::document::{Document, FigureBlock, PageBlock, TableBlock};

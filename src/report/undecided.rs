@@ -1,4 +1,4 @@
-//! Verdicts that are neither green nor failed, by cause, and what would decide them.
+//! Verdicts that are neither green nor failed, by cause, and the passes that would decide them.
 
 use crate::verify::verdict::{Outcome, Verdict};
 

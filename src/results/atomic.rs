@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all: written beside their place, flushed, renamed.
+//! Files that appear whole or not at all: written next to their final path, flushed, renamed.
 
 use std::fs::{self, File};
 use std::io::{self, Write};

@@ -1,4 +1,4 @@
-//! How far counted work may be from CPU time, by kind of estimator.
+//! The factor by which ratios of counted work may differ from those of CPU time, by kind of estimator.
 
 /// By kind, the largest factor between the cost of a run by counted work (`verify::weights`) and by CPU
 /// time, both relative to path tracing in the same cell: over 27 cells of light transport and 12 of BSSRDF

@@ -1,4 +1,4 @@
-//! Comma-separated text as RFC 4180 has it, with numbers that read back exactly.
+//! Comma-separated text by RFC 4180, with numbers that are read back exactly.
 
 use std::borrow::Cow;
 use std::fmt;

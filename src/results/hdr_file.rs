@@ -1,4 +1,4 @@
-//! Radiance HDR files (`.hdr`). Door for `image`.
+//! Radiance HDR files (`.hdr`). The only module that uses `image`.
 
 use std::io::Cursor;
 use std::path::Path;

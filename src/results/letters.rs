@@ -1,5 +1,5 @@
 //! Labels in pictures: the printable ASCII characters of DejaVu Sans Bold at 19 pixels (Bitstream Vera licence, which
-//! permits this), as a picture of one row. Other characters show as `?`.
+//! permits this), as a picture of one row. Other characters are shown as `?`.
 
 use std::sync::OnceLock;
 

@@ -1,6 +1,6 @@
 //! `manifest.json`: the summary of a result that is kept without its arrays. It holds the passes of
 //! every run, for `run --passes-of`; the hash of every array, to tell whether a re-run reproduces it;
-//! and the hash of every table, plot and picture, so that one changed by hand is found.
+//! and the hash of every table, plot and picture, to detect files that were changed by hand.
 
 use std::collections::BTreeMap;
 use std::fs;

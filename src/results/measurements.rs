@@ -1,4 +1,4 @@
-//! The table of everything that was measured: one row for each band of each observable.
+//! The table of all measurements: one row for each band of each observable.
 
 use serde::Serialize;
 

@@ -1,5 +1,5 @@
 //! Records, provenance, the atomic store, images.
-//! Doors for `blake3`, `csv`, `exr` and `png`.
+//! The only module that uses `blake3`, `exr` and `png`; it shares `csv` with `experiment`.
 
 /// Files that are there whole or not at all.
 pub mod atomic;

@@ -1,5 +1,5 @@
-//! `pictures.json`: the pictures that an experiment asks for beside those of every run. It is stored
-//! beside the record and not in it: how a record is shown changes none of its bits.
+//! `pictures.json`: the pictures that an experiment requests in addition to those of every run. It is stored
+//! beside the record and not in it, so that the display of a record changes none of its bits.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,5 @@
-//! The record: what a run writes and the only thing that verification and reports read.
-//! Byte-identical for any number of threads, block size, kill and resume.
+//! The record, which a campaign writes and which is the only input of verification and reports. It is
+//! byte-identical for any number of threads, any block size, and after any kill and resume.
 
 use std::collections::BTreeMap;
 

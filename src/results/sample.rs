@@ -1,4 +1,4 @@
-//! A small made-up record for tests of the evidence side.
+//! A small artificial record for tests of the evidence side.
 
 use std::collections::BTreeMap;
 

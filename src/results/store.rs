@@ -6,9 +6,9 @@
 //! record/cells/<CELL>/<RUN>.observables.npy, .costs.npy, .pixels.npy, .spread.npy, .guide.npy
 //! record/samplers/<NNN>.coarse.npy, .fine.npy, .serial.npy
 //! timing.json, provenance.json    beside the record, never byte-identical
-//! pictures.json                   what pictures are wanted beside those of every run
+//! pictures.json                   pictures that are requested in addition to those of every run
 //! ```
-//! and beside those the derived views. The record appears whole or not at all.
+//! and the derived views. The record appears whole or not at all.
 
 use std::collections::BTreeMap;
 use std::fs;

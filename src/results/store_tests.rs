@@ -1,4 +1,4 @@
-//! Every way in which a stored record can be unusable, planted once.
+//! Every defect that makes a stored record unusable, planted once.
 
 use tempfile::TempDir;
 

@@ -1,10 +1,10 @@
 //! States of jobs on disk, so that a run resumes where it was stopped and nothing is computed twice.
 //!
-//! One file a job, named by its identity: a header in JSON, the numbers as little-endian f64, and a
-//! blake3 of both. A file that does not fit (another job, truncated, damaged) is ignored. A
-//! state holds what a larger budget resumes from and which claims were made before the first pass: of an
-//! estimator at most 128 batches of 40 bytes per observable and band, and an image of 16 bytes per pixel
-//! and band for each bit that is set in the number of passes; of a sampler its counts.
+//! One file per job, named by the identity of the job: a header in JSON, the numbers as little-endian f64,
+//! and a blake3 hash of both. A file that does not fit (another job, truncated, damaged) is ignored. A state
+//! holds the claims that were made before the first pass, and the data from which a larger budget resumes:
+//! for an estimator at most 128 batches of 40 bytes per observable and band, and an image of 16 bytes per
+//! pixel and band for each bit that is set in the number of passes; for a sampler its counts.
 
 use std::fs;
 use std::path::{Path, PathBuf};

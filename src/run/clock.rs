@@ -1,4 +1,4 @@
-//! CPU time of the calling thread. Door for `rustix`.
+//! CPU time of the calling thread. Only this module and `memory_limits` use `rustix`.
 
 use std::time::Duration;
 

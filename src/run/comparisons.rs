@@ -1,5 +1,5 @@
-//! Claims expanded: every elementary statement, with the value that it is compared with. Expected values
-//! come into the record here, so that verification needs only the record.
+//! Expansion of claims into elementary statements, each with its expected value. Expected values are written
+//! to the record here, so that verification needs only the record.
 
 use std::collections::BTreeMap;
 

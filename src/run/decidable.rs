@@ -1,4 +1,5 @@
-//! Claims that no passes could decide: what is known of the estimators beforehand makes their test invalid.
+//! Claims that no number of passes could decide: properties of the estimators that are known beforehand make
+//! their tests invalid.
 
 use super::job::{Job, Passes};
 use crate::error::{Error, Refusals, Result};

@@ -1,10 +1,10 @@
-//! Signals. Door for `signal-hook`.
+//! Signals. The only module that uses `signal-hook`.
 //!
-//! Ctrl-C (SIGINT), SIGTERM, SIGHUP (a terminal that was closed) and SIGXCPU (a limit of CPU time) ask for the end. While
-//! passes run, what is done is kept first. Everywhere else, as in loading a mesh or writing a report, the process ends at
-//! once: whatever it writes is there whole or not at all, and a killed run loses nothing either. A second signal ends it
-//! at once everywhere, except SIGXCPU, which comes every second. SIGXFSZ, which a file-size limit sends, is caught so
-//! that the write itself fails with an error that can be told.
+//! Ctrl-C (SIGINT), SIGTERM, SIGHUP (a terminal that was closed) and SIGXCPU (a limit of CPU time) request the end of the
+//! process. While passes run, completed passes are saved first. Everywhere else, as in loading a mesh or writing a report,
+//! the process ends at once: its files appear whole or not at all, and even a killed run loses nothing. A second signal ends
+//! the process at once everywhere, except SIGXCPU, which arrives every second. SIGXFSZ, which a file-size limit sends, is
+//! caught so that the write itself fails with an error that can be reported.
 
 use std::fs;
 use std::io::{self, Write};

@@ -1,5 +1,5 @@
-//! From an experiment to jobs: every cell's scene, every estimator on it, every sampler, the streams of
-//! all.
+//! From an experiment to jobs: the scene of every cell, every estimator on it, every sampler, and the streams
+//! of all of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Names of random streams: what is hashed into their keys, and what is not.
+//! Names of random streams: which data are hashed into their keys, and which are not.
 
 use serde_json::{Value, json};
 

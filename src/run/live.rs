@@ -1,9 +1,10 @@
 //! Live view: which images are sent to a viewer while they are rendered, and when.
 //!
-//! The collector makes an image of what it has in order, from a copy: nothing here reaches a record. It
-//! does so at most twice a second, only where the one before is on its way, and for a twentieth of its
-//! time. A thread of its own sends, and one image waits at most: a viewer that is slow or hangs stalls
-//! nothing. A job's last image that finds the place taken is sent when all jobs are done.
+//! The collector makes an image of the passes that it has in order, from a copy: nothing here changes a
+//! record. It makes at most two images per second, only after the previous image was taken for sending, and
+//! spends at most a twentieth of its time on them. A separate thread sends images, and at most one image
+//! waits, so that a slow or hanging viewer delays nothing. If the last image of a job cannot be queued, it is
+//! sent when all jobs are done.
 
 use std::collections::BTreeMap;
 use std::io;

@@ -1,5 +1,5 @@
-//! What memory a run may use: the system's, or less where a container, a scheduler or the shell limits it. Door for
-//! `rustix`.
+//! The memory that a run may use: that of the system, or less where a container, a scheduler or the shell limits it.
+//! Only this module and `clock` use `rustix`.
 
 use std::fs;
 use std::path::{Path, PathBuf};

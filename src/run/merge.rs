@@ -1,4 +1,4 @@
-//! Shards into the record of the whole run.
+//! Merges shards into the record of the whole run.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

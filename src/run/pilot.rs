@@ -1,5 +1,5 @@
-//! Budgets into passes. Stopping by the clock or by the error reached would bias a mean, so a pilot on
-//! streams of its own fixes an integer number of passes before the run starts.
+//! Converts budgets into passes. Stopping by elapsed time or by the error reached would bias a mean, so a
+//! pilot run on separate streams fixes an integer number of passes before the run starts.
 
 use super::job::Passes;
 use super::keys::Stage;

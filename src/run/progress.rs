@@ -1,4 +1,4 @@
-//! Progress with an estimate of the time left, on terminals only. Door for `indicatif`.
+//! Progress with an estimate of the time left, on terminals only. The only module that uses `indicatif`.
 
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;

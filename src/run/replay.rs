@@ -1,4 +1,5 @@
-//! The first passes of every measurement once more: other blocks, other order, one thread, same bits.
+//! Runs the first passes of every measurement again, in other blocks, in another order and on one thread; the
+//! bits must be the same.
 
 use super::job::{Block, Finished, Passes};
 use crate::results::json::hash_hex;

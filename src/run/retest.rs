@@ -1,4 +1,4 @@
-//! Second looks: what failed a first test is measured again, on streams of its own and with more passes.
+//! Second looks: quantities that failed a first test are measured again, on new streams and with more passes.
 
 use super::interrupt::Interrupt;
 use super::job::Task;

@@ -1,4 +1,4 @@
-//! Shards: parts of a run that processes of their own play, on any machine, and that [`super::merge`] joins.
+//! Shards: parts of a run that separate processes run, on any machine, and that [`super::merge`] combines.
 //!
 //! ```text
 //! experiment, passes kept in state/ (the base)   the same for every shard
@@ -8,7 +8,7 @@
 //!   -> shards/i-of-n/state/*.state: states that begin at pass `from`, and shard.json once all are complete
 //! merge: base + states in the order of their passes -> Counter::append -> state/, record
 //! ```
-//! A node of the tree over passes is a function of its passes alone, so the joined moments have the bits of one run.
+//! A node of the tree over passes is a function of its passes alone, so the merged moments have the bits of one run.
 
 use std::fmt;
 use std::fs;

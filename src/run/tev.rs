@@ -1,10 +1,9 @@
-//! What tev, a viewer of images, is told over TCP: the packets as bytes, and a connection that takes
-//! them.
+//! The protocol of tev, a viewer of images, over TCP: the packets as bytes, and a connection that sends them.
 //!
-//! The form is that of tev's own source (github.com/Tom94/tev: `IpcPacket` in `include/tev/Ipc.h` at
-//! 029022e, `src/Ipc.cpp` at 61253bf, `src/main.cpp` at 009e7c1). A packet
-//! is its own length in bytes (u32, these four included), a type (i8) and that type's fields. Integers
-//! are little-endian, truth is one byte, a text ends with a zero byte, pixels are f32.
+//! The format follows the source of tev (github.com/Tom94/tev: `IpcPacket` in `include/tev/Ipc.h` at
+//! 029022e, `src/Ipc.cpp` at 61253bf, `src/main.cpp` at 009e7c1). A packet consists of its length in bytes
+//! (u32, including these four), a type (i8) and the fields of that type. Integers are little-endian, a
+//! boolean is one byte, a text ends with a zero byte, and pixels are f32.
 
 use std::fmt;
 use std::io::{self, Write};

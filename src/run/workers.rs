@@ -1,22 +1,22 @@
-//! Threads that run blocks of passes and draw from samplers, and the one place where results are put in
+//! Threads that run blocks of passes and draw from samplers, and the only place where results are put in
 //! order.
 //!
-//! Workers take the next run of passes from a shared source; the collector (the calling thread) appends
+//! Workers take the next sequence of passes from a shared source; the collector (the calling thread) appends
 //! finished blocks in the order of their passes, whatever the order in which they arrive. Blocks are
 //! sized by the time they take; the fixed tree over passes makes results independent of that size.
 //!
-//! The estimators of a cell are interleaved, so that their CPU times can be compared: one worker runs a
-//! turn of about an eighth of a second, the same part of every arm's passes in the order A B .. B A, and
-//! whatever drifts steadily (clock rate, temperature, other load) adds the same to each arm. Arms may
-//! have different numbers of passes: a turn is a part of the run, [f, f') of each. A worker's first turn
-//! in a cell warms it up, and one of which an earlier process had run a part is not in that order:
-//! neither counts as timed (`Work::settled`).
+//! The estimators of a cell are interleaved, so that their CPU times can be compared. In one turn of about an
+//! eighth of a second, a worker runs the same part of every arm's passes in the order A B .. B A, so that a
+//! steady drift (clock rate, temperature, other load) adds the same time to each arm. Arms may have different
+//! numbers of passes: a turn is a part of the run, [f, f') of each arm. A worker's first turn in a cell warms
+//! it up, and a turn that an earlier process had run in part is not in that order; neither is timed
+//! (`Work::settled`).
 //!
-//! In every eighth turn (every second where a claim rests on CPU time) the first arm's passes run twice,
-//! A C B .. B C A: C is the same work as A at another place in the order, so that the ratio of their
-//! times is 1 but for the machine. Its scores are dropped; its time is kept (`Work::twice`). The error of
-//! a ratio contains the scatter of this control: in cells of a few seconds, 1 to 3 % with every eighth
-//! turn.
+//! In every eighth turn (in every second one where a claim uses CPU time) the first arm's passes run twice,
+//! A C B .. B C A. C is the same work as A at another place in the order, so that the ratio of their times
+//! differs from 1 only by effects of the machine. The scores of C are discarded; its time is kept
+//! (`Work::twice`). The error of an efficiency ratio contains the scatter of this control: in cells of a few
+//! seconds, 1 to 3 % with every eighth turn.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -91,7 +91,7 @@ const BLOCK_SECONDS: f64 = 0.25;
 const TURN_SECONDS: f64 = 0.125;
 /// One turn in so many runs passes of the first arm twice.
 const CONTROL_EVERY: u64 = 8;
-/// The same where a claim rests on CPU time.
+/// The same where a claim uses CPU time.
 const CLAIMED_CONTROL_EVERY: u64 = 2;
 /// Time that workers have to come to an end of their passes after a signal.
 const PATIENCE: Duration = Duration::from_millis(500);
@@ -101,7 +101,7 @@ const LOOK: Duration = Duration::from_millis(50);
 const CHECKPOINT_EVERY: Duration = Duration::from_secs(5);
 
 enum Message {
-    /// A job begins: what is fixed of it, and what an earlier run had done.
+    /// A job begins: its fixed properties, and the passes that an earlier run had completed.
     Begin { job: usize, start: Start, done: Box<Block>, end: u64 },
     /// A block is done.
     Block { job: usize, block: Box<Block> },
@@ -118,7 +118,7 @@ struct Queue {
 struct Active {
     group: usize,
     lanes: Vec<Lane>,
-    /// Passes of the longest lane that turns have been given.
+    /// Passes of the longest lane that were given to turns.
     given: u64,
     /// Number of the next turn.
     turn: u64,
@@ -150,7 +150,7 @@ struct Span {
     twice: Option<Second>,
 }
 
-/// When passes run a second time for the sake of the clock.
+/// When passes run a second time as a control of CPU time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Second {
     /// Before the run that counts.
@@ -193,7 +193,7 @@ pub(crate) fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed
     let queue = Mutex::new(Queue { next_group: 0, active: None });
     let samplers = jobs.iter().filter(|job| job.draws().is_some()).count();
     let pool = Pool { jobs, groups: groups(jobs, settings.is_interleaved), samplers, settings, queue };
-    // Bounded: blocks with images wait with their workers, not in memory.
+    // Bounded: workers wait with finished blocks, so that images do not accumulate in memory.
     let (sender, receiver) = mpsc::sync_channel(settings.threads);
     std::thread::scope(|scope| {
         for number in 1..=settings.threads {
@@ -231,7 +231,7 @@ pub(super) fn groups(jobs: &[Job], is_interleaved: bool) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Whole batches of the longest lane of whose part every lane has done all.
+/// Whole batches of the longest lane for which every lane has completed its part.
 pub(super) fn done_everywhere(lanes: &[Lane]) -> u64 {
     let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
     let part =
@@ -250,7 +250,8 @@ fn last(lanes: &[Lane]) -> u64 {
 }
 
 /// The passes [from, from + length) of the longest lane and the same part of every other, in the order
-/// A B .. B A, except what is done already; and whether nothing of it was. A last pass has no way back.
+/// A B .. B A, except for passes that are done already; and whether none of them was. A single last pass is not
+/// split over both directions of the order.
 fn turn(lanes: &[Lane], from: u64, length: u64, has_control: bool) -> (Vec<Span>, bool) {
     let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
     let [middle, end] = [length.div_ceil(2), length].map(|passes| longest.min(from + passes));
@@ -316,7 +317,7 @@ impl Pool<'_> {
             if turn.is_balanced && is_warm {
                 block.settle(span.keep_level, before.or(after).as_ref());
             }
-            // Sent before the lock is asked for, which another worker's pilot may hold for long.
+            // Sent before taking the lock, which another worker's pilot may hold for a long time.
             sender.send(Message::Block { job: span.job, block: Box::new(block) }).ok()?;
         }
         let seconds = begun.elapsed().as_secs_f64() / turn.passes as f64;
@@ -446,7 +447,7 @@ impl Pool<'_> {
             _ => pilot::passes(passes, self.settings.budget?, &|| self.settings.interrupt.raised())?,
         };
         let keep_level = batch_level(count);
-        // Where a state goes too far or too coarsely, its passes run again.
+        // Where a state has too many passes, or keeps them too coarsely, its passes run again.
         let PassRange { start: from, end } = passes.part.unwrap_or(PassRange { start: 0, end: count });
         let mut done = checkpoint::load_passes(&path, identity, from, keep_level)
             .filter(|block| block.next_pass() <= end)
@@ -465,7 +466,7 @@ struct Collector<'a> {
     settings: &'a Settings<'a>,
     completed: BTreeMap<usize, Completed>,
     under_way: BTreeMap<usize, UnderWay>,
-    /// Jobs whose last image found no place on its way to the viewer.
+    /// Jobs whose last image could not be queued for the viewer.
     owed: Vec<usize>,
 }
 
@@ -551,7 +552,7 @@ impl<'a> Collector<'a> {
         self.under_way.iter().try_for_each(|(&job, running)| self.save(job, running))
     }
 
-    /// For the person who has stopped the run.
+    /// Message for the user who stopped the run.
     fn what_is_kept(&self) -> String {
         format!(
             "{} of {} measurements are complete and the passes done of the others are kept in {}; the same \

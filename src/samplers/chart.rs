@@ -1,8 +1,8 @@
-//! Charts of common domains - directions, distances along a line, points of a plane - and the sampler
-//! that such a chart makes of a technique.
+//! Charts of common domains (directions, distances along a line, points in a plane), and the sampler that
+//! combines such a chart with a technique.
 //!
-//! A technique brings its draw and its density in the domain's own measure (per solid angle, length or
-//! area); the chart brings the piece, its coordinates and its Jacobian. [`Charted`] puts both together.
+//! A technique defines its draw and its density in the measure of the domain (per solid angle, length or
+//! area); the chart defines the piece, its coordinates and its Jacobian. [`Charted`] combines both.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,15 +1,15 @@
-//! The sampler catalogue: every way of drawing a sample, beside the density that it claims.
+//! The sampler catalogue: every technique of drawing a sample, with the density that it claims.
 //!
-//! A sampler's outcomes fall apart into nothing at all (`Null`), discrete outcomes (`Delta`), and points
-//! of continuous pieces. A piece has a *chart*: one or two coordinates over a box, in which the density
-//! is smooth except at its stated kinks, graded so that a narrow lobe is as wide as the box. Densities
-//! here are per unit of the chart (the code's density times the chart's Jacobian, which is written down
-//! beside the chart and not taken from the sampler). What a sampler draws and the density that it claims
-//! come from different functions of the code under test, so that each is checked by the other.
+//! The outcome of a draw is no sample (`Null`), a discrete outcome (`Delta`), or a point of a continuous
+//! piece. A piece has a *chart*: one or two coordinates over a box, in which the density is smooth except at
+//! its stated kinks, graded so that a narrow lobe fills the box. Densities here are per unit of the chart:
+//! the density of the code times the Jacobian of the chart, which is defined with the chart and not taken
+//! from the sampler. The draws of a sampler and the density that it claims come from different functions of
+//! the code under test, so that each checks the other.
 //!
-//! Samplers of directions, of distances along a line and of points of a plane need no chart of their
-//! own: `chart` has one for each of these domains. A sampler's file also states under which name and
-//! with which options an experiment asks for it (`SamplerKind`); `KINDS` lists them all.
+//! `chart` has charts for directions, for distances along a line and for points in a plane, so that samplers
+//! of these need no chart of their own. The file of a sampler also states its name and options in
+//! experiment files (`SamplerKind`); `KINDS` lists all samplers.
 
 pub mod body;
 pub mod boundary;

@@ -1,4 +1,4 @@
-//! What every sampler of the catalogue declares: its draws, and the distribution that it claims.
+//! The trait of the samplers in the catalogue: their draws, and the distribution that they claim.
 
 use std::f64::consts::TAU;
 

@@ -1,5 +1,6 @@
-//! Thinning of a cloud of points by distance: whether each point is accepted with its probability, two
-//! neighbours independently, and so many in all as independence has it.
+//! Thinning of a cloud of points by distance: tests whether each point is accepted with its probability,
+//! whether two neighbours are accepted independently, and whether the number of accepted points has the
+//! distribution of independent acceptances.
 //!
 //! The cloud is fixed, on a sphere of diameter D. One draw is one query. Views:
 //!   distance   a point j is chosen, and the query is at distance d from it, uniform in [0, D], in a

@@ -1,4 +1,4 @@
-//! Discrete choices: one uniform number picks an index, and what is left of the number is uniform again.
+//! Discrete choices: one uniform number chooses an index, and is rescaled to a uniform number again.
 
 /// The largest number below 1.
 const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;

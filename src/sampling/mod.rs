@@ -1,5 +1,5 @@
-//! Random streams, warps with their pdf twins, distances, MIS. Sampling code takes uniform numbers,
-//! never a generator, so that it can be enumerated and integrated; only estimators hold a stream.
+//! Random streams, warps with their pdfs, distances, MIS. Sampling code takes uniform numbers, never a
+//! generator, so that tests can enumerate and integrate it; only estimators hold a stream.
 
 /// One index of many.
 pub mod discrete;

@@ -6,8 +6,8 @@
 //! at distance d under the cosine c = h / d, an area element is c / d^2 of it in solid angle, and r^2 +
 //! s^2 = h^2 / c^2 + l^2, hence
 //!   pdf = s^2 d^2 / (pi c (r^2 + s^2)^2) = s^2 h^2 c / (pi (h^2 + l^2 c^2)^2)   per solid angle.
-//! For l = 0 that is the cosine lobe. The plane is only what the lobe is made with: a direction may be
-//! used on any surface.
+//! For l = 0 that is the cosine lobe. The plane only defines the lobe; its directions may be used with any
+//! surface.
 
 use std::f64::consts::PI;
 

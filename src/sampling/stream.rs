@@ -1,4 +1,4 @@
-//! Random streams by key. Door for `rand_pcg`.
+//! Random streams by key. The only module that uses `rand_pcg`.
 //!
 //! A key states *what* is sampled, never who runs it: experiment, cell, bands, estimator and stage are
 //! hashed into 256 bits (`StreamKey::new`); pass, index (pixel or path) and purpose are mixed in on
@@ -23,7 +23,7 @@ pub enum Purpose {
     Hero = 5,
     /// Points of a surface with the light that enters there.
     Cloud = 6,
-    /// Positions on the sensor from which lights are looked for.
+    /// Positions on the sensor at which lights are scored by expectation.
     View = 7,
 }
 

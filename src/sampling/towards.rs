@@ -8,8 +8,8 @@
 //! so the direction has density (pi - theta) / (pi^3 sin theta) per solid angle, theta itself
 //! p(theta) = 2 (pi - theta) / pi^2 with the inverse theta = pi (1 - sqrt(1 - u)), and the distance is
 //! equiangular. Their product over t^2 is R / (pi^3 |x - a|^2 |x - b|^2) per volume: constant over the
-//! integrand. On a ray that ends at t_max the distance is equiangular on what is left of it, and the
-//! product keeps a factor (pi - theta) / span.
+//! integrand. On a ray that ends at t_max the distance is equiangular on the ray up to t_max, and the product
+//! keeps a factor (pi - theta) / span.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Maps from the unit square, each beside the density that it realises.
+//! Maps from the unit square, each with the density that it samples.
 
 use std::f64::consts::PI;
 

@@ -1,9 +1,9 @@
 //! Values that hold for every body, medium and phase function.
 //!
-//! A body without losses is in a sky of radiance L: the medium absorbs nothing, and what the boundary
-//! does not transmit it reflects. Radiance over squared index is then L everywhere and in all directions,
-//! which the equation of transfer and the conditions at the boundary confirm at once. (Directions that
-//! total reflection traps are filled by scattering: without any, a smooth boundary keeps them dark.) The
+//! A body without losses is lit by a sky of radiance L: the medium absorbs nothing, and the boundary reflects
+//! what it does not transmit. Radiance over squared index is then L everywhere and in all directions, which
+//! satisfies the radiative transfer equation and the conditions at the boundary. (Directions of total internal
+//! reflection receive light by scattering only: without scattering, a smooth boundary keeps them dark.) The
 //! fluence inside is 4 pi eta^2 L, so the light in the body travels
 //!   4 pi eta^2 L V
 //! per time in the volume V (power times length; a part of the body has the part's volume). The power

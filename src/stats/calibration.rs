@@ -1,6 +1,6 @@
-//! The verifier verified: every kind of test is run on null hypotheses that are true by construction,
-//! and its p-values must be uniform (or conservative, where that is all it promises). Driven by ChaCha,
-//! a generator of another family than the program's; seeds are hashes of names.
+//! Verification of the verifier: every kind of test is run on null hypotheses that are true by construction,
+//! and its p-values must be uniform (or conservative, for tests that promise only this). Random numbers come
+//! from ChaCha, a generator of another family than that of the program; seeds are hashes of names.
 //!
 //! The short versions run with every test command. The long one writes
 //! `results/published/calibration.csv` and `calibration.md`:

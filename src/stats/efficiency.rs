@@ -5,11 +5,11 @@
 //! blocks, c the cost of one pass, sum cost / sum n. At R < 0, A reaches an error at less cost: exp(-R)
 //! is its gain.
 //!
-//! *Why a jackknife.* An F interval for V_A/V_B believes in normal values and covers 25 % instead of 95
-//! % on lognormal ones; the mean of per-block log variances is biased by the concavity of the logarithm,
-//! and differently for two shapes. Leaving out one block at a time and recomputing the pooled ratio
-//! measures its spread whatever the shape, and V and c together, which are correlated: long paths cost
-//! more and vary more.
+//! *Why a jackknife.* An F interval for V_A/V_B assumes normal values and covers 25 % instead of 95 % on
+//! lognormal ones; the mean of per-block log variances is biased by the concavity of the logarithm, and
+//! differently for two shapes. Leaving out one block at a time and recomputing the pooled ratio measures its
+//! spread whatever the shape of the distribution. It also treats V and c together, which are correlated: long
+//! paths cost more and vary more.
 //!
 //! *Unequal blocks* (a partial last one). With n_k of n passes in block k and h_k = n / n_k, the
 //! pseudo-value of f is h_k f - (h_k - 1) f(without k), and
@@ -29,22 +29,21 @@
 //! (kurtosis + 1) / n, where the variance of all n values has (kurtosis - 1) / n: nothing is lost where
 //! tails are heavy, and where they are not, the pixels average it out.
 //!
-//! *What a control adds.* Let ln of the CPU time of arm X in block k be x + d_k + m_X + e_Xk: what X costs,
-//! what the machine does to all arms at that time, what it does to this arm alone for the whole run (its
-//! place in the order, the caches that its neighbour leaves), and scatter. In a ratio of interleaved
-//! arms d_k cancels, the jackknife over blocks sees e, and nobody sees m_A - m_B, of variance 2 t^2. The
-//! control is the baseline's own work at another place, C: r = ln of its time over that of A estimates
-//! m_C - m_A, with the expectation of r^2 = 2 t^2 + the control's own scatter, so that
+//! *What a control adds.* Let ln of the CPU time of arm X in block k be x + d_k + m_X + e_Xk: the cost of X, the
+//! effect of the machine on all arms at that time, its effect on this arm alone for the whole run (its place in
+//! the order, the contents of the caches), and scatter. In a ratio of interleaved arms d_k cancels, the
+//! jackknife over blocks measures e, and nothing measures m_A - m_B, of variance 2 t^2. The control C repeats
+//! the work of the baseline at another place: r = ln of its time over that of A estimates m_C - m_A, and the
+//! expectation of r^2 is 2 t^2 + the scatter of the control, so that
 //!   var(ln E) = s^2 + r^2
-//! does not fall short on average. One control may by chance show less than there is; those of the k
-//! cells of a record are controls of one machine, and r^2 is the mean of theirs, or the cell's own where
-//! that is larger. It has k degrees of freedom and s^2 those of the jackknife, nu; the sum has
-//! (s^2 + r^2)^2 / (s^4 / nu + r^4 / k) (Satterthwaite). Simulated intervals of 95 % then cover at least
-//! 94 % for any t where k >= 2. With one cell they do up to t = s / 2; beyond, where the machine decides,
-//! they may cover 88 %, and without the control 33 % (`stats::calibration`).
+//! is not too small on average. A single control may by chance be smaller than t. The k cells of a record have
+//! controls of the same machine; r^2 is their mean, or that of the cell where it is larger. r^2 has k degrees
+//! of freedom and s^2 those of the jackknife, nu; the sum has (s^2 + r^2)^2 / (s^4 / nu + r^4 / k)
+//! (Satterthwaite). Simulated 95 % intervals then have a coverage of at least 94 % for any t where k >= 2. With
+//! one cell they have it up to t = s / 2; beyond, where the machine dominates, coverage may be 88 %, and without
+//! the control 33 % (`stats::calibration`).
 //!
-//! The quoted R is the plain one, not bias-corrected: its bias is of order 1/n, its error of order
-//! 1/sqrt(n).
+//! The quoted R is not bias-corrected: its bias is of order 1/n, its error of order 1/sqrt(n).
 
 use std::fmt;
 

@@ -1,17 +1,17 @@
 //! Tests of samples against known probabilities, and the smallest defect that each would have found.
 //!
 //! K. Pearson's statistic X2 = sum (n_i - N p_i)^2 / (N p_i) over bins whose probabilities p_i come from
-//! quadrature with errors of at most d_i. Three conditions make its chi-square tail an honest one at
-//! levels down to 1e-6, and a test that does not meet them is refused, never passed:
+//! quadrature with errors of at most d_i. Three conditions make its chi-square tail valid at levels down to
+//! 1e-6, and a test that does not meet them is refused, never passed:
 //!
 //! - *The expectations are resolved.* With p_i off by d_i, X2 of a perfect sampler is a noncentral
 //!   chi-square with noncentrality lambda = N sum d_i^2 / p_i at most. That moves its mean by lambda;
 //!   one standard deviation of X2 is sqrt(2 dof). Required: lambda <= 0.02 sqrt(2 dof), a shift that
 //!   takes a level of 1e-6 to 1.1e-6 at most.
-//! - *No bin is thin*: N p_i >= 25. At 5, the usual rule, rejections at the level 1e-3 are twice too
-//!   many where one bin dominates. The likelihood-ratio statistic G would need 100.
-//! - *The bins are everything*: sum p_i = 1 within the sum of the errors. Failed samples have a bin of
-//!   their own, and so has each discrete direction.
+//! - *No bin is thin*: N p_i >= 25. At 5, the usual rule, there are twice too many rejections at the level
+//!   1e-3 where one bin dominates. The likelihood-ratio statistic G would need 100.
+//! - *The bins cover all outcomes*: sum p_i = 1 within the sum of the errors. Failed samples have a separate
+//!   bin, and so has each discrete direction.
 //!
 //! A sample in a bin of probability exactly 0 refutes the probabilities at once.
 

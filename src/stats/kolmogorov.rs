@@ -1,4 +1,4 @@
-//! The Kolmogorov-Smirnov test of uniformity, which the calibration holds p-values with.
+//! The Kolmogorov-Smirnov test of uniformity, with which the calibration tests p-values.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,5 +1,4 @@
-//! Lower confidence bounds that need no moment beyond the mean: what data support where a tail is not
-//! resolved.
+//! Lower confidence bounds that need no moment beyond the mean, for data whose tail is not resolved.
 //!
 //! Let x_1 .. x_n be independent and never negative, all with the mean m. For any r > 0 and 0 < l < 1
 //! the product of the n factors 1 + l (x_i / r - 1) is never negative, and its expectation is

@@ -1,4 +1,4 @@
-//! Moments, tests, multiplicity. Door for `statrs`, of which only survival functions are used.
+//! Moments, tests, multiplicity. The only module that uses `statrs`, and of it only survival functions.
 
 /// Two estimators at equal cost.
 pub mod efficiency;

@@ -1,4 +1,4 @@
-//! A test of sums whose terms are symmetric about 0 without an effect, and of nothing more.
+//! A test of sums that assumes only that their terms are symmetric about 0 if there is no effect.
 
 use super::hypothesis::critical_value;
 use crate::math;

@@ -1,11 +1,11 @@
 //! Survival functions, in one place, and their inverses by bisection.
 //!
-//! A probability is always computed as the tail that is asked for: 1 - cdf has no digits left where
-//! levels decide. Chi-square comes from `statrs` (relative error about 1e-15 times the degrees of
+//! A probability is always computed directly as the tail that is needed: at the levels of tests, 1 - cdf has
+//! no correct digits. Chi-square comes from `statrs` (relative error about 1e-15 times the degrees of
 //! freedom); everything else is here, because the incomplete beta function of statrs 0.19.1 loses digits
 //! for large parameters (binomial tails beyond n = 1e7, Student's t at 1e6 degrees of freedom) and its
-//! centre is wrong from 1e5 on. The table `tests/data/tails.csv` (20 digits, `scripts/tails.py`) holds
-//! each tail to 1e-8 relative.
+//! centre is wrong from 1e5 on. Tests compare each tail with the table `tests/data/tails.csv` (20 digits,
+//! `scripts/tails.py`) to a relative 1e-8.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 

@@ -1,12 +1,12 @@
 //! The fixed dyadic reduction over passes.
 //!
-//! Floating-point sums depend on their order, so the order is fixed by the passes' absolute numbers
-//! and by nothing else. A node of level l covers the passes [j 2^l, (j + 1) 2^l); its value is the
-//! merge of its two halves, left before right. A `Counter` holds the nodes of a contiguous range as
-//! a binary counter holds its digits: at most one node a level on each side of the widest one, so
-//! log2(passes) partial images suffice. Two counters of adjacent ranges join by pushing the nodes of
-//! the later one into the earlier, and since every node is a function of its passes alone, the result
-//! is the same for every cut into blocks and shards.
+//! Floating-point sums depend on their order, so the order is fixed by the absolute numbers of the passes
+//! alone. A node of level l covers the passes [j 2^l, (j + 1) 2^l); its value is the merge of its two halves,
+//! left before right. A `Counter` holds the nodes of a contiguous range like the digits of a binary counter:
+//! at most one node per level on each side of the widest one, so that log2(passes) partial images suffice.
+//! Two counters of adjacent ranges are merged by pushing the nodes of the later one into the earlier. Every
+//! node is a function of its passes alone, so the result is the same for every division into blocks and
+//! shards.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,17 +1,17 @@
 //! The table of efficiencies: every estimator of a cell against the first of the experiment file, by
 //! counters and by CPU time.
 //!
-//! Every ratio is the baseline's over the candidate's: above 1 the candidate is the better. An
-//! efficiency is quoted where the means agree, by the test that an `agree` claim would make, at a level
-//! of 1e-3 over the whole table (Bonferroni); its interval is for the reader, at 95 %. Whether it is
-//! resolved is judged as for claims (`verify::efficiency`). The metric is the sensor's first observable,
-//! by class; where it has pixels, `pixels` beside it: the variance of a pixel, averaged over the image.
+//! Every ratio is variance times cost of the baseline over that of the candidate: above 1 the candidate is
+//! better. A ratio is quoted where the means agree, by the test that an `agree` claim would make, at a level
+//! of 1e-3 over the whole table (Bonferroni); its interval, for readers, is at 95 %. Whether the ratio is
+//! resolved is decided as for claims (`verify::efficiency`). The metric is the first observable of the sensor,
+//! by class; if the sensor has pixels, also `pixels`, the variance of a pixel averaged over the image.
 //! Controls are in the table as candidates, by CPU time alone.
 //!
-//! Where there is no ratio because of the baseline's tail alone, its variance has a lower bound all the
-//! same, and so has the ratio (`stats::lower_bound`). Whether the means agree is then open: a mean with
-//! such a tail has no interval. But where scores are never negative it has a lower bound, too, and a
-//! candidate whose mean lies below that misses light: then there is no bound of the ratio.
+//! Where only the tail of the baseline prevents a ratio, its variance still has a lower bound, and so has the
+//! ratio (`stats::lower_bound`). Whether the means agree is then unknown, because a mean with such a tail has
+//! no interval. But where scores are never negative, the mean has a lower bound, too. A candidate whose mean
+//! lies below this bound misses light, and its ratio has no bound.
 
 use serde::Serialize;
 

@@ -1,18 +1,17 @@
 //! Two records of one experiment: their descriptions, and whether their means differ.
 //!
 //! A quantity that both records hold is compared in one of four ways:
-//! - `identical`: the moments of every batch are the same bits. Nothing is left to test.
+//! - `identical`: the moments of every batch are the same bits. There is nothing to test.
 //! - `paired t`: pass k of both was run on the same random numbers, so that the differences pass by pass
-//!   are what is left of a change in the program. They are independent from pass to pass, whatever a
-//!   change does to the numbers' use within one, so the t test of their batch means is valid, and
-//!   sharper the more alike the two programs are. Welch's test would take the shared noise for two
-//!   noises.
+//!   come from a change in the program. They are independent between passes, even if the change affects how
+//!   numbers are used within a pass. The t test of their batch means is therefore valid, and more sensitive
+//!   the more similar the two programs are. Welch's test would treat the shared noise as independent.
 //! - `welch t`: other seeds, names or physics, hence other random numbers: independent batches. The
 //!   fewer of both sides' degrees of freedom are used, which bounds the tails for every ratio of
 //!   variances (M. Mickey, M. Brown, "Bounds on the distribution functions of the Behrens-Fisher
 //!   statistic", 1966).
 //! - `sum of errors`: the same random numbers and another number of passes, or an experiment that pairs
-//!   cells and whose physics changed: nothing is paired, nor surely independent. |a - b| > c (e_a + e_b)
+//!   cells and whose physics changed: the means are neither paired nor independent. |a - b| > c (e_a + e_b)
 //!   needs |a - mu| > c e_a or |b - mu| > c e_b, so twice the t tail is a p-value whatever the
 //!   correlation.
 

@@ -1,4 +1,4 @@
-//! `compare` on made-up records.
+//! `compare` on artificial records.
 
 use serde_json::json;
 

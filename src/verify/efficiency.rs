@@ -1,7 +1,7 @@
 //! Claims of efficiency: `faster` and `not_slower`.
 //!
-//! With V the variance of a pass and c its cost (all bands together: what a pass costs, whatever it
-//! scores), the efficiency ratio of a candidate A against a baseline B is E = V_B c_B / (V_A c_A). Both
+//! With V the variance of a pass and c its cost (of all bands together, whatever the pass scores), the
+//! efficiency ratio of a candidate A relative to a baseline B is E = V_B c_B / (V_A c_A). Both
 //! claims state that E exceeds a bound e: `faster` e = ratio, `not_slower` e = 1 / margin, because the
 //! ratio of inverse efficiencies is 1 / E. ln E has a Student interval from a jackknife over blocks
 //! (`stats::efficiency`).
@@ -9,28 +9,28 @@
 //! Of the observable `pixels`, V is the variance of a pixel in one pass, averaged over the pixels, as
 //! the pairs of passes show it (`results::record::Image::spread`); the means that must agree are those
 //! of the sensor's first observable. Where the pixels of a pass are independent, the variance of the
-//! image's mean is V over their number, and the ratio is that of `mean`, which knows it less well: it is
-//! the variance of n numbers, not of n times the pixels. Where an estimator's pixels share paths, the
-//! two differ.
+//! mean of the image is V over their number, and the ratio is that of `mean`. The ratio of `mean` has a wider
+//! interval, because it uses the variance of n numbers instead of n times the pixels. Where pixels of an
+//! estimator share paths, the two ratios differ.
 //!
 //! Before any number is quoted
 //!   the two means agree: the test that an `agree` claim would make. An objection to it voids the claim;
 //!   E is resolved: it moved by no more than its 99.9 % interval when the passes doubled, and no pass
 //!   may hold more than 5 % of an arm's sum of squares; by CPU time, the blocks are parts of a run that
-//!   interleaved the arms of the cell, A B .. B A (`run::workers`), the interval contains what the clock's
-//!   control shows of the machine (`stats::efficiency`), and the baseline against its own control arm has
-//!   1 in the 99.9 % intervals of both E and the cost ratio, or is within 5 % of it. Parts that warmed a
-//!   worker up or were run in pieces are left out whole: which ones these are does not depend on the
+//!   interleaved the arms of the cell, A B .. B A (`run::workers`), the interval includes the effect of the
+//!   machine that the control shows (`stats::efficiency`), and for the baseline and its own control arm the
+//!   99.9 % intervals of both E and the cost ratio contain 1, or the ratios are within 5 % of it. Parts that
+//!   warmed a worker up or were run in pieces are left out whole; this selection does not depend on the
 //!   scores.
 //!
-//! By counted work E may be off by the factor f of the two kinds of estimators
-//! (`results::counted_work`), so that the claim must hold whatever the clock says within it: e f stands
-//! for e where it must be exceeded, e / f where it is rejected.
+//! By counted work E may differ from the value by CPU time by the factor f of the two kinds of estimators
+//! (`results::counted_work`), so that the claim must hold for every value within this factor: e f replaces
+//! e where it must be exceeded, and e / f where it is rejected.
 //!
 //! Then the claim
 //!   fails, where the p-value 2 min(p_mean, p_slow) is rejected in the family of all tests (Holm), with
 //!   p_mean two-sided for equal means and p_slow one-sided for E >= e (Bonferroni over the two: both are
-//!   true where the claim is). One look: streams anew would be timed under other conditions;
+//!   true where the claim is). One look, because new streams would be timed under other conditions;
 //!   passes, where it does not fail and the two-sided 99.9 % interval of E lies above e: a claim that
 //!   E > e is false and passes with probability at most 1 in 2000, claim by claim; is underpowered
 //!   otherwise. `detectable` is the smallest shortfall of E below e, relative to e, that would have

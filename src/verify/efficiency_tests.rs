@@ -1,4 +1,4 @@
-//! Every rule of claims of efficiency seen to pass, and to catch a planted defect.
+//! For every rule of claims of efficiency: a case that passes, and a planted defect that is caught.
 
 use super::super::judge::judge_alone;
 use super::super::verdict::Outcome;

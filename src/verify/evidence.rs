@@ -1,4 +1,4 @@
-//! What the numbers of one test show by themselves, before they are adjusted for those of other tests.
+//! The evidence of one test by itself, before p-values are adjusted for those of other tests.
 
 use super::levels::POWER;
 use super::verdict::{Objection, Outcome, Verdict};

@@ -1,5 +1,5 @@
 //! From comparisons to verdicts: every comparison by itself (`trial`), then all of them as one family
-//! (`family`) with at most two looks (`levels`), then what controls expect.
+//! (`family`) with at most two looks (`levels`), then the expectations of controls.
 
 use std::collections::BTreeMap;
 

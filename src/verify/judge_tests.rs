@@ -1,4 +1,4 @@
-//! Every rule seen to pass, and to catch a planted defect.
+//! For every rule: a case that passes, and a planted defect that is caught.
 
 use serde_json::json;
 

@@ -1,11 +1,11 @@
 //! The error rates of a whole verification, and how two looks share them.
 //!
 //! All tests of one verification, m of them, are one family; Holm's adjusted p-values bound the
-//! probability of any false failure under whatever dependence. A test fails
+//! probability of any false failure under any dependence. A test fails
 //!   at once, where its adjusted p-value is below `AT_ONCE`, or
-//!   at the second look: its adjusted p-value is below `FIRST_LOOK`, and the same quantity measured anew
-//!   on streams of its own with `RETEST_FACTOR` times the passes has, adjusted over all second looks,
-//!   a p-value below `SECOND_LOOK`.
+//!   at the second look: its adjusted p-value is below `FIRST_LOOK`, and the same quantity, measured again
+//!   on new streams with `RETEST_FACTOR` times the passes, has a p-value, adjusted over all second looks,
+//!   below `SECOND_LOOK`.
 //! A correct family fails at once with probability at most 5e-7. It needs any second look with
 //! probability at most 1e-3, and fails it, the streams being independent, with conditional probability
 //! at most 5e-4: together at most 5e-7 + 1e-3 * 5e-4 = 1e-6 = `FAMILY_LEVEL`.
@@ -15,9 +15,9 @@
 //! m = 300 the first look cuts at 4.65 standard errors where one look at 1e-6 would cut at 5.91: 6.98
 //! against 8.24 standard errors to be found, 1.4 times fewer passes.
 //!
-//! The second look is independent of the first only as far as its errors are its own. A published value
-//! brings the same stated error to both; where that is more than `SHARED_ERROR` of the sampling error,
-//! or where a test sums over many measurements, there is one look, at `AT_ONCE`.
+//! The second look is independent of the first only as far as the two share no errors. A published value
+//! has the same stated error in both. Where this error is more than `SHARED_ERROR` of the sampling error, or
+//! where a test sums over many measurements, there is one look, at `AT_ONCE`.
 
 /// The probability of any false failure in one whole verification is at most this.
 pub(crate) const FAMILY_LEVEL: f64 = 1e-6;

@@ -1,5 +1,5 @@
-//! Claims and records in, verdicts out, and a list of the cases that need a second look. Pure: a verdict
-//! is a function of records and levels.
+//! Turns claims and records into verdicts and a list of the cases that need a second look. A verdict is a
+//! pure function of records and levels.
 
 /// Two records of one experiment: what changed.
 pub(crate) mod difference;

@@ -1,6 +1,6 @@
 //! Evidence that adds up over nights of fresh streams.
 //!
-//! A defect too small for one night's tests is there every night. For a valid p-value, P(p <= x) <= x
+//! A defect that is too small for the tests of one night recurs every night. For a valid p-value, P(p <= x) <= x
 //! under the hypothesis, e = 1 / (2 sqrt(p)) is a valid e-value: its expectation is at most
 //! integral of dp / (2 sqrt(p)) over (0, 1) = 1 (V. Vovk, R. Wang, "E-values: Calibration, combination,
 //! and applications", Annals of Statistics 49(3), 2021, the calibrator kappa = 1/2). Nights are

@@ -1,6 +1,6 @@
 //! Efficiencies by CPU time in two records: whether the second's ratios are those of the first.
 //!
-//! Times are never the same twice, their ratios should be: the log ratios of one pair of estimators in
+//! Times are never the same twice, but their ratios should be: the log ratios of one pair of estimators in
 //! both records differ by chance within sqrt(s_a^2 + s_b^2), s the half width of the 95 % interval over
 //! 1.96. Where both records hold the same numbers the variances in the two ratios are the same as well,
 //! and only the costs differ by chance: the test is then wider than it need be. Another machine may

@@ -1,4 +1,4 @@
-//! What a walk with connections does at its vertices and exits; its densities are those at the head of `vertex`.
+//! The actions of a walk with connections at its vertices and exits; the head of `vertex` states the densities.
 
 use super::facet::SolverWork;
 use super::method::ConnectionMethod;

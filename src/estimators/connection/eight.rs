@@ -1,5 +1,5 @@
-//! [`Bounds`] of eight parts, tested all at once: the compiler makes vectors of the loop, of whatever width the caller's target
-//! features allow.
+//! [`Bounds`] of eight parts, tested all at once: the compiler vectorises the loop to the width that the target features of the
+//! caller allow.
 
 use super::bounds::{Bounds, PreparedQuery};
 

@@ -14,9 +14,9 @@
 //!   k |N| = s |eta ct - cl|,   s = |P| / eta,   |eta ct - cl| = |eta^2 - 1| / (eta ct + cl),
 //! and the last falls as cl grows. On that interval the roots are isolated in Bernstein form
 //! (`polynomial`), so none is lost, and intervals whose u, v, 1 - u - v cannot all be positive are
-//! dropped at once. A Newton step on the triangle removes what rounding the polynomial has left.
+//! dropped at once. A Newton step on the triangle removes the rounding error of the polynomial.
 //!
-//! With one normal for the whole facet the root is closed: cl is known, hence ct, w and p.
+//! With one normal for the whole facet the root has a closed form: cl is known, hence ct, w and p.
 
 use super::bounds::Bounds;
 use super::patch::{Facet, SurfacePatch};

@@ -1,17 +1,15 @@
 //! Walks on the boundary towards a root, from a starting point: manifold next-event estimation, and
 //! specular manifold sampling.
 //!
-//! A walk takes Newton steps in the tangent plane and comes back to the boundary by a ray from x, so
-//! that what it finds is visible from x (Hanika, Droske & Fascione 2015, "Manifold next event
-//! estimation"). A step that makes the residual grow is halved, else the next one is doubled, to 1 at
-//! most.
+//! A walk takes Newton steps in the tangent plane and returns to the boundary by a ray from x, so that its
+//! roots are visible from x (Hanika, Droske & Fascione 2015, "Manifold next event estimation"). A step that
+//! makes the residual grow is halved; otherwise the next one is doubled, up to 1.
 //!
-//! From one start, where the straight ray to the light leaves the body, a walk finds one root or none:
-//! MNEE. All others are lost. From random starts it finds each visible root k with a probability p_k > 0
-//! that nobody knows; the number of further trials until the same root is found again has the mean 1 /
-//! p_k, which weights it without bias (Zeltner, Georgiev & Jakob 2020, "Specular manifold sampling for
-//! rendering high-frequency caustics and glints"). No trial is cut off: the mean number of trials is one
-//! for each root that is there.
+//! MNEE starts where the straight ray to the light leaves the body. It finds one root or none, and loses all
+//! others. From random starts a walk finds each visible root k with an unknown probability p_k > 0. The number
+//! of further trials until the same root is found again has the mean 1 / p_k and weights the root without
+//! bias (Zeltner, Georgiev & Jakob 2020, "Specular manifold sampling for rendering high-frequency caustics and
+//! glints"). Trials are never cut off: their mean number is one for each root that exists.
 //!
 //! Starts are uniform in the cone about w_L of half angle acos(min(eta, 1 / eta)), seen from x, beyond
 //! which no refraction turns light.

@@ -1,4 +1,4 @@
-//! What walks find, against all roots.
+//! The roots that manifold walks find, compared with all roots.
 
 use super::super::conic::Conic;
 use super::super::testing::{direction, meshes, point_inside, stream};

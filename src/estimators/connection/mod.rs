@@ -1,29 +1,28 @@
 //! Connections through the boundary: at every medium vertex x of a camera walk, the boundary points
 //! p at which light from a chosen light is refracted to x.
 //!
-//! A root p obeys Snell's law for w = unit(p - x) and the direction w_L to the light; what it
-//! contributes is in `throughput`, its weight against the walk's own sampling in `vertex`. A root counts
-//! where p is the first boundary point that x sees along w, and nothing is between p and the light.
-//! Methods differ in which roots they find:
+//! A root p satisfies Snell's law for w = unit(p - x) and the direction w_L to the light. `throughput`
+//! computes its contribution, and `vertex` its MIS weight against unidirectional sampling by the walk. A root
+//! counts if p is the first boundary point on the ray from x along w, and nothing lies between p and the
+//! light. Methods differ in which roots they find:
 //!
 //! | method | roots | parallel light | disc of directions |
 //! |---|---|---|---|
 //! | `conic` | all | unbiased | unbiased, MIS with the walk |
-//! | `newton` | one a triangle at most | biased on interpolated normals | unbiased, MIS with the walk |
-//! | `mnee` | one at most | biased: light is missing | unbiased, MIS with the walk |
+//! | `newton` | at most one per triangle | biased on interpolated normals | unbiased, MIS with the walk |
+//! | `mnee` | at most one | biased: light is missing | unbiased, MIS with the walk |
 //! | `sms` | one, weighted | unbiased | unbiased, alone |
-//! | `segments` | all | unbiased | unbiased, MIS with the walk but for single scattering |
-//! | `straight_line` | one that is none | biased | biased, alone |
+//! | `segments` | all | unbiased | unbiased, MIS with the walk except for single scattering |
+//! | `straight_line` | the unrefracted point, which is no root | biased | biased, alone |
 //!
 //! Lights that are not concentrated (environments) are left to the walk.
 //!
-//! At a rough boundary a facet is drawn, too, which refracts in the place of the surface (`newton`, `mnee`,
-//! `sms`); there the walk finds all that a method loses, parallel light included, so that none is biased. `sms`
-//! has its lights alone.
+//! At a rough boundary `newton`, `mnee` and `sms` also draw a facet, which refracts in place of the surface.
+//! There the walk finds every path that a method loses, also under parallel light, so that no method is
+//! biased; `sms` replaces the walk for its lights.
 //!
-//! What the connection finds are paths whose light is refracted once, at the last boundary point before
-//! it meets the last medium vertex: whatever the camera's part of the path does. In the record's
-//! classes:
+//! Connections find the paths whose light is refracted once, at the last boundary point before the last
+//! medium vertex, whatever the camera's part of the path does. By transport class of the record:
 //!
 //! | light reaches the last medium vertex | class by the camera's part | found |
 //! |---|---|---|
@@ -32,10 +31,10 @@
 //! | by a refraction and internal reflections | `single_internal`, `multiple_internal` | from a disc, by the walk; parallel light: no |
 //! | through another part of a body that is not convex | any of the four | from a disc, by the walk; parallel light: no |
 //!
-//! So under parallel light `single` and `multiple` are complete on convex bodies. `single_internal` and
-//! `multiple_internal` lack what is reflected inside on the light's side; a record does not tell it from
-//! what is reflected on the camera's side, so there `light_trace` has more. On the path to the sensor
-//! a body is entered and left any number of times.
+//! Under parallel light `single` and `multiple` are therefore complete on convex bodies. `single_internal` and
+//! `multiple_internal` lack light that is reflected inside on the light's side. The classes do not
+//! distinguish it from light that is reflected on the camera's side, so that `light_trace` has larger means
+//! there. The part of the path towards the sensor may enter and leave the body any number of times.
 
 mod bounds;
 mod cones;
@@ -88,7 +87,7 @@ pub struct ConnectionOptions {
     /// How a vertex is connected to a light through the boundary.
     #[serde(default = "complete")]
     pub method: ConnectionMethod,
-    /// When a path is ended by chance; both ways are unbiased.
+    /// Russian roulette; all choices are unbiased.
     #[serde(default)]
     pub roulette: Roulette,
 }
@@ -101,13 +100,13 @@ fn complete() -> ConnectionMethod {
 /// 0.4 pi sr.
 const LEAST_CONCENTRATION: f64 = 10.0;
 
-/// What connections share.
+/// Data that all connections share.
 #[derive(Debug)]
 struct ConnectionSetup {
     solver: Solver,
     /// Per band: probability of choosing each light; 0 for those that are left to the walk.
     shares: Vec<Vec<f64>>,
-    /// Whether the method knows the density of what it finds.
+    /// Whether the density of the method's roots is known.
     is_density_known: bool,
 }
 
@@ -225,7 +224,7 @@ impl Estimator for SpecularConnection {
     }
 }
 
-/// What no connection through one boundary point finds of parallel light.
+/// Note on parallel light that no connection through one boundary point finds.
 pub(super) fn missing_notes(scene: &Scene) -> Vec<String> {
     let is_smooth = scene.boundary.iter().any(Boundary::is_delta);
     let lights = scene.lights.iter().filter(|light| is_smooth && light.is_directional());

@@ -1,9 +1,9 @@
 //! One Newton iteration on every triangle that the hierarchy leaves (Walter, Zhao, Holzschuch & Bala
 //! 2009, "Single scattering in refractive media with triangle mesh boundaries").
 //!
-//! The iteration starts at the triangle's middle; a step that makes the residual grow is halved. Where a
-//! triangle has two roots, or where the iteration goes astray, roots are lost: on flat facets and
-//! analytic shapes, where one start is enough or the roots are closed, it is complete, with interpolated
+//! The iteration starts at the middle of the triangle; a step that makes the residual grow is halved. Where a
+//! triangle has two roots, or where the iteration does not converge, roots are lost. The method is complete
+//! on flat facets and analytic shapes, where one start suffices or roots have closed forms; with interpolated
 //! normals it is not. On a sphere with a rough boundary it is one walk from the straight line.
 
 use super::conic::Conic;

@@ -1,4 +1,4 @@
-//! The boundary about one of its points: normals, and how the shading normal turns along it.
+//! The boundary about one of its points: normals, and the derivative of the shading normal.
 
 use crate::geometry::{FaceId, Mesh, Shape};
 use crate::math::DVec3;

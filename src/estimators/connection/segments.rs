@@ -1,22 +1,23 @@
-//! Single scattering by segments of the camera ray: every triangle is asked on its own part of the ray.
+//! Single scattering by segments of the camera ray: each triangle is tested on its own part of the ray.
 //!
 //! Along a flight x(t) = o + t d inside, before the first medium vertex, the light of direction w_L that a
-//! triangle refracts onto the ray comes in on parts of it only (Holzschuch 2015, "Accurate computation of
-//! single scattering in participating media with refractive boundaries"). There the ends of a part are
-//! found by Newton's method on the triangle's edges and its middle stands for all of it, which loses parts
-//! and is biased. Here the hierarchy of `cones` cuts the ray, conservatively, into parts (triangle, [t_0,
-//! t_1]) that hold every root, each is sampled at one point of density e^(-sigma_t t), truncated,
+//! triangle refracts onto the ray arrives on parts of it only (Holzschuch 2015, "Accurate computation of
+//! single scattering in participating media with refractive boundaries"). In that paper the ends of a part are
+//! found by Newton's method on the triangle's edges and the middle represents the whole part, which loses parts
+//! and is biased. Here the hierarchy of `cones` divides the ray, conservatively, into parts (triangle, [t_0,
+//! t_1]) that contain every root. Each part is sampled at one point of density e^(-sigma_t t), truncated,
 //!   p(t) = sigma_t e^(-sigma_t (t - t_0)) / (1 - e^(-sigma_t (t_1 - t_0))),
-//! where all roots of the triangle are solved for. So nothing is lost, and it is unbiased however wide
+//! where all roots of the triangle are solved for. No root is lost, and the method is unbiased however wide
 //! the parts are. All other shapes are one part.
 //!
-//! Far parts are searched by roulette: up to the horizon h with P(h > t) = e^(-sigma_t t / 2), by which what is
-//! found is divided. A sample then scores with
+//! Far parts are searched by roulette, up to a random horizon h with P(h > t) = e^(-sigma_t t / 2); scores are
+//! divided by this probability. A sample then scores with
 //!   sigma_t e^(-sigma_t t) / (p(t) P(h > t)) = e^(sigma_t (t / 2 - t_0)) (1 - e^(-sigma_t (t_1 - t_0)))
-//! in the place of the walk's own draw of t.
+//! instead of the distance t that the walk draws.
 //!
-//! Later vertices are connected by the complete solver. What a segment finds has no known density: lights
-//! that are connected to are left to it alone for paths of one medium vertex.
+//! Later vertices are connected by the complete solver. The density of a root of a segment is not known, so
+//! that MIS is not possible: for paths of one medium vertex, only segments sample the lights that are connected
+//! to.
 
 use super::facet::{self, SolverWork};
 use super::method::WeightedRoot;

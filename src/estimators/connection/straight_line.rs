@@ -1,8 +1,8 @@
-//! The straight line: light that reaches a point as if the boundary did not bend it.
+//! The straight line: light that reaches a point as if the boundary did not refract it.
 //!
 //! p is where the ray from x towards the light leaves the body; Fresnel's factor and the attenuation are
-//! those of p, the focusing is 1. Wrong in place, number and strength wherever eta is not 1 (Walter et
-//! al. 2009 compare it), and light where the truth is dark.
+//! those of p, the focusing is 1. Wherever eta is not 1, boundary points are wrong in place, number and strength
+//! (Walter et al. 2009 compare this method), and points are lit that are dark in truth.
 
 use super::facet::SolverWork;
 use super::patch::SurfacePatch;

@@ -1,5 +1,5 @@
-//! Common to the tests of connections: bodies, points inside them, light followed from its source, and a
-//! search for roots that shares nothing with the solvers but the constraint.
+//! Shared by the tests of connections: bodies, points inside them, light traced from its source, and a
+//! search for roots that shares nothing with the solvers except the constraint.
 
 use super::facet::TOLERANCE;
 use super::patch::Facet;

@@ -1,4 +1,4 @@
-//! What a walk does at its medium vertices, and the density of a path's end under the connection.
+//! The actions of a walk at its medium vertices, and the density of the end of a path under the connection.
 //!
 //! x is a medium vertex of the walk, p the boundary point after it, w the direction from x to p, w_L
 //! that from p to a light. The walk draws w with the density U = phase(w) e^(-sigma_t d) per solid angle
@@ -7,8 +7,8 @@
 //! angle of w it has P p_L J, J = |d w_L / d w|. Relative to U, as walks have it, that is P p_L J /
 //! (phase e^(-sigma_t d)), and both techniques score
 //!   throughput * T eta^2 L / (T + P p_L J / (phase e^(-sigma_t d))),
-//! the walk only where it can: not parallel light. A method that does not know whether it finds a root
-//! (`Solver::finds`) has its lights to itself: the walk's hits score 0 there.
+//! the walk only where it can, which excludes parallel light. A method whose probability of finding a root is
+//! not known (`Solver::finds`) replaces the walk for its lights: hits of the walk on these lights score 0.
 //!
 //! At a rough boundary the connection also draws the slopes of the facet that refracts, from the distribution
 //! of facets, with the density D(m) m_z^4 of slopes, and finds the w at which it does; J becomes the area of

@@ -1,4 +1,4 @@
-//! What a connection costs and finds, method by method.
+//! Cost and roots of a connection, method by method.
 
 use super::facet::SolverWork;
 use super::method::{ConnectionMethod, Solver};

@@ -1,15 +1,15 @@
-//! Where light leaves the body near a point.
+//! Escapes near the boundary.
 //!
-//! Diffusion knows the boundary by its mean: phi there is what a photon finds that may leave, be reflected, or scatter
-//! again. One that meets the boundary inside the cone that refraction lets out finds s, the light itself, which is more;
-//! one outside of the cone is reflected and finds less. For a walk this is the difference between an end and a detour, and most
-//! of the variance that a guide leaves. So near the boundary some guided steps are escapes ([`Escape`]). With
+//! Diffusion describes the boundary only on average: phi there is the light that a photon finds that may leave, be reflected,
+//! or scatter again. A photon that meets the boundary inside the escape cone of refraction finds s, the light itself, which is
+//! more; one outside the cone is reflected and finds less. For a walk this difference decides between an end and a detour, and
+//! causes most of the variance that remains with a guide. So near the boundary some guided steps are escapes ([`Escape`]). With
 //!   x = s / phi - 1   at the boundary,   P = (1 - cos_c) / 2   (the cone's share of all directions),
-//! an escape is worth P x e^{-tau / mu} more, tau being the depth in mean free paths, mu near 0.85, than what phi has of it; it
-//! takes half of that as its share y / (1 + y), y = P x / 2, since the guide takes the cone as well. Under forward
-//! scattering, where most of them turn too far, y has the factor 1 - g. The half is measured; weights know the chance,
-//! whatever it is, and larger ones make them grow from step to step.
-//! e^{-tau / mu} is written as the square of a square, which ends.
+//! the importance of an escape exceeds the part of it that phi contains by P x e^{-tau / mu}, where tau is the depth in mean
+//! free paths and mu is near 0.85. Half of this gives the share y / (1 + y) of escapes, y = P x / 2, since the guide also
+//! samples directions in the cone. Under forward scattering, where most escapes turn too far, y has the factor 1 - g. The half
+//! is an empirical choice: results are unbiased for any probability of escapes, and with larger ones weights grow from step to
+//! step. e^{-tau / mu} is approximated by the square of a square, which has a finite range.
 
 use crate::math::{DVec3, Vec3, renormalized};
 use crate::optics::boundary::Boundary;

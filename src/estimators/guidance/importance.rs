@@ -1,18 +1,18 @@
-//! Importance inside a body: how much light a photon that scatters at x will find, up to a factor.
+//! Importance inside a body: the amount of light that a photon that scatters at x will find, up to a factor.
 //!
 //! In the diffusion approximation, with the exact asymptotic growth kappa of transport in its place:
 //!   lap(phi) = kappa^2 phi   inside,      phi + 2 A D dphi/dn = s(y)   on the boundary,
-//! s(y) what is let in at y (`incidence`), A the mismatch of internal reflection, D = 1 / (3 sigma_t'). A half-space and a
-//! slab have it in closed form. Elsewhere it is solved by finite volumes on cubic cells whose centres lie in the body. A face
-//! between two of them carries (phi' - phi) h; one that the boundary cuts, in the direction e, carries
+//! where s(y) is the light that enters at y (`incidence`), A the mismatch of internal reflection, and D = 1 / (3 sigma_t'). A
+//! half-space and a slab have closed forms. Elsewhere phi is solved by finite volumes on cubic cells whose centres lie in the
+//! body. A face between two cells carries (phi' - phi) h; one that the boundary cuts, in the direction e, carries
 //!   w h^2 (s - phi) / (2 A D + d),   w = |n.e|,   d = w t,
 //! t being the distance from the centre to the boundary along e, n the normal there: of a plane the faces of the
 //! staircase, weighted by w, have the area of the plane. h^2 kappa^2 is written 2 (cosh(kappa h) - 1), with which a plane
 //! wave along an axis grows by e^{kappa h} from node to node, however coarse the grid is.
 //!
-//! Walks ask for the gradient of ln phi over sigma_t in the cell where they are; cells outside next to the body have the
-//! mean of their neighbours. Where there is no cell (in parts thinner than one) or phi has underflowed, there is none, and
-//! the walk is plain. Nothing of this needs to be exact: it guides.
+//! Walks use the gradient of ln phi over sigma_t in their present cell; cells just outside the body have the mean of their
+//! neighbours. Where there is no cell (in parts thinner than one) or phi has underflowed, there is no gradient, and the walk is
+//! plain. The solution need not be exact, because it only guides.
 
 use super::exit::{ExitPlane, ExitRule, REACH, unit};
 use super::incidence::{LetIn, TransmittedLight};

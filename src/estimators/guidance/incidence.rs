@@ -1,4 +1,4 @@
-//! Light that the boundary lets in: what a walk finds that leaves the body there.
+//! Light that enters through the boundary, which is the light that a walk finds that leaves the body there.
 
 use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, GOLDEN};

@@ -1,6 +1,6 @@
-//! Growth of importance that walks have learned, per cell of the body: path guiding with a lobe a cell, multiplied by the phase
-//! function, and with guided distances (as Herholz et al. 2019, "Volume path guiding based on zero-variance random walk theory",
-//! have both), the rival of what diffusion says.
+//! Growth of importance that is learned from walks, per cell of the body: path guiding with one lobe per cell, multiplied by the
+//! phase function, and with guided distances (both as in Herholz et al. 2019, "Volume path guiding based on zero-variance random
+//! walk theory"), for comparison with the diffusion solution.
 //!
 //! A turn that scores points, on average over the walks that come by, along the gradient of importance. Let m be its mean
 //! cosine. In the diffusion limit importance is 1 + s / (1 - a g) w.n in angle, whose mean cosine is s / (3 (1 - a g)); for

@@ -1,11 +1,11 @@
-//! Walks that know where the light is.
+//! Guided walks.
 //!
-//! At every medium vertex a walk turns and flies either as the medium does, or drawn towards where importance grows
-//! ([`crate::optics::guided`]): the second with the share q, and both weighted by the balance heuristic over direction and
-//! distance together, so that no event has a weight above albedo / (1 - q). Importance comes from a diffusion solution in
-//! the body ([`importance`]), or grows along the normal where the walk came in (Dwivedi's sampling as production has it:
-//! Krivanek & d'Eon 2014), or is what earlier walks have found ([`learned`]). Whatever it is, results are unbiased; only their
-//! variance changes.
+//! At every medium vertex, direction and distance are drawn either from phase function and transmittance or, with
+//! probability q, towards growing importance ([`crate::optics::guided`]). Both are weighted by the balance heuristic over
+//! direction and distance together, so that no event has a weight above albedo / (1 - q). Importance comes from a diffusion
+//! solution in the body ([`importance`]), or grows along the normal at which the walk entered (Dwivedi sampling as in
+//! production renderers: Krivanek & d'Eon 2014), or is learned from earlier walks ([`learned`]). Results are unbiased
+//! whatever the importance; only their variance changes.
 //!
 //! ```text
 //! lights, boundary, medium, body -> Importance -> Guidance (one per band) -> GuidedBand (state of a walk)
@@ -34,21 +34,21 @@ pub(super) use learned::{FoundLight, LearnedPulls, LearningCells, Lessons};
 pub use slice::GuideSlice;
 pub(super) use steered::GuidedBand;
 
-/// How a walk is drawn inside the body; all ways are unbiased.
+/// How walks are sampled inside the body; all choices are unbiased.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum WalkDraw {
-    /// As the medium scatters.
+    /// Directions by the phase function, distances by the transmittance.
     Plain {},
-    /// Towards the boundary point where the walk last came in, along its normal (Dwivedi's sampling as production renderers
-    /// have it; Krivanek & d'Eon 2014).
+    /// Guided along the normal of the boundary point at which the walk last entered (Dwivedi sampling as in production
+    /// renderers; Krivanek & d'Eon 2014).
     Dwivedi {
         /// Share of turns and flights that are guided.
         #[serde(default = "half")]
         #[schemars(range(min = 0.0, max = 0.99))]
         share: f64,
     },
-    /// Towards where importance grows, by a diffusion solution in the body with what the lights let in as its source.
+    /// Guided by importance: a diffusion solution in the body, whose source is the light that enters it.
     Guided {
         /// Share of turns and flights that are guided.
         #[serde(default = "most")]
@@ -59,17 +59,17 @@ pub enum WalkDraw {
         #[schemars(range(min = 4, max = 256))]
         nodes: u32,
         /// Walks stay plain in a finite body that is nowhere as deep as this many mean free paths after similarity,
-        /// 1 / (sigma_t (1 - albedo g)): light leaves it before a guide pays.
+        /// 1 / (sigma_t (1 - albedo g)): light leaves such a body too soon for a guide to pay.
         #[serde(default = "least_depth")]
         #[schemars(range(min = 0.0))]
         least_depth: f64,
-        /// Whether walks are guided even where subdivision connects to every light and these shine where walks come in:
-        /// there the connections find the light, and a plain step costs less.
+        /// Whether walks are guided even where subdivision connects to every light and the lights illuminate the points at
+        /// which walks enter: there connections find the light, and a plain step costs less.
         #[serde(default)]
         near_lights: bool,
     },
-    /// Towards where earlier walks have found light, per cell of the body (path guiding; with products and distances, as Herholz
-    /// et al. 2019). Learned before the first pass, and timed with the passes.
+    /// Guided to where earlier walks found light, per cell of the body (path guiding, with products and distances as in Herholz
+    /// et al. 2019). The guide is learned before the first pass, and timed with the passes.
     Learned {
         /// Share of turns and flights that are guided.
         #[serde(default = "half")]
@@ -79,7 +79,7 @@ pub enum WalkDraw {
         #[serde(default = "cells")]
         #[schemars(range(min = 1, max = 64))]
         cells: u32,
-        /// Paths to learn from, per band.
+        /// Number of training paths per band.
         #[serde(default = "paths")]
         #[schemars(range(min = 16, max = 16777216))]
         paths: u64,
@@ -98,7 +98,7 @@ impl WalkDraw {
         matches!(self, WalkDraw::Guided { .. })
     }
 
-    /// Whether walks are guided even where connections find all light near where walks come in.
+    /// Whether walks are guided even where connections find all light near the points at which walks enter.
     pub(super) fn is_near_lights(&self) -> bool {
         matches!(self, WalkDraw::Guided { near_lights: true, .. })
     }
@@ -128,10 +128,10 @@ fn paths() -> u64 {
     32768
 }
 
-/// Rays of the sensor that tell where walks come in.
+/// Number of sensor rays that sample the points at which walks enter.
 const RAYS: usize = 64;
 
-/// Where importance grows.
+/// How the growth of importance is determined.
 #[derive(Clone, Debug)]
 enum Aim {
     /// Along the normal at the last boundary point, by so much per mean free path.
@@ -152,7 +152,7 @@ pub(super) struct Guidance {
 }
 
 impl Guidance {
-    /// Per band; `None` where walks are plain: nothing scatters, no light comes in, or nothing has been learned yet.
+    /// Per band; `None` where walks are plain: nothing scatters, no light enters, or nothing has been learned yet.
     pub(super) fn of_bands(scene: &Scene, draw: WalkDraw) -> Vec<Option<Guidance>> {
         let (share, aims) = match draw {
             WalkDraw::Plain {} | WalkDraw::Learned { .. } => return vec![None; scene.bands()],
@@ -180,8 +180,8 @@ impl Guidance {
         Guidance { share, turns, aim: Aim::Learned(learned) }
     }
 
-    /// What guides a step from a point, and phi (0 where nothing is known), of a walk that last came in at a boundary point with
-    /// this normal. In place, since a walk asks at every step.
+    /// The guide of a step from a point, and phi (0 where it is unknown), for a walk that last entered at a boundary point with
+    /// this normal. Written in place, since a walk calls this at every step.
     #[inline]
     pub(super) fn at(&self, x: DVec3, normal: DVec3, guide: &mut StepGuide) -> f64 {
         match &self.aim {
@@ -197,7 +197,7 @@ impl Guidance {
         }
     }
 
-    /// Importance where rays of the sensor first meet the body, over its largest in the body; 1 where none is known.
+    /// Importance at the first hits of sensor rays, over its largest value in the body; 1 where it is unknown.
     pub(super) fn at_first_hits(&self, scene: &Scene) -> f64 {
         let Aim::Solution(importance) = &self.aim else { return 1.0 };
         let rays = scene.sensor.rays_per_pass();

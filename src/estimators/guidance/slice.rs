@@ -1,4 +1,4 @@
-//! What guides walks, in a plane through the body: for pictures.
+//! The guide of walks in a plane through the body, for pictures.
 
 use super::{Aim, Guidance};
 use crate::estimators::guidance::importance::extent;

@@ -6,10 +6,10 @@
 //! [`WalkBands::density`] says of walks that bands share, too.
 //!
 //! Turn and flight multiply it together ([`crate::optics::guided`]). After a boundary the direction is given, and the
-//! flight is guided with the share of the whole.
+//! flight alone is guided, with the same share.
 //!
-//! Roulette looks at weight times importance over what it was where the walk came in: of a walk of zero variance it is 1
-//! all the way.
+//! Roulette compares weight times importance with its value where the walk entered; along a walk of zero variance this
+//! ratio is always 1.
 
 use super::Guidance;
 use crate::estimators::bands::WalkBands;

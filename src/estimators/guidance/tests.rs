@@ -1,4 +1,4 @@
-//! The field, and walks that it guides well or badly.
+//! Tests of the importance field, and of walks with good and bad guides.
 
 use std::sync::Arc;
 

@@ -1,21 +1,20 @@
 //! The point-cloud method for BSSRDFs (Dal Corso & Frisvad 2018: direct Monte Carlo integration, two
 //! phases).
 //!
-//! Phase one, once a pass: M points of the surface with density f per area, at each one direction to a
-//! light, and the flux Phi = E / f that enters there. Phase two, for each camera path that is refracted
-//! into the body at x_o:
+//! Phase one runs once per pass. It draws M points of the surface with density f per area and at each point
+//! one direction to a light, and stores the flux Phi = E / f that enters there. Phase two, for each camera
+//! path that is refracted into the body at x_o, computes
 //!   L_r = 1/M sum_p S(x_p, x_o) Phi_p B_p / p(d_p),
 //!   B_p = 1 with probability p(d_p), d_p = |x_o - x_p|,
-//! the source's V(xi, e^(-sigma_tr d)) e^(+sigma_tr d) with p(d) = e^(-sigma_tr d). Given the points
-//! E[B_p / p] = 1, and over the points each term has mean int S E dA, whatever p > 0 is: unbiased with
-//! respect to the model, which knows no visibility inside the body. What p decides is variance: the
-//! second moment of a term is E[(S Phi)^2 / p], and where p falls faster than S^2 does, it grows with
-//! the size of the body ([`AcceptanceRule`]).
+//! which is the paper's V(xi, e^(-sigma_tr d)) e^(+sigma_tr d) for p(d) = e^(-sigma_tr d). Given the points
+//! E[B_p / p] = 1, and over the points each term has mean int S E dA for every p > 0. The estimator is thus
+//! unbiased with respect to the model, which does not include visibility inside the body. p determines the
+//! variance: the second moment of a term is E[(S Phi)^2 / p], and where p falls faster than S^2, it grows
+//! with the size of the body ([`AcceptanceRule`]).
 //!
-//! The camera path's branch of refraction has probability T21, so the kernel leaves T21 out
-//! (`emergence.rs`). Light is sampled by strength with a shadow ray. Pixels of a pass share the points:
-//! their errors are correlated within a pass, and independent between passes, each of which has points
-//! of its own.
+//! The camera path is refracted with probability T21, so the kernel leaves T21 out (`emergence.rs`). A light
+//! is chosen by strength, and a shadow ray is traced. Pixels of a pass share the points: their errors are
+//! correlated within a pass, and independent between passes, because each pass has its own points.
 
 mod cloud;
 
@@ -59,10 +58,10 @@ pub enum AcceptanceRule {
     MeanOfExponentials {},
     /// max(e^(-m d), this), m the mean of sigma_tr.
     Floor(#[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))] f64),
-    /// In proportion to the kernel.
+    /// Proportional to the kernel.
     ///
-    /// That is to the mean over the bands of the kernel over its integral; as many as the mean of
-    /// exponentials accepts over a disc as wide as the body.
+    /// More precisely, to the mean over the bands of kernel over integral, scaled to accept as many points as
+    /// the mean of exponentials on a disc as wide as the body.
     Kernel {},
 }
 
@@ -91,7 +90,7 @@ pub struct PointCloudOptions {
     /// The probability p(d) with which a point at distance d is evaluated; its weight is 1/p.
     #[serde(default)]
     pub acceptance: AcceptanceRule,
-    /// How accepted points are found; both have the same law.
+    /// How accepted points are found; both choices have the same distribution.
     #[serde(default)]
     pub search: Search,
     /// Whether single scattering is added by sampling; by default where the model leaves it out.

@@ -1,5 +1,5 @@
 //! Bidirectional path tracing with one light vertex inside the medium (Lafortune & Willems 1993; Veach &
-//! Guibas 1994): what subdivision is a local form of.
+//! Guibas 1994). Subdivision is a local form of it.
 //!
 //! Every walk gets one light path: a direction from a light, a point of the disc across it that covers
 //! the body, the first boundary point x_k met, refraction there, a flight to x_j. Every medium vertex
@@ -8,7 +8,7 @@
 //!   p_G(w_L) (n.w_L) / (pi R^2) p(w_kj | w_L) sigma_t T(d_jk) / d_jk^2,
 //! over U of [`super::connections`]:
 //!   p_G (n.w_L) / (pi R^2) p_rev d_ij^2 / (phase_i T_ij phase_j cos_k).
-//! Unlike a probe from x_i it needs no view of x_k from x_i; unlike it, x_k knows nothing of x_i.
+//! Unlike for a probe from x_i, x_k need not be visible from x_i; on the other hand, x_k does not depend on x_i.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -38,7 +38,7 @@ use crate::scene::Scene;
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct BidirectionalOptions {
-    /// When a path is ended by chance; both ways are unbiased.
+    /// Russian roulette; all choices are unbiased.
     #[serde(default)]
     roulette: Roulette,
 }

@@ -1,4 +1,4 @@
-//! The density that a technique states is that of what it draws.
+//! A technique samples the density that it states.
 //!
 //! A draw is a function of its uniform numbers. Where it is smooth, its density is the inverse Jacobian
 //! determinant by these numbers, summed over the numbers that give the same result, times the

@@ -3,14 +3,14 @@
 //! A ray that meets the boundary from outside, with Fresnel reflectance F, sees by reflection the radiance F L(w_r), and
 //! straight through the body, along a chord of length d,
 //!   (1 - F) e^{-sigma_t d} (1 - F') L(w_t),
-//! F' being the reflectance at the far end; the factors eta^2 of entry and exit cancel. A walk takes these ways with
-//! the probabilities F and (1 - F) e^{-sigma_t d} (1 - F'), and then meets the whole radiance of the light, which for a small
-//! light is large. So the two are scored where the ray meets the boundary, and the walks that take them score nothing.
-//! What is reflected inside at the far end stays the walk's.
+//! F' being the reflectance at the far end; the factors eta^2 of entry and exit cancel. A walk follows these paths with
+//! the probabilities F and (1 - F) e^{-sigma_t d} (1 - F'), and then scores the whole radiance of the light, which for a small
+//! light is large. So both are scored by their expectation where the ray meets the boundary, and the walks that follow them
+//! score nothing. Light that is reflected inside at the far end is left to the walk.
 //!
-//! What is left is the variance over the sensor: of a pixel on the light's mirror image one ray sees the light and the
-//! next does not. A look takes two or three rays, a walk many, so that each walk has `views` looks from sensor rays of
-//! its own pixel, each with its share of the mean.
+//! The variance over the sensor remains: in a pixel on the light's mirror image, one ray sees the light and the next does
+//! not. Scoring a sensor ray takes two or three rays, a walk many. So each walk scores `views` sensor rays of its pixel in
+//! this way, each with an equal share of the mean.
 
 use super::state::Connections;
 use crate::estimators::bands::WalkBands;
@@ -21,7 +21,7 @@ use crate::geometry::{FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
 use crate::sampling::distance::transmittance;
 
-/// Where a light is looked for, and what of its radiance arrives.
+/// A direction in which a light is seen, and the fraction of its radiance that arrives.
 struct View {
     way: Unscattered,
     from: DVec3,

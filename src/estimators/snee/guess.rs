@@ -1,9 +1,9 @@
 //! The specular guess: where light from a direction would enter the body to reach a point inside.
 //!
-//! A fixed point, deterministic and cheap, that need not converge: shoot from the point along the
-//! light's direction, refract the light at the normal that is met, shoot back along the refracted ray,
-//! take the normal there. It steers samplers, which know their own densities; what it gets wrong costs
-//! variance alone.
+//! A fixed-point iteration, deterministic and cheap, that need not converge: trace from the point along the
+//! light's direction, refract the light at the normal of the hit, trace back along the refracted ray, and
+//! take the normal there. The guess steers samplers whose densities are exact for any guess; its errors
+//! increase only variance.
 
 use crate::estimators::Cost;
 use crate::estimators::walk::CameraWalk;

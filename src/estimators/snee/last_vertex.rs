@@ -1,7 +1,7 @@
 //! The light-guided last vertex: from any medium vertex x_j, towards where light probably enters.
 //!
 //! Rough boundary: draw w_L from the light, refract it at a microfacet about the normal n* of the
-//! specular guess, and go against it to the boundary, x_k the first hit. Two widths of microfacets are
+//! specular guess, and trace against it to the boundary, with x_k the first hit. Two widths of microfacets are
 //! mixed, the boundary's own and a wider one for bodies whose true normal at x_k may be far from n*. Per
 //! area of x_k and solid angle of w_L the density is
 //!   q(x_j) p_G(w_L) p(w_kj | w_L, n*) cos_k / d_jk^2,   over U:   q p_G p / (phase(x_j) T(d_jk)).

@@ -1,16 +1,17 @@
 //! Subdivision next-event estimation (Koerner, Novak, Kutz, Habel & Jarosz 2016, "Subdivision next-event
-//! estimation for path-traced subsurface scattering"), and what makes it worth calling.
+//! estimation for path-traced subsurface scattering"), and extensions that make it efficient.
 //!
-//! At every medium vertex x_i of a camera walk a boundary point x_k is probed and the edge between them
-//! is subdivided by a vertex x_j, from the light's end or from the walk's (`subdivision`). Both are
-//! weighted against the walk's own ways of making the same path. Beyond the talk: probes that know where
-//! light probably enters (`guess`, `probe`), a last vertex guided by the light (`last_vertex`), calls
-//! made with a probability that falls with depth. Lights that are not concentrated are skipped and left
-//! to the walk (`guide`): where every light is skipped, the estimator is `path` to the last bit.
+//! At every medium vertex x_i of a camera walk a boundary point x_k is probed, and the edge between them
+//! is subdivided by a vertex x_j, from the light's end or from the walk's end (`subdivision`). Both are
+//! weighted by MIS against the techniques by which the walk makes the same path. The extensions of the talk
+//! are probes guided to where light probably enters (`guess`, `probe`), a last vertex guided by the light
+//! (`last_vertex`), and a probability of subdivision that falls with depth. Lights that are not concentrated
+//! are skipped and left to the walk (`guide`); where every light is skipped, the estimator is `path` to the
+//! last bit.
 //!
-//! Unbiased for all that the walk or a rival can sample. Through a smooth boundary parallel light is
-//! only found by subdivision from the light's end: what lacks two medium vertices before the exit is
-//! missing there. `snee_connect` has the specular connection beside it (`specular`), which finds that, too.
+//! The estimator is unbiased for all paths that the walk or a rival can sample. Through a smooth boundary
+//! only subdivision from the light's end finds parallel light, and paths without two medium vertices before
+//! the exit are missing. `snee_connect` adds specular connections (`specular`), which find these paths, too.
 
 mod bidirectional;
 mod connections;
@@ -68,7 +69,7 @@ struct BandSetup {
     sigma: f64,
     joint: JointDirections,
     specular: Option<Specular>,
-    /// Rays of the sensor per walk from which lights are looked for; 1 where none is scored by expectation.
+    /// Number of sensor rays per walk at which lights are scored by expectation; 1 where none is.
     views: u32,
 }
 

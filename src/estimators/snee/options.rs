@@ -21,7 +21,7 @@ pub struct SneeOptions {
     pub strategies: Strategies,
     /// How often an edge is subdivided.
     pub call: Call,
-    /// The same where nothing else finds the path: parallel light through a smooth boundary.
+    /// The same where no other technique finds the path: parallel light through a smooth boundary.
     pub call_alone: Call,
     /// Whether distances end at the boundary (one more ray for every density) or run on and may fail.
     pub truncated: bool,
@@ -34,12 +34,12 @@ pub struct SneeOptions {
     /// Connections of the last vertex through a smooth boundary.
     pub connection: Option<ConnectionCall>,
     /// Whether a smooth boundary's reflection of a light that is connected to is scored by its
-    /// expectation, wherever a walk meets the boundary from outside, instead of by the walks that take
-    /// it.
+    /// expectation, wherever a walk meets the boundary from outside, instead of by the walks that are
+    /// reflected.
     pub expected_reflection: bool,
-    /// The same of a light that is seen straight through the body.
+    /// The same for a light that is seen straight through the body.
     pub expected_passage: bool,
-    /// Rays of the sensor per walk from which such lights are looked for.
+    /// Number of sensor rays per walk at which these expectations are scored.
     pub views: u32,
     /// Least concentration 4 pi int L^2 / (int L)^2 of a light that is connected to; with 1 none is
     /// skipped.
@@ -85,7 +85,7 @@ pub struct SneeChoices {
     /// Preset that the other options change.
     #[serde(default)]
     pub preset: SneePreset,
-    /// When a path is ended by chance.
+    /// Russian roulette.
     #[serde(default)]
     pub roulette: Roulette,
     /// How walks are drawn inside the body; all ways are unbiased.
@@ -93,11 +93,11 @@ pub struct SneeChoices {
     pub walk: WalkDraw,
     /// Techniques for paths whose last two medium vertices are consecutive.
     ///
-    /// All other paths are always the walk's own (and the light-guided last vertex's).
+    /// All other paths are always sampled by the walk (and by the light-guided last vertex).
     pub strategies: Option<Vec<EdgeTechnique>>,
     /// How often an edge is subdivided.
     pub call: Option<Call>,
-    /// The same where nothing else finds the path: parallel light through a smooth boundary.
+    /// The same where no other technique finds the path: parallel light through a smooth boundary.
     pub call_alone: Option<Call>,
     /// Where sampled distances end.
     pub distances: Option<DistanceEnd>,
@@ -119,9 +119,9 @@ pub struct SneeChoices {
     ///
     /// By default `snee` leaves it to the walk, and `snee_connect` does not.
     pub expected_passage: Option<bool>,
-    /// Rays of the sensor per walk from which such lights are looked for, the walk's own included.
+    /// Number of sensor rays per walk, its first ray included, at which these two expectations are scored.
     ///
-    /// By default 1 for `snee`, and 8 for `snee_connect`. Without expectations there is nothing to look for, and 1 is used.
+    /// By default 1 for `snee`, and 8 for `snee_connect`. Where no expectation is scored, 1 is used.
     #[schemars(range(min = 1, max = 1024))]
     pub views: Option<u32>,
     /// Lights of a smaller concentration are skipped: sampled by path tracing only.
@@ -129,7 +129,7 @@ pub struct SneeChoices {
     /// The concentration is 4 pi int L^2 / (int L)^2; 1 skips none.
     #[schemars(range(min = 1.0))]
     pub least_concentration: Option<f64>,
-    /// Whether bands have walks of their own.
+    /// Whether each band has separate walks or all bands share them.
     #[serde(default)]
     pub bands: BandWalks,
 }
@@ -140,7 +140,7 @@ pub struct SneeChoices {
 pub enum SneePreset {
     /// As published: all strategies, uniform probes, truncated distances, a call at every vertex.
     Paper,
-    /// Tuned: probes and a last vertex that are guided by the light, calls whose probability falls with
+    /// Tuned: probes and a last vertex that are guided by the light, and calls whose probability falls with
     /// depth; lights that are not concentrated are skipped.
     #[default]
     Guided,
@@ -170,13 +170,13 @@ pub enum DistanceEnd {
     Unbounded,
 }
 
-/// Views of `snee_connect`: in the pixels that a small light is seen in, it is most of what varies.
+/// Views of `snee_connect`: in pixels in which a small light is seen, whether a ray sees it causes most of the variance.
 const CONNECTED_VIEWS: u32 = 8;
 
 /// The least share of uniform directions among probes.
 const LEAST_UNIFORM: f64 = 1e-3;
 
-/// Shares of the lobes of probes; what is left to 1 is uniform in direction, at least 0.001.
+/// Shares of the lobes of probes; the rest, at least 0.001, is uniform in direction.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeLobes {
@@ -190,14 +190,14 @@ pub struct ProbeLobes {
     pub guided: f64,
 }
 
-/// Who shares a walk.
+/// Which bands share a walk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BandWalks {
-    /// Every band has its own.
+    /// Every band has separate walks.
     #[default]
     Alone,
-    /// One walk scores all bands, which may differ in their media alone.
+    /// One walk scores all bands, which may differ only in their media.
     Shared,
 }
 

@@ -1,4 +1,4 @@
-//! Points of the boundary by a direction from a medium vertex and the first hit.
+//! Points of the boundary: the first hit along a sampled direction from a medium vertex.
 //!
 //! Three lobes, mixed: uniform directions; directions to the tangent plane of the specular guess, by
 //! area about the vertex's foot; directions about the guess itself, with density falling as 1 / sin of

@@ -1,15 +1,15 @@
 //! `snee_connect`: subdivision next-event estimation and the specular connection through a smooth boundary, weighted against
 //! each other and the walk by the balance heuristic.
 //!
-//! Each has what the other lacks. The connection finds single scattering, exits that the vertex before the last does not
-//! see, and vertices after an internal reflection; subdivision bounds the connection's weights at caustics. Path
-//! classes and densities are in `specular`. `snee`'s other techniques keep their place, but the last vertex is off
-//! unless `last_vertex` is named: it draws by guess what the connection solves, at the cost of another ray.
+//! The two complement each other. The connection finds single scattering, exits that the vertex before the last does not
+//! see, and vertices after an internal reflection; subdivision bounds the connection's weights at caustics. `specular` has the
+//! path classes and densities. The other techniques of `snee` are unchanged, but the last vertex is off unless `last_vertex`
+//! is named: it samples by a guess what the connection solves for, at the cost of another ray.
 //!
 //! | light reaches the last medium vertex | parallel light | disc of directions |
 //! |---|---|---|
 //! | by one refraction | complete | complete |
-//! | by a refraction and internal reflections, or through another part of a body that is not convex | missing | the walk's |
+//! | by a refraction and internal reflections, or through another part of a body that is not convex | missing | left to the walk |
 
 use std::sync::Arc;
 

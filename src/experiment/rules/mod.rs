@@ -1,4 +1,4 @@
-//! What the schema cannot express: rules between values, each with the place of the offending key.
+//! Rules between values, which the schema cannot express; each reports the place of the offending key.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;

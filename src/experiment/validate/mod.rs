@@ -1,5 +1,5 @@
-//! A generic walk of a document along the JSON Schema that the types of `schema` generate: types,
-//! keys, variants, ranges. It reports every violation, not the first.
+//! Validates a document against the JSON Schema that the types of `schema` generate: types, keys, variants,
+//! ranges. Every violation is reported, not only the first.
 
 use std::collections::BTreeMap;
 

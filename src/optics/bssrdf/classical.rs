@@ -6,9 +6,8 @@
 //! 2C1)/(1 - 2C1). Both signs are plus with z_v > 0: the virtual source is negative, and so is its
 //! depth. Over the plane it is (alpha'/2) (1 + e^(-(4/3) A q)) e^(-q), q = sqrt(3 (1 - alpha')) = s z_r.
 //!
-//! Reciprocal, never negative. The source's figures count all light, single scattering too, in the
-//! measured alpha', so that adding the single-scattering term counts it twice in part (see the module's
-//! table).
+//! Reciprocal, never negative. The paper's measured alpha' includes all light, single scattering too, so that
+//! adding the single-scattering term counts it twice in part (see the head of the module).
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! The two ends of the light that a BSSRDF carries.
+//! The two ends of a BSSRDF: where light enters and where it leaves.
 
 use crate::math::DVec3;
 

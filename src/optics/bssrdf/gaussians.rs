@@ -1,7 +1,7 @@
 //! Sums of Gaussians: R(r) = sum_i w_i e^(-r^2/(2 v_i)) / (2 pi v_i), whose integral over the plane is
 //! sum_i w_i.
 //!
-//! Reciprocal, never negative. They hold what the profile that they were fitted to holds.
+//! Reciprocal, never negative. They include the same light as the profile that they were fitted to.
 
 use std::f64::consts::PI;
 

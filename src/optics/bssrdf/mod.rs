@@ -1,34 +1,34 @@
-//! Models of the light that diffuses from one point of a surface to another, one band.
+//! Models of the light that diffuses from one point of a surface to another, for one band.
 //!
-//! A BSSRDF S(xi, wi, xo, wo), 1/(mm^2 sr), makes radiance out of light that enters elsewhere,
+//! A BSSRDF S(xi, wi, xo, wo), 1/(mm^2 sr), relates outgoing radiance to light that enters elsewhere,
 //!   L(xo, wo) = int_A int_Omega S(xi, wi, xo, wo) L(xi, wi) |n_i . wi| dwi dA,
 //! and all models here have the Fresnel transmittances of a smooth boundary as factors,
 //!   S = T12(wi) K T21(wo).
-//! Code that refracts at both ends has the transmittances in its hands (a path that is refracted with
-//! probability T21 must not multiply by it again), so what is evaluated here is K, the *kernel*.
+//! The code that refracts at both ends applies the transmittances (a path that is refracted with probability
+//! T21 must not be multiplied by T21 again), so this module evaluates K, the *kernel*.
 //!
 //! Every model except the directional dipole is reciprocal and never negative.
 //!
 //! - *Classical dipole.* Loses the part 2 C1(1/eta) of the exitance on the way out unless it is
-//!   normalized. By its source's measure it leaves nothing out (its albedo counts all light), yet single
-//!   scattering is added to it: see below.
-//! - *Better dipole.* Normalized; up to a tenth above the truth with single scattering added, which it
-//!   leaves out.
-//! - *Directional dipole.* Not reciprocal; can be negative and is clamped at 0; its energy is not
-//!   bounded: up to 1.1 of what enters at a high albedo, 0.1 at none. Leaves nothing out; light that
-//!   goes straight through has an extinction of its own.
+//!   normalized. By the measure of its publication it leaves nothing out (its albedo counts all light), yet
+//!   single scattering is added to it: see below.
+//! - *Better dipole.* Normalized; leaves out single scattering. With single scattering added, it is up to a
+//!   tenth above the truth.
+//! - *Directional dipole.* Not reciprocal; can be negative and is clamped at 0. Its energy is not bounded: up
+//!   to 1.1 of the incident energy at a high albedo, 0.1 at albedo 0. Leaves nothing out; light that passes
+//!   straight through has a separate extinction coefficient.
 //! - *Normalized diffusion.* Normalized: returns exactly the albedo that it is given. Leaves nothing
 //!   out.
 //! - *Gaussians of skin.* Normalized: returns exactly the reflectance that it is given. Leaves nothing
 //!   out.
-//! - *Fitted Gaussians.* Normalized: return exactly their dipole's total, and leave out what it leaves
-//!   out.
+//! - *Fitted Gaussians.* Normalized: return exactly the total of their dipole, and leave out what the dipole
+//!   leaves out.
 //!
-//! "Reciprocal" is of K with its ends exchanged, where the coefficients are the same everywhere. The
-//! normalised models have K = R / (pi (1 - 2 C1(1/eta))), so that their hemispherical exitance under T21
-//! is R. The classical dipole's total is the whole diffuse reflectance within 0.03 of exact transport,
-//! so that single scattering on top of it is counted twice in part; its source adds it nonetheless, and
-//! `leaves_out_single` states this.
+//! "Reciprocal" means that K is symmetric in its ends, where the coefficients are the same everywhere. The
+//! normalized models have K = R / (pi (1 - 2 C1(1/eta))), so that their hemispherical exitance under T21
+//! is R. The total of the classical dipole is within 0.03 of the whole diffuse reflectance of exact
+//! transport, so that adding single scattering counts it twice in part. Its publication adds it nonetheless,
+//! and `leaves_out_single` states this.
 
 mod better;
 mod classical;

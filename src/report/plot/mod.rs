@@ -1,4 +1,4 @@
-//! Plots as SVG, inline in the page and as files, and their numbers as CSV. Text has the colour of the
+//! Plots as SVG, inline in the page and as files, and their numbers as CSV. Text has the text colour of the
 //! page. Series use the palette of Okabe & Ito, which is safe for colour-blind readers, and each series
 //! is also labelled at its end.
 

@@ -1,4 +1,4 @@
-//! What guides walks, in a plane through the body.
+//! The guide of walks, in a plane through the body.
 
 use super::section::{Content, PlotFigure, Section, band_name, joined, runs, shown_bands};
 use crate::report::document::slug;

@@ -1,6 +1,6 @@
-//! The pictures of one cell in a viewer that compares them: one PNG per estimator for a reader without
-//! scripts, and the input of the page's script: linear values, and maps of noise, of differences and of
-//! their z-scores.
+//! A viewer that compares the pictures of one cell. It has one PNG per estimator for readers without scripts,
+//! and the input of the page's script: linear values, and maps of noise, of differences and of their
+//! z-scores.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! What a viewer holds, by cells made up.
+//! Tests of the contents of a viewer, with artificial cells.
 
 use serde_json::Value;
 

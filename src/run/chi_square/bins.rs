@@ -1,11 +1,11 @@
-//! Bins in which a sampler's draws are counted, chosen by the density alone and never by the draws.
+//! Bins in which the draws of a sampler are counted, chosen by the density alone and never by the draws.
 //!
-//! A piece of two dimensions starts as a grid whose resolution follows the piece's mass; boxes that hold
-//! more than four times their share are quartered, again and again; those that would expect fewer than
-//! 25 draws are joined with neighbours. Periodic axes begin at an irrational offset, so that symmetry
-//! planes are no edges. A piece of one dimension has bins of equal mass, and in its upper tail at 1 -
-//! 2^-k, and at both ends of 1e-4. Coarse bins are unions of fine ones; both are unions of leaves, whose
-//! masses are integrated.
+//! A piece of two dimensions starts as a grid whose resolution follows the mass of the piece. Boxes that hold
+//! more than four times their share are quartered repeatedly; boxes that would expect fewer than 25 draws are
+//! merged with neighbours. Periodic axes begin at an irrational offset, so that symmetry planes are not edges
+//! of bins. A piece of one dimension has bins of equal mass, further edges in its upper tail at 1 - 2^-k, and
+//! bins of mass 1e-4 at both ends. Coarse bins are unions of fine ones; both are unions of leaves, whose masses
+//! are integrated.
 
 use super::quadrature::{Area, Mass, Quadrature, wrap};
 use crate::samplers::Coordinate;

@@ -1,12 +1,13 @@
-//! Thinning: each point x_i of a cloud is accepted independently with probability p(|x - x_i|), and what
-//! is accepted has weight 1/p, so that the expected sum over the accepted is the sum over all.
+//! Thinning: each point x_i of a cloud is accepted independently with probability p(|x - x_i|), and accepted
+//! points have weight 1/p, so that the expected sum over accepted points is the sum over all points.
 //!
-//! p is positive and does not increase with distance. `scan` evaluates every point; `PointTree` makes
-//! acceptances of the same law from a hierarchy, without visiting most of the points that it rejects.
+//! p is positive and does not increase with distance. `scan` evaluates every point; `PointTree` draws
+//! acceptances from the same distribution with a hierarchy, without visiting most of the points that it
+//! rejects.
 //!
-//! Uniform numbers decide against p down to 2^-106 (`Stream::draw_fine`): with 24 bits, the one number 0
-//! would accept points of p < 2^-24 with probability 2^-24 and weights e^(+sigma d) without bound, a
-//! bias of orders of magnitude in large bodies; with 53 bits the same happens beyond optical depth 36.7.
+//! p is compared with uniform numbers of resolution 2^-106 (`Stream::draw_fine`). With 24 bits, the number 0
+//! alone would accept points of p < 2^-24 with probability 2^-24 and unbounded weights e^(+sigma d), a bias
+//! of orders of magnitude in large bodies; with 53 bits the same happens beyond optical depth 36.7.
 
 mod scan;
 mod tree;

@@ -1,5 +1,5 @@
-//! Thinning by evaluating every point: the oracle, and what the hierarchy does where nearly all are
-//! accepted.
+//! Thinning by evaluating every point: the oracle of tests, and the method of the hierarchy where nearly all
+//! points are accepted.
 
 use super::{Accepted, ThinningRule, ThinningWork, decide};
 use crate::math::DVec3;

@@ -1,4 +1,4 @@
-//! The law of thinning, and what it costs.
+//! The distribution of thinning, and its cost.
 
 use super::*;
 use crate::math::DVec3;

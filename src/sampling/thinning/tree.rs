@@ -1,11 +1,11 @@
-//! Thinning by a hierarchy, exact in law.
+//! Thinning by a hierarchy, with exactly the distribution of independent acceptances.
 //!
 //! Points are in the order of their Morton codes, so that a node is a range of them, with a box around
 //! it. A query descends from the root; where it stops at a node, with p_m = p(distance to its box), it
 //! draws candidates among the node's points at a rate q >= p_m, and accepts candidate i with probability
 //! p_i / q.
 //!
-//! Same law as independent Bernoulli(p_i):
+//! Why the distribution is that of independent Bernoulli(p_i):
 //!   1. The nodes at which a query stops depend on the query point, the tree and constants alone, not on
 //!      random numbers, and their ranges partition the points.
 //!   2. The candidates of a range are independent Bernoulli(q), made in one of two ways that p_m alone

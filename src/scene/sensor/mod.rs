@@ -1,8 +1,7 @@
-//! Sensors: what a pass measures, as rays with weights. A pass traces every ray of the sensor once;
-//! ray i belongs to one slot (a pixel, or a bin of a flux), and slots add up to regions.
+//! Sensors define what a pass measures, as rays with weights. A pass traces every ray of the sensor once;
+//! ray i belongs to one slot (a pixel, or a bin of a flux), and slots are summed into regions.
 //!
-//! One file a kind of sensor, which implements `SensorMethods`; `Sensor` passes every call on to its
-//! kind.
+//! Each kind of sensor has one file and implements `SensorMethods`; `Sensor` forwards every call to its kind.
 
 mod accepting;
 mod body_flux;

@@ -1,4 +1,4 @@
-//! How far light travels in a finite body, and how much falls onto its surface.
+//! The path length of light in a finite body, and the power that falls onto its surface.
 //!
 //! Light that leaves the body for good along a path of power dP scores dP l and dP n, where l is the
 //! path's length in the medium and n counts how often it fell onto the surface from outside; both are

@@ -1,4 +1,4 @@
-//! Radiant exitance of the top face of a half-space or slab by how far from the exit its light came in.
+//! Radiant exitance of the top face of a half-space or slab by the distance between entry and exit.
 
 use std::f64::consts::PI;
 

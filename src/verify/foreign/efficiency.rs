@@ -1,4 +1,4 @@
-//! Variance times seconds of images made elsewhere, over that of a record.
+//! Variance times seconds of images of other renderers, over that of a record.
 
 use super::images::Planes;
 use super::pixels::BandImages;

@@ -1,4 +1,4 @@
-//! `judge` on made-up images: error rates without a defect, and defects that are found.
+//! `judge` on artificial images: error rates without a defect, and defects that are found.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Images made elsewhere, as planes of a record's bands.
+//! Images of other renderers, as planes of a record's bands.
 
 use crate::error::{Error, Result};
 use crate::results::exr_file::ExrImage;

@@ -1,13 +1,13 @@
 //! Images rendered elsewhere, with two or more seeds, against a record of the same scene.
 //!
-//! What is tested, at one family-wise level over all bands (Holm):
-//! - the image mean and the tiles: the seeds' means against the record's batches, both with their
-//!   errors. By default a seed is one observation; where a user vouches for independent pixels, the
-//!   pixels' own spread gives the error of a region's mean, which has far more degrees of freedom;
+//! The tests share one family-wise level over all bands (Holm):
+//! - the image mean and the tiles: the means of the seeds against the batches of the record, both with their
+//!   errors. By default a seed is one observation. If the user states that pixels are independent, the
+//!   spread of the pixels gives the error of the mean of a region, with far more degrees of freedom;
 //! - the squared bias of all pixels, from products of different seeds (`pixels::squared_bias`).
 //!
-//! Convention: row 0 is the top of the image and column 0 its left; OpenEXR files are read as their data
-//! window states, whatever the order of their lines. Values are radiance, linear, without exposure.
+//! Convention: row 0 is at the top of the image and column 0 at its left; OpenEXR files are read as their
+//! data window states, whatever the order of their lines. Values are linear radiance, without exposure.
 
 use super::evidence::Evidence;
 use super::family::{Finding, conclude};
