@@ -8,7 +8,8 @@ use super::output::unwritable;
 use super::{Reading, counted, experiment_files};
 use crate::error::{Diagnostic, Error, Result};
 use crate::experiment::{Experiment, LoadOptions, Registry, load};
-use crate::run::plan;
+use crate::run::memory_limits::available;
+use crate::run::{Options, Plan, plan};
 
 /// Validate experiment files and report all errors.
 ///
@@ -38,8 +39,9 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
             let others: &[String] = if options.setting.is_some() { &[] } else { &experiment.settings };
             let planned = |setting| plan(&load_setting(setting)?, registry);
             let mut wrong: Vec<Diagnostic> = Vec::new();
-            for planned in std::iter::once(plan(&experiment, registry)).chain(others.iter().map(planned))
-            {
+            let own = plan(&experiment, registry);
+            let memory = own.as_ref().map_or(String::new(), too_large);
+            for planned in std::iter::once(own).chain(others.iter().map(planned)) {
                 match planned {
                     Err(Error::Input(more)) => {
                         let new = |one: &Diagnostic| !wrong.contains(one);
@@ -49,12 +51,12 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
                     planned => drop(planned?),
                 }
             }
-            if wrong.is_empty() { Ok(experiment) } else { Err(Error::Input(wrong)) }
+            if wrong.is_empty() { Ok((experiment, memory)) } else { Err(Error::Input(wrong)) }
         });
         match checked {
-            Ok(experiment) => {
+            Ok((experiment, memory)) => {
                 let ok = Console::of_output().verdict("ok", true);
-                writeln!(out, "{}: {ok}, {}", path.display(), summary(&experiment))
+                writeln!(out, "{}: {ok}, {}{memory}", path.display(), summary(&experiment))
                     .map_err(unwritable)?;
             }
             Err(error) => match error.of_input("everything that an experiment reads must be there") {
@@ -64,6 +66,13 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
         }
     }
     if findings.is_empty() { Ok(()) } else { Err(Error::Input(findings)) }
+}
+
+/// That a run would be refused for its memory, which is no mistake of the file but a limit of this machine.
+fn too_large(plan: &Plan) -> String {
+    let memory = plan.memory(Options::new("").threads, true);
+    let words = memory.check(available()).err().map(|error| error.to_string());
+    words.map_or(String::new(), |words| format!("\n{}", words.replacen("error", "on this machine", 1)))
 }
 
 fn summary(experiment: &Experiment) -> String {
@@ -108,6 +117,21 @@ mod tests {
             result.is_ok() && out.ends_with("0.toml: ok, 1 cell, 1 estimator, 3 bands, 0 claims\n"),
             "{out}"
         );
+    }
+
+    #[test]
+    fn what_no_machine_holds_is_told() {
+        let image = "{ orthographic = { resolution = [16000, 16000], center_mm = [0, 0, 5], toward = [0, 0, -1], \
+                     up = [0, 1, 0], width_mm = 2.5 } }";
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("large.toml");
+        std::fs::write(&path, format!("{GOOD}[setting.large]\nsensor = {image}\n"))
+            .expect("it is written");
+        let reading = Reading { set: Vec::new(), setting: Some("large".into()) };
+        let mut out = Vec::new();
+        run(&Args { files: vec![path], reading }, &Registry::builtin(), &mut out).expect("it is sound");
+        let out = String::from_utf8(out).expect("it is text");
+        assert!(out.contains("on this machine: the run would need") || available().is_none(), "{out}");
     }
 
     #[test]

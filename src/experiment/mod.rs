@@ -77,6 +77,9 @@ mod sweep_csv;
 /// Axes and points as types.
 mod sweep_point;
 
+/// Slips of the pen in TOML.
+mod syntax;
+
 /// The walk along the schema.
 pub(crate) mod validate;
 

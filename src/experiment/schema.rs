@@ -30,8 +30,8 @@ pub struct ExperimentFile {
     /// What the experiment shows, for reports.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub description: Option<String>,
-    /// Root of all random streams, where another sample is wanted; without it the experiment's name and
-    /// content alone name its streams.
+    /// Root of all random streams, where another sample is wanted.
+    /// Without it the experiment's name and content alone name its streams.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 9223372036854775807u64))]
     pub seed: Option<u64>,
@@ -190,8 +190,8 @@ pub enum ShapeEntry {
         /// Unit of the file's numbers; mm without it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         unit: Option<LengthUnit>,
-        /// Scale the longest side of its bounding box to this, and centre the box at the origin; without it
-        /// the mesh keeps its size and place.
+        /// Scale the longest side of its bounding box to this, and centre the box at the origin.
+        /// Without it the mesh keeps its size and place.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(extend("exclusiveMinimum" = 0))]
         longest_side_mm: Option<f64>,

@@ -7,6 +7,7 @@ use super::number::significant;
 use super::table::Table;
 use super::viewer;
 use crate::error::Result;
+use crate::experiment::titled;
 use crate::results::canvas::{Canvas, Unshown};
 use crate::results::image::{Picture, gain};
 use crate::results::pictures::{Split, Wanted};
@@ -168,8 +169,10 @@ pub(super) fn lead(
     if grid.zoom > 1 {
         caption += &format!(" A pixel is shown as {0} x {0}.", grid.zoom);
     }
-    let place =
-        if stored.record.cells.len() > 1 { format!("Cell {}. ", cell.1.label) } else { String::new() };
+    let place = match stored.record.cells.len() {
+        0 | 1 => String::new(),
+        _ => format!("Cell {}. ", titled(&cell.1.axes, &cell.1.label)),
+    };
     Ok(FigureBlock { path, picture: PictureFile::Png(png), title, caption: place + &caption })
 }
 

@@ -5,6 +5,7 @@ use super::document::TableBlock;
 use super::number::{per_cent, significant, with_error};
 use super::summary;
 use super::table::Table;
+use crate::experiment::titled;
 use crate::results::measurements::Measurement;
 use crate::results::record::CostMeasure;
 use crate::verify::comparisons::EfficiencyRow;
@@ -83,6 +84,11 @@ pub(crate) fn efficiency_rows(data: &ReportData) -> Vec<&EfficiencyRow> {
     Some(by(CostMeasure::Cpu)).filter(has_ratio).unwrap_or_else(|| by(CostMeasure::Counters))
 }
 
+/// Why a row has no ratio.
+pub(crate) fn reason(row: &EfficiencyRow) -> &str {
+    row.note.strip_prefix("no mean test: ").unwrap_or(&row.note)
+}
+
 /// A text in lines of at most `width` characters, broken at blanks.
 pub(crate) fn wrapped(text: &str, width: usize) -> String {
     let (mut lines, mut length) = (String::new(), 0);
@@ -109,12 +115,13 @@ pub(crate) fn notes(data: &ReportData) -> Vec<String> {
         None => lines.push((text, vec![cell.to_string()])),
     };
     for cell in &data.stored.record.cells {
+        let title = titled(&cell.axes, &cell.label);
         for run in &cell.runs {
-            run.notes.iter().for_each(|note| add(format!("{}: {note}", run.estimator), &cell.label));
+            run.notes.iter().for_each(|note| add(format!("{}: {note}", run.estimator), &title));
             for (name, _) in run.anomalies.iter().filter(|(_, count)| **count > 0) {
                 let total = run.cost.get("paths").copied().unwrap_or(0);
                 let count = run.anomalies[name];
-                add(format!("{}: {count} of `{name}` in {total} paths", run.estimator), &cell.label);
+                add(format!("{}: {count} of `{name}` in {total} paths", run.estimator), &title);
             }
         }
     }
