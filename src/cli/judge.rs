@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use super::console::Console;
 use super::output::unwritable;
 use crate::error::{Error, Result};
-use crate::experiment::titled;
 use crate::report::document::{FigureBlock, PictureFile};
 use crate::report::number::{per_cent, significant};
 use crate::report::outcome;
@@ -161,9 +160,8 @@ fn cell(stored: &Stored, label: Option<&str>) -> Result<usize> {
         )),
         Some(label) => {
             // As the record names it, or as `run` prints it: `alpha = 0.1`.
-            let is_meant = |c: &Cell| {
-                [&c.label, &titled(&c.axes, &c.label)].iter().any(|known| plain(known) == plain(label))
-            };
+            let is_meant =
+                |c: &Cell| [&c.label, &c.title()].iter().any(|known| plain(known) == plain(label));
             cells.iter().position(is_meant).ok_or_else(|| {
                 let rule = format!("the record has no cell `{label}`");
                 Error::input_help(rule, format!("it has {}", labels()))

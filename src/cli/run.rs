@@ -8,8 +8,8 @@ use super::console::Console;
 use super::output::{say, unwritable};
 use super::{Reading, Working, counted, experiment_files, listen};
 use crate::error::Result;
+use crate::experiment::load;
 use crate::experiment::registry::Registry;
-use crate::experiment::{load, titled};
 use crate::report::ReportData;
 use crate::report::number::significant;
 use crate::report::{self, terminal};
@@ -104,7 +104,7 @@ pub(super) fn tell(
     let mut table = terminal::run_table(material);
     for row in &mut table.rows {
         if let Some(cell) = record.cells.iter().find(|cell| cell.label == row[0]) {
-            row[0] = titled(&cell.axes, &cell.label);
+            row[0] = cell.title();
         }
     }
     let less = ["observable", "paths/s/core", "CPU s"];

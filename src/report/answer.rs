@@ -157,7 +157,10 @@ impl PairRows<'_> {
         }
         let loose = self.rows.iter().filter(|row| row.quoted().is_some() && !row.resolved).count();
         if loose > 0 {
-            text += &format!("; {loose} of {} ratios are not resolved", quoted.len());
+            text += &match quoted.len() {
+                1 => "; the ratio is not resolved".to_string(),
+                all => format!("; {loose} of {all} ratios are not resolved"),
+            };
         }
         text += &self.agreement(stored).map_or(".".into(), |bound| {
             format!(

@@ -7,7 +7,6 @@ use super::number::significant;
 use super::table::Table;
 use super::viewer;
 use crate::error::Result;
-use crate::experiment::titled;
 use crate::results::canvas::{Canvas, Unshown};
 use crate::results::image::{Picture, gain};
 use crate::results::pictures::{Split, Wanted};
@@ -171,7 +170,7 @@ pub(super) fn lead(
     }
     let place = match stored.record.cells.len() {
         0 | 1 => String::new(),
-        _ => format!("Cell {}. ", titled(&cell.1.axes, &cell.1.label)),
+        _ => format!("Cell {}. ", cell.1.title()),
     };
     Ok(FigureBlock { path, picture: PictureFile::Png(png), title, caption: place + &caption })
 }

@@ -5,7 +5,6 @@ use super::document::TableBlock;
 use super::number::{per_cent, significant, with_error};
 use super::summary;
 use super::table::Table;
-use crate::experiment::titled;
 use crate::results::measurements::Measurement;
 use crate::results::record::CostMeasure;
 use crate::verify::comparisons::EfficiencyRow;
@@ -115,7 +114,7 @@ pub(crate) fn notes(data: &ReportData) -> Vec<String> {
         None => lines.push((text, vec![cell.to_string()])),
     };
     for cell in &data.stored.record.cells {
-        let title = titled(&cell.axes, &cell.label);
+        let title = cell.title();
         for run in &cell.runs {
             run.notes.iter().for_each(|note| add(format!("{}: {note}", run.estimator), &title));
             for (name, _) in run.anomalies.iter().filter(|(_, count)| **count > 0) {
