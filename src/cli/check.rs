@@ -8,6 +8,7 @@ use super::output::unwritable;
 use super::{Reading, counted, experiment_files};
 use crate::error::{Diagnostic, Error, Result};
 use crate::experiment::{Experiment, LoadOptions, Registry, load};
+use crate::run::job::{Job, Passes};
 use crate::run::memory_limits::available;
 use crate::run::{Options, Plan, plan};
 
@@ -40,7 +41,7 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
             let planned = |setting| plan(&load_setting(setting)?, registry);
             let mut wrong: Vec<Diagnostic> = Vec::new();
             let own = plan(&experiment, registry);
-            let memory = own.as_ref().map_or(String::new(), too_large);
+            let remarks = own.as_ref().map_or(String::new(), |plan| notes(plan) + &too_large(plan));
             for planned in std::iter::once(own).chain(others.iter().map(planned)) {
                 match planned {
                     Err(Error::Input(more)) => {
@@ -51,12 +52,12 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
                     planned => drop(planned?),
                 }
             }
-            if wrong.is_empty() { Ok((experiment, memory)) } else { Err(Error::Input(wrong)) }
+            if wrong.is_empty() { Ok((experiment, remarks)) } else { Err(Error::Input(wrong)) }
         });
         match checked {
-            Ok((experiment, memory)) => {
+            Ok((experiment, remarks)) => {
                 let ok = Console::of_output().verdict("ok", true);
-                writeln!(out, "{}: {ok}, {}{memory}", path.display(), summary(&experiment))
+                writeln!(out, "{}: {ok}, {}{remarks}", path.display(), summary(&experiment))
                     .map_err(unwritable)?;
             }
             Err(error) => match error.of_input("everything that an experiment reads must be there") {
@@ -68,9 +69,26 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
     if findings.is_empty() { Ok(()) } else { Err(Error::Input(findings)) }
 }
 
+/// What estimators say of their results before they have any, such as light that they cannot sample.
+fn notes(plan: &Plan) -> String {
+    let passes = plan.jobs.iter().filter_map(Job::passes);
+    let of_job = |job: &Passes| {
+        let name = job.arm.name.clone();
+        job.estimator.notes().into_iter().map(move |note| format!("\nnote: {name}: {note}"))
+    };
+    let mut notes: Vec<String> = Vec::new();
+    for note in passes.flat_map(of_job) {
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
+    notes.concat()
+}
+
 /// That a run would be refused for its memory, which is no mistake of the file but a limit of this machine.
 fn too_large(plan: &Plan) -> String {
-    let memory = plan.memory(Options::new("").threads, true);
+    // A run takes the estimators of a cell one after the other where there is no room for all of them.
+    let memory = plan.memory(Options::new("").threads, false);
     let words = memory.check(available()).err().map(|error| error.to_string());
     words.map_or(String::new(), |words| format!("\n{}", words.replacen("error", "on this machine", 1)))
 }
@@ -114,9 +132,14 @@ mod tests {
     fn good_files_are_summed_up() {
         let (out, result) = check(&[GOOD]);
         assert!(
-            result.is_ok() && out.ends_with("0.toml: ok, 1 cell, 1 estimator, 3 bands, 0 claims\n"),
+            result.is_ok() && out.contains("0.toml: ok, 1 cell, 1 estimator, 3 bands, 0 claims\n"),
             "{out}"
         );
+        assert!(
+            out.ends_with("its share is excluded from this estimator's result (exactly 0)\n"),
+            "{out}"
+        );
+        assert_eq!(out.matches("note: mis: path cannot sample directional light").count(), 1, "{out}");
     }
 
     #[test]

@@ -42,9 +42,12 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
     let experiment = load(&args.file, &args.reading.options(), registry)?;
     let plan = run::plan(&experiment, registry)?;
     let threads = args.threads.unwrap_or_else(|| run::Options::new("").threads);
-    let memory = plan.memory(threads, true);
+    let available = available();
+    // As a run does: the estimators of a cell by turns where there is room for all of them.
+    let is_interleaved = plan.memory(threads, true).fits(available);
+    let memory = plan.memory(threads, is_interleaved);
     tell(args, &experiment, &plan, threads, &memory, out).map_err(unwritable)?;
-    memory.check(available())?;
+    memory.check(available)?;
     Ok(0)
 }
 

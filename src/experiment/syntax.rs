@@ -11,12 +11,13 @@ pub(super) fn finding(message: &str, place: Place) -> Diagnostic {
     let line = place.text[begin..].lines().next().unwrap_or("");
     let here = place.text().trim();
     let is_value = message.starts_with("string values must be quoted");
+    if let Some(number) = decimal_comma(line) {
+        let at = begin + line.find(number).unwrap_or(0);
+        let help = Some(format!("write {}, with a point", number.replace(',', ".")));
+        let place = Place { span: at..at + number.len(), ..place.clone() };
+        return Diagnostic { rule: format!("`{number}` is no number"), place: Some(place), help };
+    }
     let (rule, help) = match message {
-        _ if decimal_comma(line).is_some() => {
-            let number = decimal_comma(line).unwrap_or_default();
-            let help = format!("write {}, with a point", number.replace(',', "."));
-            (format!("`{number}` is no number"), Some(help))
-        }
         _ if is_value && here.contains(['\u{201c}', '\u{201d}', '\u{2018}', '\u{2019}']) => {
             said("a typographic quotation mark", "write the straight one: \"")
         }
@@ -76,7 +77,7 @@ mod tests {
             ("seed = 1\nseed = 2\n", (2, 1), "duplicate key", "remove one of the two"),
             ("a = .3\n", (1, 5), "a number begins with a digit", "0.5"),
             ("a = True\n", (1, 5), "invalid boolean", "small letters"),
-            ("a = 1,3\n", (1, 6), "`1,3` is no number", "write 1.3"),
+            ("a = 1,3\n", (1, 5), "`1,3` is no number", "write 1.3"),
         ] {
             let findings = parse("x.toml", text).expect_err("it is not TOML");
             let [finding] = &findings[..] else { panic!("{text}: {findings:#?}") };
