@@ -71,10 +71,14 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
 
 /// What estimators say of their results before they have any, such as light that they cannot sample.
 fn notes(plan: &Plan) -> String {
+    let console = Console::of_output();
     let passes = plan.jobs.iter().filter_map(Job::passes);
     let of_job = |job: &Passes| {
         let name = job.arm.name.clone();
-        job.estimator.notes().into_iter().map(move |note| format!("\nnote: {name}: {note}"))
+        job.estimator
+            .notes()
+            .into_iter()
+            .map(move |note| console.wrapped(&format!("note: {name}: {note}"), usize::MAX))
     };
     let mut notes: Vec<String> = Vec::new();
     for note in passes.flat_map(of_job) {
@@ -82,7 +86,7 @@ fn notes(plan: &Plan) -> String {
             notes.push(note);
         }
     }
-    notes.concat()
+    notes.iter().map(|note| format!("\n{note}")).collect()
 }
 
 /// That a run would be refused for its memory, which is no mistake of the file but a limit of this machine.

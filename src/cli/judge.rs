@@ -316,12 +316,12 @@ fn tell(
     )?;
     let means = verdicts.iter().filter(|v| v.observable == "mean").filter_map(|v| v.detectable);
     if let Some(worst) = means.filter(|d| d.is_finite()).max_by(f64::total_cmp) {
-        writeln!(
-            out,
+        let power = format!(
             "bias of an image mean that would have been found (99 % power): {}; `detectable` is relative \
              to the image mean",
             per_cent(worst)
-        )?;
+        );
+        writeln!(out, "{}", console.wrapped(&power, usize::MAX))?;
     }
     if verdicts.iter().any(|v| matches!(v.outcome, Outcome::Invalid(_) | Outcome::Underpowered)) {
         let advice = "undecided: images with further seeds narrow the images' side; a larger budget of the \

@@ -71,8 +71,7 @@ fn tell(
         writeln!(out, "about {:.0} s on {threads} threads", total / threads as f64)?;
     }
     let free = available().map_or("unknown".into(), |available| available.words());
-    writeln!(
-        out,
+    let sums = format!(
         "memory: {} (shapes {}, making them {}, guides {}, results {}, working {}); available: {free}",
         readable(memory.total()),
         readable(memory.shapes),
@@ -80,7 +79,8 @@ fn tell(
         readable(memory.guides),
         readable(memory.results),
         readable(memory.working)
-    )
+    );
+    writeln!(out, "{}", Console::of_output().wrapped(&sums, usize::MAX))
 }
 
 fn tell_origins(origins: &[(String, String, String)], out: &mut impl Write) -> io::Result<()> {

@@ -77,7 +77,7 @@ fn figures(figures: &[FigureBlock]) -> String {
 }
 
 /// Longer fields of a table, in bytes, are broken into lines.
-const LONGEST_LINE: usize = 72;
+const LONGEST_LINE: usize = 40;
 
 /// A table with its caption, and its text for a paper, a spreadsheet or a page.
 fn table(of: &TableBlock) -> String {
