@@ -222,6 +222,8 @@ impl Refusals {
     pub(crate) fn none_in(self, cells: usize) -> Result<()> {
         let told = |(mut finding, mut labels): (Diagnostic, Vec<String>)| {
             labels.dedup();
+            // A finding about the whole experiment has no cell.
+            labels.retain(|label| !label.is_empty());
             match &labels[..] {
                 several if several.len() >= cells => {}
                 [one] => finding.rule += &format!(" (cell `{one}`)"),

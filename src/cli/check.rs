@@ -8,7 +8,9 @@ use super::output::unwritable;
 use super::{Reading, counted, experiment_files};
 use crate::error::{Diagnostic, Error, Result};
 use crate::experiment::{Experiment, LoadOptions, Registry, load};
-use crate::run::plan;
+use crate::run::job::{Job, Passes};
+use crate::run::memory_limits::available;
+use crate::run::{Options, Plan, plan};
 
 /// Validate experiment files and report all errors.
 ///
@@ -38,8 +40,9 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
             let others: &[String] = if options.setting.is_some() { &[] } else { &experiment.settings };
             let planned = |setting| plan(&load_setting(setting)?, registry);
             let mut wrong: Vec<Diagnostic> = Vec::new();
-            for planned in std::iter::once(plan(&experiment, registry)).chain(others.iter().map(planned))
-            {
+            let own = plan(&experiment, registry);
+            let remarks = own.as_ref().map_or(String::new(), |plan| notes(plan) + &too_large(plan));
+            for planned in std::iter::once(own).chain(others.iter().map(planned)) {
                 match planned {
                     Err(Error::Input(more)) => {
                         let new = |one: &Diagnostic| !wrong.contains(one);
@@ -49,12 +52,12 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
                     planned => drop(planned?),
                 }
             }
-            if wrong.is_empty() { Ok(experiment) } else { Err(Error::Input(wrong)) }
+            if wrong.is_empty() { Ok((experiment, remarks)) } else { Err(Error::Input(wrong)) }
         });
         match checked {
-            Ok(experiment) => {
+            Ok((experiment, remarks)) => {
                 let ok = Console::of_output().verdict("ok", true);
-                writeln!(out, "{}: {ok}, {}", path.display(), summary(&experiment))
+                writeln!(out, "{}: {ok}, {}{remarks}", path.display(), summary(&experiment))
                     .map_err(unwritable)?;
             }
             Err(error) => match error.of_input("everything that an experiment reads must be there") {
@@ -64,6 +67,34 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
         }
     }
     if findings.is_empty() { Ok(()) } else { Err(Error::Input(findings)) }
+}
+
+/// What estimators say of their results before they have any, such as light that they cannot sample.
+fn notes(plan: &Plan) -> String {
+    let console = Console::of_output();
+    let passes = plan.jobs.iter().filter_map(Job::passes);
+    let of_job = |job: &Passes| {
+        let name = job.arm.name.clone();
+        job.estimator
+            .notes()
+            .into_iter()
+            .map(move |note| console.wrapped(&format!("note: {name}: {note}"), usize::MAX))
+    };
+    let mut notes: Vec<String> = Vec::new();
+    for note in passes.flat_map(of_job) {
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
+    notes.iter().map(|note| format!("\n{note}")).collect()
+}
+
+/// That a run would be refused for its memory, which is no mistake of the file but a limit of this machine.
+fn too_large(plan: &Plan) -> String {
+    // A run takes the estimators of a cell one after the other where there is no room for all of them.
+    let memory = plan.memory(Options::new("").threads, false);
+    let words = memory.check(available()).err().map(|error| error.to_string());
+    words.map_or(String::new(), |words| format!("\n{}", words.replacen("error", "on this machine", 1)))
 }
 
 fn summary(experiment: &Experiment) -> String {
@@ -105,9 +136,29 @@ mod tests {
     fn good_files_are_summed_up() {
         let (out, result) = check(&[GOOD]);
         assert!(
-            result.is_ok() && out.ends_with("0.toml: ok, 1 cell, 1 estimator, 3 bands, 0 claims\n"),
+            result.is_ok() && out.contains("0.toml: ok, 1 cell, 1 estimator, 3 bands, 0 claims\n"),
             "{out}"
         );
+        assert!(
+            out.ends_with("its share is excluded from this estimator's result (exactly 0)\n"),
+            "{out}"
+        );
+        assert_eq!(out.matches("note: mis: path cannot sample directional light").count(), 1, "{out}");
+    }
+
+    #[test]
+    fn what_no_machine_holds_is_told() {
+        let image = "{ orthographic = { resolution = [16000, 16000], center_mm = [0, 0, 5], toward = [0, 0, -1], \
+                     up = [0, 1, 0], width_mm = 2.5 } }";
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("large.toml");
+        std::fs::write(&path, format!("{GOOD}[setting.large]\nsensor = {image}\n"))
+            .expect("it is written");
+        let reading = Reading { set: Vec::new(), setting: Some("large".into()) };
+        let mut out = Vec::new();
+        run(&Args { files: vec![path], reading }, &Registry::builtin(), &mut out).expect("it is sound");
+        let out = String::from_utf8(out).expect("it is text");
+        assert!(out.contains("on this machine: the run would need") || available().is_none(), "{out}");
     }
 
     #[test]

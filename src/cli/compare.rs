@@ -107,6 +107,7 @@ pub(super) fn run(args: &Args, out: &mut impl Write) -> Result<u8> {
 }
 
 fn tell(compared: &Compared, args: &Args, out: &mut impl Write) -> std::io::Result<()> {
+    let console = Console::of_output();
     if !compared.changes.is_empty() {
         writeln!(out, "differences between the two records:")?;
         compared.changes.iter().try_for_each(|change| writeln!(out, "  {change}"))?;
@@ -118,7 +119,6 @@ fn tell(compared: &Compared, args: &Args, out: &mut impl Write) -> std::io::Resu
         // Every row is of the same claim.
         let rows: Vec<Verdict> =
             shown.into_iter().map(|v| Verdict { claim: String::new(), ..v }).collect();
-        let console = Console::of_output();
         writeln!(out, "{}", console.outcomes(&console.laid_out(&verdict_table(&rows))))?;
     }
     let all = compared.verdicts.len();
@@ -127,20 +127,23 @@ fn tell(compared: &Compared, args: &Args, out: &mut impl Write) -> std::io::Resu
     if identical == all {
         writeln!(out, "identical: all {all} quantities, bit for bit")?;
     } else {
-        let work = work_table(&compared.work).to_text();
-        writeln!(out, "work and variance, after over before:\n{work}")?;
+        let work = console.laid_out(&work_table(&compared.work));
         writeln!(
             out,
+            "work and variance, after over before; counts that stayed the same are left out\n{work}"
+        )?;
+        let sums = format!(
             "{green} of {all} quantities are green, {identical} of them identical bit for bit; \
              family-wise level {:e} (Holm)",
             args.level
-        )?;
+        );
+        writeln!(out, "{}", console.wrapped(&sums, usize::MAX))?;
         if let Some(worst) = coarsest(compared) {
-            writeln!(
-                out,
+            let power = format!(
                 "largest change of a first observable that could have gone unseen (99 % power): {} %",
                 significant(100.0 * worst, 2)
-            )?;
+            );
+            writeln!(out, "{}", console.wrapped(&power, usize::MAX))?;
         }
     }
     for work in compared.work.iter().filter(|work| work.too_slow.is_some()) {
@@ -219,6 +222,10 @@ fn work_table(work: &[WorkChange]) -> Table {
     let mut names: Vec<&str> = work.iter().flat_map(|w| w.counts.keys().map(String::as_str)).collect();
     names.sort_unstable();
     names.dedup();
+    // A counter that neither side needs stays at 1, as one that did not change.
+    let is_other =
+        |name: &&str| work.iter().any(|w| w.counts.get(*name).is_none_or(|ratio| *ratio != 1.0));
+    names.retain(is_other);
     let mut header = vec!["cell", "estimator"];
     header.extend(&names);
     header.extend(["variance", "variance x rays"]);

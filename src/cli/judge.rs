@@ -13,7 +13,10 @@ use crate::report::tables::verdict_table;
 use crate::results::exr_file::{Part, read_exr, write_parts};
 use crate::results::image::write_diverging_png;
 use crate::results::store::{RecordFolder, Stored};
-use crate::results::{atomic, record::EstimatorRun};
+use crate::results::{
+    atomic,
+    record::{Cell, EstimatorRun},
+};
 use crate::verify::foreign::efficiency::{Ratio, ratios};
 use crate::verify::foreign::images::{Planes, planes};
 use crate::verify::foreign::{Answer, LEVEL, PixelMap, Question, judge, run_of};
@@ -155,10 +158,15 @@ fn cell(stored: &Stored, label: Option<&str>) -> Result<usize> {
             format!("the record has {} cells", cells.len()),
             format!("select one with --cell: {}", labels()),
         )),
-        Some(label) => cells.iter().position(|c| plain(&c.label) == plain(label)).ok_or_else(|| {
-            let rule = format!("the record has no cell `{label}`");
-            Error::input_help(rule, format!("it has {}", labels()))
-        }),
+        Some(label) => {
+            // As the record names it, or as `run` prints it: `alpha = 0.1`.
+            let is_meant =
+                |c: &Cell| [&c.label, &c.title()].iter().any(|known| plain(known) == plain(label));
+            cells.iter().position(is_meant).ok_or_else(|| {
+                let rule = format!("the record has no cell `{label}`");
+                Error::input_help(rule, format!("it has {}", labels()))
+            })
+        }
     }
 }
 
@@ -296,7 +304,7 @@ fn tell(
     let console = Console::of_output();
     write!(out, "{}", console.outcomes(&console.laid_out(&verdict_table(&rows))))?;
     for note in &answer.notes {
-        writeln!(out, "note: {note}")?;
+        writeln!(out, "{}", console.wrapped(&format!("note: {note}"), usize::MAX))?;
     }
     let green = verdicts.iter().filter(|v| v.is_green()).count();
     writeln!(
@@ -308,12 +316,17 @@ fn tell(
     )?;
     let means = verdicts.iter().filter(|v| v.observable == "mean").filter_map(|v| v.detectable);
     if let Some(worst) = means.filter(|d| d.is_finite()).max_by(f64::total_cmp) {
-        writeln!(
-            out,
+        let power = format!(
             "bias of an image mean that would have been found (99 % power): {}; `detectable` is relative \
              to the image mean",
             per_cent(worst)
-        )?;
+        );
+        writeln!(out, "{}", console.wrapped(&power, usize::MAX))?;
+    }
+    if verdicts.iter().any(|v| matches!(v.outcome, Outcome::Invalid(_) | Outcome::Underpowered)) {
+        let advice = "undecided: images with further seeds narrow the images' side; a larger budget of the \
+                      record narrows the record's, and where that has a heavy tail nothing else helps";
+        writeln!(out, "{}", console.wrapped(advice, usize::MAX))?;
     }
     if args.seconds.is_empty() {
         return Ok(());

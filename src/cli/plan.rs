@@ -42,9 +42,12 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
     let experiment = load(&args.file, &args.reading.options(), registry)?;
     let plan = run::plan(&experiment, registry)?;
     let threads = args.threads.unwrap_or_else(|| run::Options::new("").threads);
-    let memory = plan.memory(threads, true);
+    let available = available();
+    // As a run does: the estimators of a cell by turns where there is room for all of them.
+    let is_interleaved = plan.memory(threads, true).fits(available);
+    let memory = plan.memory(threads, is_interleaved);
     tell(args, &experiment, &plan, threads, &memory, out).map_err(unwritable)?;
-    memory.check(available())?;
+    memory.check(available)?;
     Ok(0)
 }
 
@@ -68,8 +71,7 @@ fn tell(
         writeln!(out, "about {:.0} s on {threads} threads", total / threads as f64)?;
     }
     let free = available().map_or("unknown".into(), |available| available.words());
-    writeln!(
-        out,
+    let sums = format!(
         "memory: {} (shapes {}, making them {}, guides {}, results {}, working {}); available: {free}",
         readable(memory.total()),
         readable(memory.shapes),
@@ -77,7 +79,8 @@ fn tell(
         readable(memory.guides),
         readable(memory.results),
         readable(memory.working)
-    )
+    );
+    writeln!(out, "{}", Console::of_output().wrapped(&sums, usize::MAX))
 }
 
 fn tell_origins(origins: &[(String, String, String)], out: &mut impl Write) -> io::Result<()> {

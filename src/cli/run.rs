@@ -8,8 +8,8 @@ use super::console::Console;
 use super::output::{say, unwritable};
 use super::{Reading, Working, counted, experiment_files, listen};
 use crate::error::Result;
+use crate::experiment::load;
 use crate::experiment::registry::Registry;
-use crate::experiment::{load, titled};
 use crate::report::ReportData;
 use crate::report::number::significant;
 use crate::report::{self, terminal};
@@ -104,7 +104,7 @@ pub(super) fn tell(
     let mut table = terminal::run_table(material);
     for row in &mut table.rows {
         if let Some(cell) = record.cells.iter().find(|cell| cell.label == row[0]) {
-            row[0] = titled(&cell.axes, &cell.label);
+            row[0] = cell.title();
         }
     }
     let less = ["observable", "paths/s/core", "CPU s"];
@@ -167,8 +167,13 @@ fn tell_ratios(material: &ReportData, console: Console, out: &mut impl Write) ->
     }
     for (candidate, baseline) in pairs {
         let own = rows.iter().filter(|row| row.candidate == candidate && row.baseline == baseline);
-        let ratios: Vec<f64> = own.filter_map(|row| row.quoted()).map(|[ratio, ..]| ratio).collect();
+        let ratios: Vec<f64> =
+            own.clone().filter_map(|row| row.quoted()).map(|[ratio, ..]| ratio).collect();
         if ratios.is_empty() {
+            let first = rows.iter().find(|row| row.candidate == candidate && row.baseline == baseline);
+            let reason = first.map_or("", |row| terminal::reason(row));
+            let line = format!("no ratio of the efficiencies of {candidate} and {baseline}: {reason}");
+            writeln!(out, "{}", console.wrapped(&line, usize::MAX))?;
             continue;
         }
         // The better one first.
@@ -183,7 +188,17 @@ fn tell_ratios(material: &ReportData, console: Console, out: &mut impl Write) ->
         .map(|x| significant(x, 2));
         let times = if least == most { least } else { format!("{least} to {most}") };
         let line = format!("{first} is {times} times as efficient as {second}");
-        writeln!(out, "{}", console.verdict(&line, true))?;
+        let (of, open) =
+            (own.clone().count(), own.filter(|row| row.quoted().is_some() && !row.resolved));
+        let mut limits = String::new();
+        if ratios.len() < of {
+            limits += &format!("; without a ratio: {} of {of} bands and cells", of - ratios.len());
+        }
+        match open.count() {
+            0 => {}
+            open => limits += &format!("; not resolved: {open} of {}", ratios.len()),
+        }
+        writeln!(out, "{}{limits}", console.verdict(&line, limits.is_empty()))?;
     }
     Ok(())
 }

@@ -8,6 +8,7 @@ use serde_json::json;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Error as TomlError};
 
+use super::syntax;
 use crate::error::{Diagnostic, Place};
 
 /// What kind of input a value was read from.
@@ -177,6 +178,7 @@ pub(crate) fn parse(name: &str, text: &str) -> Result<Node, Vec<Diagnostic>> {
     let mut findings: Vec<Diagnostic> = errors.iter().map(|e| reader.syntax_error(e)).collect();
     let span = table.span();
     let root = reader.table(table.get_ref(), span, &mut findings);
+    syntax::keep_first_of_lines(&mut findings);
     if findings.is_empty() { Ok(root) } else { Err(findings) }
 }
 
@@ -286,8 +288,7 @@ impl Reader {
     }
 
     fn syntax_error(&self, error: &TomlError) -> Diagnostic {
-        let place = self.place(error.span().unwrap_or(0..0));
-        Diagnostic { rule: error.message().to_string(), place: Some(place), help: None }
+        syntax::finding(error.message(), self.place(error.span().unwrap_or(0..0)))
     }
 
     fn table(&self, table: &DeTable, span: Range<usize>, findings: &mut Vec<Diagnostic>) -> Node {

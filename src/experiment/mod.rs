@@ -77,12 +77,16 @@ mod sweep_csv;
 /// Axes and points as types.
 mod sweep_point;
 
+/// Slips of the pen in TOML.
+mod syntax;
+
 /// The walk along the schema.
 pub(crate) mod validate;
 
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub(crate) use crate::results::record::titled;
 pub use registry::Registry;
 pub(crate) use sources::Sources;
 pub(crate) use sweep::resolve_path;
@@ -175,13 +179,6 @@ impl Experiment {
         let own = self.cells.get(cell).and_then(|cell| cell.estimator.as_ref());
         own.and_then(|list| list.get(entry)).unwrap_or(&self.file.estimator[entry])
     }
-}
-
-/// A cell by its place on the axes of the sweep, as `alpha = 0.1, g = 0.8`; the label itself where there is
-/// no sweep.
-pub(crate) fn titled(axes: &BTreeMap<String, String>, label: &str) -> String {
-    let words: Vec<String> = axes.iter().map(|(axis, label)| format!("{axis} = {label}")).collect();
-    if words.is_empty() { label.into() } else { words.join(", ") }
 }
 
 impl From<&sweep::SweepAxis> for Axis {

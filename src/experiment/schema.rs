@@ -30,8 +30,8 @@ pub struct ExperimentFile {
     /// What the experiment shows, for reports.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub description: Option<String>,
-    /// Root of all random streams, to draw another sample; by default the streams depend on the name and
-    /// content of the experiment alone.
+    /// Root of all random streams, to draw another sample.
+    /// By default the streams depend on the name and content of the experiment alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 9223372036854775807u64))]
     pub seed: Option<u64>,
@@ -190,8 +190,8 @@ pub enum ShapeEntry {
         /// Unit of the file's numbers; by default mm.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         unit: Option<LengthUnit>,
-        /// Scales the longest side of the bounding box to this, and centres the box at the origin; by default
-        /// the mesh keeps its size and place.
+        /// Scales the longest side of the bounding box to this, and centres the box at the origin.
+        /// By default the mesh keeps its size and place.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(extend("exclusiveMinimum" = 0))]
         longest_side_mm: Option<f64>,

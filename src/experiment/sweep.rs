@@ -208,7 +208,9 @@ fn unique_labels(points: &[AxisPoint], findings: &Findings) -> bool {
     let mut labels = BTreeSet::new();
     let twice: Vec<&AxisPoint> = points.iter().filter(|point| !labels.insert(&point.label)).collect();
     for point in &twice {
-        findings.at(&point.place, format!("label `{}` occurs twice on the axis", point.label), None);
+        let help = "drop one of the two, or give rows a `label` each";
+        let rule = format!("label `{}` occurs twice on the axis", point.label);
+        findings.at(&point.place, rule, Some(help.into()));
     }
     twice.is_empty()
 }
@@ -278,7 +280,8 @@ fn not_overridden(
         if let Some((axis, _)) = swept.iter().find(|(_, swept)| is_within(key, swept)) {
             sound = false;
             let rule = format!("`{key}` has no effect: the sweep `{axis}` sets it in every cell");
-            findings.at(place, rule, None);
+            let help = "drop it, or set the values of the sweep, as `--set sweep.0.values=[0.5]`";
+            findings.at(place, rule, Some(help.into()));
         }
     }
     sound

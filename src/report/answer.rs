@@ -6,6 +6,7 @@ use super::document::{BadgeKind, FigureBlock, PageBlock};
 use super::number::significant;
 use super::split;
 use super::summary::chosen;
+use super::terminal::reason;
 use crate::error::Result;
 use crate::results::record::{CostMeasure, EstimatorRun, PIXELS};
 use crate::results::store::{RecordFolder, Stored};
@@ -139,13 +140,16 @@ impl PairRows<'_> {
         }
         let known = quoted.len() + if quoted.is_empty() { bounds.len() } else { 0 };
         if known < self.rows.len() {
-            let missing = self.rows.iter().find(|row| row.quoted().is_none());
+            let mut missing =
+                self.rows.iter().filter(|row| row.quoted().is_none()).map(|row| reason(row));
+            let first = missing.next().unwrap_or_default();
+            // Numbers that hold for all of them are told, and no others.
+            let is_of_all = missing.all(|reason| reason == first);
             let reason =
-                missing.map_or("", |row| row.note.strip_prefix("no mean test: ").unwrap_or(&row.note));
-            let reason = reason.split(':').next().unwrap_or_default();
+                if is_of_all { Some(first) } else { first.split(':').next() }.unwrap_or_default();
             text += &match (known, self.rows.len()) {
                 (0, 1) => format!(": {reason}"),
-                (0, all) => format!(", in none of {all} bands and cells: {reason}"),
+                (0, all) => format!(" in any of {all} bands and cells: {reason}"),
                 (_, all) => {
                     format!("; in {} of {all} bands and cells there is no ratio: {reason}", all - known)
                 }
@@ -153,7 +157,10 @@ impl PairRows<'_> {
         }
         let loose = self.rows.iter().filter(|row| row.quoted().is_some() && !row.resolved).count();
         if loose > 0 {
-            text += &format!("; {loose} of {} ratios are not resolved", quoted.len());
+            text += &match quoted.len() {
+                1 => "; the ratio is not resolved".to_string(),
+                all => format!("; {loose} of {all} ratios are not resolved"),
+            };
         }
         text += &self.agreement(stored).map_or(".".into(), |bound| {
             format!(
@@ -292,7 +299,7 @@ mod tests {
         );
         sample::set_observables(&mut stored, "snee", |i, _, _| 1.3 + 0.05 * sample::uniform(i + 7000));
         let text = told(&stored);
-        assert!(text.contains("is not known, in none of 2 bands and cells: the means differ"), "{text}");
+        assert!(text.contains("is not known in any of 2 bands and cells: the means differ"), "{text}");
         assert!(!text.contains("agree"), "{text}");
         let rows = comparisons(&stored);
         assert_eq!(lead_pair(&stored, &rows).expect("a pair").2, "", "no ratio in the picture");

@@ -77,6 +77,9 @@ fn figures(figures: &[FigureBlock]) -> String {
     format!("<div class=\"figures\">\n{}</div>\n", figures.iter().map(figure).collect::<String>())
 }
 
+/// Longer fields of a table, in bytes, are broken into lines.
+const LONGEST_LINE: usize = 40;
+
 /// A table with its caption, and its text for a paper, a spreadsheet or a page.
 fn table(of: &TableBlock) -> String {
     let TableBlock { name, caption, table } = of;
@@ -91,7 +94,8 @@ fn table(of: &TableBlock) -> String {
         .enumerate()
         .map(|(c, h)| format!("<th scope=\"col\"{}>{}</th>", class(c), escape(h)));
     let row = |row: &Vec<String>| {
-        let fields = row.iter().enumerate().map(|(c, f)| format!("<td{}>{}</td>", class(c), field(f)));
+        let of = |c: usize, f: &str| if f.len() > LONGEST_LINE { " class=\"long\"" } else { class(c) };
+        let fields = row.iter().enumerate().map(|(c, f)| format!("<td{}>{}</td>", of(c, f), field(f)));
         format!("<tr>{}</tr>\n", fields.collect::<String>())
     };
     let caption = match caption.is_empty() {

@@ -220,9 +220,10 @@ fn measured(data: &ReportData) -> Vec<PageBlock> {
         let rows: Vec<&Measurement> = data.rows.iter().filter(|row| row.cell == cell.label).collect();
         let table = named(&format!("measurements-{index:03}"), measurement_table(&rows, &bands));
         let is_long = record.cells.len() > OPEN_CELLS || rows.len() / bands.len().max(1) > OPEN_ROWS;
-        let title = if record.cells.len() == 1 { "All measurements" } else { &cell.label };
+        let named_cell = cell.title();
+        let title = if record.cells.len() == 1 { "All measurements" } else { &named_cell };
         if !is_long && record.cells.len() > 1 {
-            blocks.push(PageBlock::Heading(3, cell.label.clone()));
+            blocks.push(PageBlock::Heading(3, named_cell.clone()));
         }
         blocks.extend(folded_if(is_long, title, vec![table]));
     }
@@ -316,9 +317,13 @@ fn cost(data: &ReportData) -> Vec<PageBlock> {
 
 fn notes(data: &ReportData) -> Vec<PageBlock> {
     let mut items = Vec::new();
-    for cell in &data.stored.record.cells {
+    let cells = &data.stored.record.cells;
+    for cell in cells {
         for run in &cell.runs {
-            let place = format!("{} {}", cell.label, run.estimator);
+            let place = match cells.len() {
+                1 => run.estimator.clone(),
+                _ => format!("{}, {}", cell.title(), run.estimator),
+            };
             let counted = run.anomalies.iter().filter(|(_, count)| **count > 0);
             items.extend(counted.map(|(name, count)| {
                 format!("{}: {count} of `{name}`{}", place.trim(), of_paths(run, *count))

@@ -168,8 +168,10 @@ pub(super) fn lead(
     if grid.zoom > 1 {
         caption += &format!(" A pixel is shown as {0} x {0}.", grid.zoom);
     }
-    let place =
-        if stored.record.cells.len() > 1 { format!("Cell {}. ", cell.1.label) } else { String::new() };
+    let place = match stored.record.cells.len() {
+        0 | 1 => String::new(),
+        _ => format!("Cell {}. ", cell.1.title()),
+    };
     Ok(FigureBlock { path, picture: PictureFile::Png(png), title, caption: place + &caption })
 }
 

@@ -83,6 +83,11 @@ pub(crate) fn efficiency_rows(data: &ReportData) -> Vec<&EfficiencyRow> {
     Some(by(CostMeasure::Cpu)).filter(has_ratio).unwrap_or_else(|| by(CostMeasure::Counters))
 }
 
+/// Why a row has no ratio.
+pub(crate) fn reason(row: &EfficiencyRow) -> &str {
+    row.note.strip_prefix("no mean test: ").unwrap_or(&row.note)
+}
+
 /// A text in lines of at most `width` characters, broken at blanks.
 pub(crate) fn wrapped(text: &str, width: usize) -> String {
     let (mut lines, mut length) = (String::new(), 0);
@@ -103,34 +108,64 @@ pub(crate) fn wrapped(text: &str, width: usize) -> String {
 
 /// Notes of estimators and counts of anomalies, each once, with its cells.
 pub(crate) fn notes(data: &ReportData) -> Vec<String> {
-    let mut lines: Vec<(String, Vec<String>)> = Vec::new();
-    let mut add = |text: String, cell: &str| match lines.iter_mut().find(|(known, _)| *known == text) {
-        Some((_, cells)) => cells.push(cell.to_string()),
-        None => lines.push((text, vec![cell.to_string()])),
-    };
-    for cell in &data.stored.record.cells {
+    fn add<T>(lines: &mut Vec<(String, Vec<T>)>, text: String, of_cell: T) {
+        match lines.iter_mut().find(|(known, _)| *known == text) {
+            Some((_, cells)) => cells.push(of_cell),
+            None => lines.push((text, vec![of_cell])),
+        }
+    }
+    let record = &data.stored.record;
+    let (mut notes, mut anomalies) = (Vec::new(), Vec::new());
+    for cell in &record.cells {
         for run in &cell.runs {
-            run.notes.iter().for_each(|note| add(format!("{}: {note}", run.estimator), &cell.label));
-            for (name, _) in run.anomalies.iter().filter(|(_, count)| **count > 0) {
-                let total = run.cost.get("paths").copied().unwrap_or(0);
-                let count = run.anomalies[name];
-                add(format!("{}: {count} of `{name}` in {total} paths", run.estimator), &cell.label);
+            let own = run.notes.iter().map(|note| format!("{}: {note}", run.estimator));
+            own.for_each(|note| add(&mut notes, note, cell.title()));
+            let paths = run.cost.get("paths").copied().unwrap_or(0);
+            for (name, count) in run.anomalies.iter().filter(|(_, count)| **count > 0) {
+                let share = *count as f64 / paths as f64;
+                add(&mut anomalies, format!("{}: `{name}`", run.estimator), (*count, share));
             }
         }
     }
-    if data.stored.has_foreign_timing {
-        add(FOREIGN_TIMING.into(), "");
-    }
-    let line = |(text, cells): (String, Vec<String>)| {
-        let cells: Vec<String> = cells.into_iter().filter(|cell| !cell.is_empty()).collect();
-        if cells.is_empty() { text } else { format!("{text} [{}]", cells.join("; ")) }
+    let is_swept = record.cells.len() > 1;
+    let note = |(text, cells): (String, Vec<String>)| match is_swept {
+        true => format!("{text} [{}]", cells.join("; ")),
+        false => text,
     };
-    lines.into_iter().map(line).collect()
+    let mut lines: Vec<String> = notes.into_iter().map(note).collect();
+    lines.extend(anomalies.into_iter().map(|(text, cells)| text + &shares(&cells, is_swept)));
+    lines.extend(data.stored.has_foreign_timing.then(|| FOREIGN_TIMING.into()));
+    lines
+}
+
+/// How often something happened in so many cells: counts, and between what shares of the paths they are.
+fn shares(cells: &[(u64, f64)], is_swept: bool) -> String {
+    let all: u64 = cells.iter().map(|(count, _)| count).sum();
+    let least = cells.iter().map(|(_, share)| *share).fold(f64::INFINITY, f64::min);
+    let most = cells.iter().map(|(_, share)| *share).fold(0.0, f64::max);
+    let [least, most] = [least, most].map(|share| significant(100.0 * share, 2));
+    let times = if all == 1 { "time" } else { "times" };
+    let of = if is_swept { format!(", in {} cells", cells.len()) } else { String::new() };
+    match most.parse::<f64>().is_ok_and(f64::is_finite) {
+        true if least == most => format!(" {all} {times}, in {most} % of paths{of}"),
+        true => format!(" {all} {times}, in {least} to {most} % of paths{of}"),
+        false => format!(" {all} {times}{of}"),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shares_of_cells_are_told_together() {
+        assert_eq!(shares(&[(20, 0.05)], false), " 20 times, in 5.0 % of paths");
+        assert_eq!(
+            shares(&[(20, 0.05), (25, 0.0625)], true),
+            " 45 times, in 5.0 to 6.2 % of paths, in 2 cells"
+        );
+        assert_eq!(shares(&[(1, f64::INFINITY)], false), " 1 time");
+    }
 
     #[test]
     fn lines_are_broken_at_blanks() {

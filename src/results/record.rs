@@ -98,7 +98,19 @@ pub struct Cell {
     pub runs: Vec<EstimatorRun>,
 }
 
+/// A cell by its place on the axes of the sweep, as `alpha = 0.1, g = 0.8`; the label itself where there is
+/// no sweep.
+pub(crate) fn titled(axes: &BTreeMap<String, String>, label: &str) -> String {
+    let words: Vec<String> = axes.iter().map(|(axis, label)| format!("{axis} = {label}")).collect();
+    if words.is_empty() { label.into() } else { words.join(", ") }
+}
+
 impl Cell {
+    /// Its place on the axes of the sweep, for people.
+    pub(crate) fn title(&self) -> String {
+        titled(&self.axes, &self.label)
+    }
+
     /// The region that an observable measures with all lights together; none for one light's share of a
     /// region.
     pub fn region_of(&self, observable: &Observable) -> Option<&ObservedRegion> {

@@ -24,7 +24,8 @@ pub(crate) fn bands(at: At, bands: &BandsEntry) {
             for (i, band) in list.iter().enumerate() {
                 let at = at.to("explicit").item(i);
                 if !names.insert(&band.name) {
-                    at.to("name").report(format!("two bands are named `{}`", band.name));
+                    let rule = format!("two bands are named `{}`", band.name);
+                    at.to("name").report_help(rule, "give each a name of its own");
                 }
                 range(at, band);
             }

@@ -72,6 +72,12 @@ pub(crate) fn claim(at: At, claim: &ClaimEntry, known: &Known) {
             "write `expect = \"fails\"`",
         );
     }
+    if (claim.equals.is_some() || claim.agree.is_some()) && claim.expect == Some(Expect::Fails) {
+        at.to("expect").report_help(
+            "`fails` is about efficiency, and this claim is about means",
+            "write `expect = \"differs\"`",
+        );
+    }
     if let Some(differs) = &claim.differs {
         let (names, across, only) = (&differs.estimators, &differs.across, &differs.only);
         pairs(at.to("differs"), names, across.as_deref(), only, known);

@@ -43,7 +43,8 @@ pub(crate) fn names(at: At, entries: &Node, what: &str) {
     for (i, entry) in entries.items().iter().enumerate() {
         let Some(name) = entry.get("name").and_then(Node::as_str) else { continue };
         if !seen.insert(name) {
-            at.item(i).to("name").report(format!("two {what} are named `{name}`"));
+            let rule = format!("two {what} are named `{name}`");
+            at.item(i).to("name").report_help(rule, "give each a name of its own");
         }
         if let Some(sign) = name.chars().find(|c| "/\\".contains(*c) || c.is_control()) {
             at.item(i).to("name").report_help(

@@ -17,7 +17,8 @@ pub(crate) fn lights(at: At, entry: &BandsEntry, emits: bool) {
         let at = at.item(i);
         let name = light.name.clone().unwrap_or_else(|| format!("light_{}", i + 1));
         if !names.insert(name.clone()) {
-            at.to("name").report(format!("two lights are named `{name}`"));
+            let rule = format!("two lights are named `{name}`");
+            at.to("name").report_help(rule, "give each a name of its own");
         }
         if emits && name == Scene::EMISSION {
             at.to("name").report_help(

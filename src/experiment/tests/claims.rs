@@ -20,7 +20,18 @@ fn accepted(text: &str) {
 #[test]
 fn estimators_have_unique_names() {
     let message = refused_with("[[estimator]]\nname = \"mis\"\nsnee = {}\n");
-    holds(&message, "two estimators are named `mis`", "15:8", "");
+    holds(&message, "two estimators are named `mis`", "15:8", "a name of its own");
+}
+
+#[test]
+fn only_claims_of_efficiency_expect_a_failure() {
+    let message = claim(
+        "agree = { estimators = [\"mis\"], across = \"radius_mm\", detect = 1 }\nexpect = \"fails\"",
+    );
+    assert!(
+        message.contains("`fails` is about efficiency") && message.contains("\"differs\""),
+        "{message}"
+    );
 }
 
 #[test]

@@ -144,6 +144,16 @@ impl<'a> SchemaWalk<'a> {
                 };
                 help = Some(help.map_or(of.clone(), |doc| format!("{of}. {doc}")));
             }
+            (Value::String(text), _) if text.ends_with(".csv") && types.contains(&"a table") => {
+                help = Some(format!(
+                    "a column of a file is `{{ csv = {{ path = \"{text}\", wavelength = \"COLUMN\", unit = \
+                     \"nm\", column = \"COLUMN\", interpolation = \"linear\" }} }}`"
+                ));
+            }
+            (Value::String(text), _) if text.parse::<f64>().is_ok_and(f64::is_finite) => {
+                let is_number = types.iter().any(|name| ["an integer", "a number"].contains(name));
+                help = is_number.then(|| format!("write {text}, without quotes")).or(help);
+            }
             _ => {}
         }
         self.report(node.place(), rule, help);
@@ -315,9 +325,12 @@ impl<'a> SchemaWalk<'a> {
             0 if self.lenient => return,
             0 => format!("exactly one of {} is needed, found none", suggest::quoted(names)),
             1 => return,
+            // One that is unknown is told at its own place.
+            _ if given.iter().any(|name| !names.contains(name)) => return,
             _ => format!("only one kind may be given, found {}", suggest::quoted(&given)),
         };
-        self.report(node.place(), rule, None);
+        let help = (!given.is_empty()).then(|| "keep one of them, and remove the others".to_string());
+        self.report(node.place(), rule, help);
     }
 
     fn unknown_variant(&mut self, place: &Place, name: &str, names: &[&str]) {

@@ -71,7 +71,7 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> Vec<PlotFigure> {
         let plot = Plot::small(PlotAxis::log(price.label), PlotAxis::log("relative RMS error"), series);
         let name = format!("error-{}-{index:03}", price.name);
         let caption = format!("Against {}.", price.label);
-        is_measured.then(|| PlotFigure::of(name, cell.label.clone(), caption, plot))
+        is_measured.then(|| PlotFigure::of(name, cell.title(), caption, plot))
     };
     PRICES.iter().filter_map(plot).collect()
 }

@@ -41,7 +41,7 @@ fn figure(
     let (x_mm, z_mm) = (plane.x_mm, plane.z_mm);
     Some(PlotFigure {
         name: format!("guide-{index:03}-{}-{}", slug(&run.estimator), band + 1),
-        title: joined(&[&cell.label, &run.estimator, band_name(stored, band)]),
+        title: joined(&[&cell.title(), &run.estimator, band_name(stored, band)]),
         caption: String::new(),
         content: Content::Slice(SlicePlot { x_mm, z_mm, columns, nodes: nodes.to_vec() }),
     })

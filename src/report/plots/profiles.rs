@@ -51,7 +51,7 @@ fn of_band(stored: &Stored, (index, cell): (usize, &Cell), band: usize, edges: &
     let (x, y) = (PlotAxis::log("distance / mm"), PlotAxis::log("exitance / area, W/mm^4"));
     PlotFigure::of(
         format!("profile-{index:03}-{}", band + 1),
-        joined(&[&cell.label, band_name(stored, band)]),
+        joined(&[&cell.title(), band_name(stored, band)]),
         "A ring whose mean is not above 0 has no point.".into(),
         Plot::small(x, y, runs(cell).map(line).collect()),
     )
@@ -100,7 +100,7 @@ fn over_transport(
     plot.levels = vec![(1.0, transport.estimator.clone())];
     Some(PlotFigure::of(
         format!("profile-ratio-{index:03}-{}", band + 1),
-        joined(&[&cell.label, band_name(stored, band), "model over transport"]),
+        joined(&[&cell.title(), band_name(stored, band), "model over transport"]),
         format!("Each model over `{}`, with the errors of both sides.", transport.estimator),
         plot,
     ))

@@ -65,7 +65,7 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
     let levels: Vec<(f64, String)> =
         expected.map(|value| (value, "expected".into())).into_iter().collect();
     let range = Some(range(&series, expected)?);
-    let title = joined(&[&cell.label, &observable.name, &observable.class, &running.band]);
+    let title = joined(&[&cell.title(), &observable.name, &observable.class, &running.band]);
     let plot = Plot {
         x: PlotAxis::log("passes"),
         y: PlotAxis { range, ..PlotAxis::linear(format!("mean of {}", observable.name)) },

@@ -62,13 +62,13 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [PlotFigure; 2] {
     [
         PlotFigure::of(
             format!("spectrum-{index:03}"),
-            cell.label.clone(),
+            cell.title(),
             "Bands at their middle.".into(),
             plot,
         ),
         PlotFigure {
             name: format!("colour-{index:03}"),
-            title: cell.label.clone(),
+            title: cell.title(),
             caption: format!("{caption} Exposure {stops:+} stops."),
             content: Content::Swatches(swatches),
         },

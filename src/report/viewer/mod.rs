@@ -86,7 +86,7 @@ fn viewers_within(stored: &Stored, pictures: &[RunPicture], room: usize) -> Resu
             left = room.checked_sub(text.len());
             data = left.map(|_| text);
         }
-        viewers.push(ViewerBlock { cell: cell.label.clone(), figures, data });
+        viewers.push(ViewerBlock { cell: cell.title(), figures, data });
     }
     Ok(viewers)
 }
