@@ -129,7 +129,7 @@ fn json(stored: &Stored, cell: &Cell) -> Result<String> {
 impl Data<'_> {
     /// A name may contain `</script>`; JSON allows `<` to be escaped by its number.
     fn to_text(&self) -> String {
-        serde_json::to_string(self).unwrap_or_default().replace('<', "\\u003c")
+        serde_json::to_string(self).expect("numbers and names are JSON").replace('<', "\\u003c")
     }
 }
 
