@@ -1,7 +1,7 @@
 //! scatterproof: a research testbed for light that enters a body through a refractive surface,
 //! scatters inside it, and leaves again.
 //!
-//! One TOML file is one experiment. It runs estimators per wavelength band and writes a record; a
+//! One TOML file is one experiment. The program runs its estimators per wavelength band and writes a record; a
 //! verification layer judges the claims of the record, and reports are made from the record alone.
 //!
 //! # Two sides that never import each other

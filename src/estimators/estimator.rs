@@ -5,8 +5,8 @@ use crate::sampling::stream::PassKey;
 
 /// Turns random numbers into scores.
 pub trait Estimator: Send + Sync {
-    /// Makes what all passes need and takes longer than a moment, such as what walks learn from a warm-up. Called once before
-    /// the first pass; ratios of efficiency count its CPU time.
+    /// Does lengthy work that all passes share, such as training the guides of walks. Called once before the first pass;
+    /// efficiency ratios include its CPU time.
     fn prepare(&self) {}
 
     /// Runs one independent realisation of every observable for these bands and adds it to the
@@ -18,20 +18,20 @@ pub trait Estimator: Send + Sync {
         BandUse::EachAlone
     }
 
-    /// What the mean of the scores converges to.
+    /// The relation of the mean of the scores to the integral.
     fn bias(&self) -> Bias {
         Bias::Unbiased
     }
 
-    /// The model whose integral this estimates; none where it is light transport itself. Estimators of
-    /// one integral have to agree; between different ones lies a model error, which is measured and no
-    /// failure.
+    /// The model whose integral this estimates; none if it is light transport itself. Estimators of one
+    /// integral have to agree; between different integrals there is a model error, which is measured and is
+    /// not a failure.
     fn model(&self) -> Option<String> {
         None
     }
 
-    /// Bands and classes in which the mean of any affordable number of passes is far from normal, known
-    /// beforehand.
+    /// Bands and classes that are known beforehand to have a mean that is far from normal for any affordable
+    /// number of passes.
     fn heavy_tails(&self) -> Vec<HeavyTail> {
         Vec::new()
     }
@@ -46,7 +46,7 @@ pub trait Estimator: Send + Sync {
         0
     }
 
-    /// What guides its walks, band by band, for pictures; empty where nothing does.
+    /// The guide of its walks, band by band, for pictures; empty if walks are not guided.
     fn guides(&self) -> Vec<Option<GuideSlice>> {
         Vec::new()
     }

@@ -14,7 +14,7 @@ pub struct Serves {
     pub boundaries: &'static [BoundaryKind],
     /// Extents of bodies that the estimator serves.
     pub bodies: Bodies,
-    /// Whether it counts light that the medium emits; if not, media that emit are refused.
+    /// Whether it scores emission of the medium; if not, media that emit are refused.
     pub emission: bool,
 }
 
@@ -56,7 +56,7 @@ pub enum Bodies {
 }
 
 impl Serves {
-    /// Every scene whose medium does not emit: an estimator has to say that it counts emission.
+    /// Every scene whose medium does not emit: an estimator must state that it scores emission.
     pub const ALL: Serves = Serves {
         sensors: Sensors::All,
         boundaries: &[BoundaryKind::Matched, BoundaryKind::Smooth, BoundaryKind::Rough],

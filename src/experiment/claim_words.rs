@@ -19,7 +19,7 @@ pub struct ClaimEntry {
     /// The outcome that makes the claim green, where it is not a pass (controls).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expect: Option<Expect>,
-    /// The reason for which a control expects its test to be invalid; any other turns it red.
+    /// The reason for which a control expects its test to be invalid; any other reason makes it fail.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub because: Option<InvalidReason>,
     /// A quantity equals a known value.
@@ -49,7 +49,7 @@ pub struct ClaimEntry {
 }
 
 impl ClaimEntry {
-    /// The key of what it claims.
+    /// The key of its kind.
     pub(crate) fn kind(&self) -> &'static str {
         let kinds = [
             ("equals", self.equals.is_some()),
@@ -79,7 +79,7 @@ pub struct SamplerClaim {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
     pub samplers: Option<Vec<String>>,
-    /// The largest relative error of the density, of one size in all coarse bins, that may go unseen.
+    /// The largest relative error of the density, of the same size in all coarse bins, that may go undetected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub detect: Option<f64>,
@@ -169,8 +169,8 @@ pub struct MeanPathLength {
     pub only: BTreeMap<String, String>,
 }
 
-/// Estimators differ in every cell, or cells that differ only `across` one axis do, and the test finds
-/// it: a negative control.
+/// Estimators differ in every cell, or cells that differ only `across` one axis do, and the test finds the
+/// difference: a negative control.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Differs {

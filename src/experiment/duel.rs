@@ -20,7 +20,7 @@ pub struct Faster {
     pub candidate: String,
     /// Estimator that the candidate is compared with.
     pub baseline: String,
-    /// What the efficiency ratio must exceed.
+    /// The bound that the efficiency ratio must exceed.
     #[serde(default = "one")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub ratio: f64,
@@ -53,7 +53,7 @@ pub struct NotSlower {
     pub candidate: String,
     /// Estimator that the candidate is compared with.
     pub baseline: String,
-    /// What the ratio of inverse efficiencies must stay below.
+    /// The bound that the ratio of inverse efficiencies must stay below.
     #[serde(default = "tenth_more")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub margin: f64,

@@ -18,8 +18,8 @@ pub struct PictureEntry {
     pub running: Option<RunningEntry>,
 }
 
-/// A plot a cell: the mean of one number over the first passes, with its interval, as passes add up; and
-/// the value that an `equals` claim expects of it.
+/// A plot per cell: the mean of one number over the first passes, with its interval, against the number of
+/// passes; and the value that an `equals` claim expects of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunningEntry {
@@ -37,9 +37,9 @@ pub struct RunningEntry {
     pub band: String,
 }
 
-/// A grid of pictures, a picture a cell of the sweep: its left half by one estimator, its right half by
-/// another, shown alike. The caption states what CPU time each half took. Axes that are neither rows nor
-/// columns give one grid per label.
+/// A grid of pictures, one picture per cell of the sweep: its left half by one estimator, its right half by
+/// another, with the same exposure. The caption states the CPU time of each half. Axes that are neither rows
+/// nor columns give one grid per label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SplitEntry {
@@ -53,8 +53,8 @@ pub struct SplitEntry {
     /// The axis of the sweep whose labels are the columns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub columns: Option<String>,
-    /// Stops by which all pictures of the grid are brightened; without it each picture has a white of
-    /// its own, the same for both halves: the 95th percentile of the half with less noise.
+    /// Stops by which all pictures of the grid are brightened; by default each picture has its own white level,
+    /// the same for both halves: the 95th percentile of the half with less noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_stops: Option<f64>,
 }

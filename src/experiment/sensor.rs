@@ -35,8 +35,8 @@ pub enum SensorEntry {
         #[schemars(extend("exclusiveMinimum" = 0))]
         width_mm: f64,
         /// Solid angle of the cap of directions about the view from which a pixel accepts light, sr: its
-        /// value is the mean radiance over pixel and cap, weighted by the cosine to the view. One
-        /// direction without it. For bodies of finite size.
+        /// value is the mean radiance over pixel and cap, weighted by the cosine to the view. By default a
+        /// single direction. For bodies of finite size.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = std::f64::consts::TAU))]
         acceptance_sr: Option<f64>,
@@ -98,10 +98,10 @@ pub enum SensorEntry {
         #[schemars(range(min = 1, max = 1048576))]
         paths_per_pass: usize,
     },
-    /// Radiant exitance of a `half_space` or `slab` by how far from the exit its light came in.
+    /// Radiant exitance of a `half_space` or `slab` by the distance between entry and exit of the light.
     ///
-    /// Of the top face, W/mm^2; the distance is taken along the face. Observables `ring_i`, and `all` of
-    /// every ring and beyond.
+    /// Of the top face, W/mm^2; the distance is measured along the face. Observables `ring_i`, and `all` for
+    /// all distances, those beyond the last ring included.
     Rings {
         /// Edges of the rings, mm, increasing from 0 or more.
         #[schemars(length(min = 2, max = 1025))]
@@ -117,7 +117,7 @@ pub enum SensorEntry {
     /// parts of the body included, as a mean over surface and cosine; `path_length`, the same times the
     /// length of the light's path in the medium, mm W/(mm^2 sr), all of it light that leaves the body.
     PathLength {
-        /// Only lengths within a ball in the body count; all without it.
+        /// A ball in the body: only lengths within it count. By default all lengths count.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         ball: Option<BallEntry>,
         /// Independent paths whose mean is one pass.
@@ -169,7 +169,7 @@ impl SensorEntry {
     /// The sensor, for a body of this shape.
     ///
     /// # Errors
-    /// A shape that it cannot look at.
+    /// A shape that the sensor does not support.
     pub fn build(&self, shape: &Shape) -> Result<Sensor> {
         Ok(match self {
             SensorEntry::Orthographic {

@@ -8,8 +8,8 @@ use super::{BoundingSphere, FaceId, Hit, Ray, Side, topology};
 use crate::error::Result;
 use crate::math::DVec3;
 
-/// A closed, consistently oriented triangle mesh with outward normals. Several components may
-/// enclose volumes of their own, or cavities with normals into them.
+/// A closed, consistently oriented triangle mesh with outward normals. Several components may enclose
+/// separate volumes, or cavities with normals into them.
 #[derive(Clone, Debug)]
 pub struct Mesh {
     vertices: Vec<DVec3>,
@@ -21,7 +21,7 @@ pub struct Mesh {
     /// The triangles in the tree's order, with their corners.
     leaves: Vec<Leaf>,
     clearance: Clearance,
-    /// How far rounding may put a point of the surface off it, mm: a point is a sum of three corners
+    /// The distance by which rounding may displace a point of the surface, mm: a point is a sum of three corners
     /// and, on a ray, of origin and flight, each rounded a few times at the size of its coordinates.
     slack: f64,
     around: Around,
@@ -62,8 +62,8 @@ struct Leaf {
     triangle: u32,
 }
 
-/// The nearest crossing so far. Equal distances (a hit on an edge) go to the smaller index, so that
-/// the order of visits does not show.
+/// The nearest crossing so far. At equal distances (a hit on an edge) the smaller index wins, so that the
+/// result does not depend on the order of visits.
 struct Nearest {
     t: f64,
     triangle: u32,
@@ -123,10 +123,9 @@ impl Mesh {
     /// outside. `interpolated` gives it shading normals: `normals`, or else angle-weighted ones.
     ///
     /// # Errors
-    /// Everything that keeps it from bounding a body: no triangles, indices out of range, vertices
+    /// Everything that keeps the mesh from bounding a body: no triangles, indices out of range, vertices
     /// that are not finite, triangles without area, edges and vertices where it is not a closed,
-    /// consistently oriented 2-manifold, components that are inside out. Parts that run through each
-    /// other are not noticed.
+    /// consistently oriented 2-manifold, components that are inside out. Self-intersections are not detected.
     ///
     /// # Panics
     /// If `normals` has not as many triangles as the mesh.
@@ -174,8 +173,8 @@ impl Mesh {
         self.normals.as_ref()
     }
 
-    /// Volume, mm^3, by the divergence theorem for the field x / 3: the signed tetrahedra from the middle of the
-    /// bounding sphere, so that a body far from the origin loses no digits, to the triangles.
+    /// Volume, mm^3, by the divergence theorem for the field x / 3: the sum of the signed tetrahedra that the triangles
+    /// span with the middle of the bounding sphere, so that a body far from the origin loses no digits.
     pub fn volume(&self) -> f64 {
         let corners = |t: &[u32; 3]| t.map(|i| self.vertices[i as usize] - self.bounds.center);
         self.triangles.iter().map(corners).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
@@ -239,7 +238,7 @@ impl Mesh {
         false
     }
 
-    /// Memory behind the mesh, bytes.
+    /// Memory of the mesh on the heap, bytes.
     pub fn heap_bytes(&self) -> usize {
         size_of_val(&*self.vertices)
             + size_of_val(&*self.triangles)
@@ -251,13 +250,13 @@ impl Mesh {
             + size_of_val(&*self.around.triangles)
     }
 
-    /// The hit of a ray that starts on an edge of its face and heads through a face beside it.
+    /// The hit of a ray that starts on an edge of its face and points through an adjacent face.
     ///
-    /// Seen along such a ray the edge is the rim of the body, and rounding decides on which side of the
-    /// rim the origin lies: outside of it no triangle is met at all. So an origin that is on an edge to
-    /// rounding is taken to be on every face there, and leaves (or enters) through the first that it
-    /// heads through. Between nearly coplanar faces rounding reaches farther along the surface, hence
-    /// the margin; the fraction of a surface near the origin that lies so near to an edge is below 1e-9
+    /// Seen along such a ray the edge is on the silhouette of the body, and rounding decides on which side of
+    /// the silhouette the origin lies; outside of it the ray hits no triangle. So an origin that is on an edge
+    /// to within rounding is treated as lying on every face there, and leaves (or enters) through the first face
+    /// that the ray points through. Between nearly coplanar faces rounding reaches farther along the surface,
+    /// hence the margin; the fraction of a surface near the origin that lies so near to an edge is below 1e-9
     /// with fewer than a hundred edges across.
     fn at_once(&self, ray: &Ray, side: Side, from: FaceId) -> Option<Hit> {
         let margin = 1e3 * self.slack;
@@ -403,7 +402,7 @@ mod tests {
                 }
                 let Some(hit) = all else { continue };
                 hits += 1;
-                // A flight that ends at the hit sees it, one that ends before does not.
+                // A flight that ends at the hit finds it; one that ends before does not.
                 assert_eq!(mesh.intersect(&ray, side, None, hit.t), all, "{name} {ray:?}");
                 let before = hit.t.next_down();
                 assert_eq!(mesh.intersect(&ray, side, None, before), None, "{name} {ray:?}");
@@ -414,7 +413,7 @@ mod tests {
                     let all = mesh.brute_force(&on, Side::Inside, Some(hit.face), f64::INFINITY);
                     assert_eq!(next, all, "{name} {on:?}");
                 }
-                // The face that a ray starts on is not there for it.
+                // A ray does not hit the face that it starts on.
                 let beyond = mesh.intersect(&ray, side, Some(hit.face), f64::INFINITY);
                 assert!(beyond.is_none_or(|b| b.face != hit.face && b.t >= hit.t), "{name} {ray:?}");
             }
@@ -443,7 +442,7 @@ mod tests {
         }
     }
 
-    /// In a thin wall of triangles that fit the padding's last bit a false cull would show most: a
+    /// A wrongly culled triangle is most likely in a thin wall of triangles that match the last bit of the padding: a
     /// ray through a plane of axis-parallel triangles, its components near and below 2^-23.
     #[test]
     fn nearly_axis_parallel_rays_are_not_culled() {

@@ -18,7 +18,7 @@ const EQUAL: f64 = 1.1;
 /// The fraction of non-black pixels that are darker than the white level of a picture. It is below 1, so
 /// that a highlight does not darken the body.
 const WHITE: f64 = 0.95;
-/// A picture narrower than this is enlarged by a whole factor.
+/// A picture narrower than this is enlarged by an integer factor.
 const WIDE_ENOUGH: usize = 192;
 /// Gap between the halves of a picture, in pixels of the sheet.
 const SEAM: usize = 1;
@@ -34,7 +34,7 @@ pub(crate) struct SplitFigure {
     pub title: String,
     /// Bytes of the PNG file.
     pub png: Vec<u8>,
-    /// How to read it.
+    /// Caption that explains the grid.
     pub caption: String,
     /// A row for each cell.
     pub table: Table,
@@ -109,7 +109,7 @@ impl SplitFigure {
 /// The width that a lead picture has at least, in pixels.
 const LEAD_WIDE: usize = 640;
 
-/// Writes one picture with the names of both estimators, their CPU seconds, and what is known of the ratio in it.
+/// Writes one picture labelled with the names of both estimators, their CPU seconds, and the result for their ratio.
 ///
 /// # Errors
 /// I/O.
@@ -444,7 +444,7 @@ impl<'a> Half<'a> {
     fn of(stored: &'a Stored, cell: &'a Cell, name: &str) -> Half<'a> {
         let run = cell.runs.iter().find(|run| run.estimator == name);
         let cost = stored.timing.as_ref().and_then(|timing| timing.of(&cell.label, name));
-        // A run that lost the time of some passes has no time to compare.
+        // A run for which the times of some passes are missing has no time to compare.
         let whole =
             run.zip(cost).filter(|(run, cost)| cost.passes == run.passes && cost.cpu_seconds > 0.0);
         Half {

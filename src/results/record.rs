@@ -19,9 +19,9 @@ pub struct Record {
     pub schema_version: u32,
     /// The experiment's name.
     pub experiment: String,
-    /// `main`, or `retest` for a second look on streams of its own.
+    /// `main`, or `retest` for a second look on new streams.
     pub stage: String,
-    /// What fixes the bits: numerical version, crates, target (see `results::provenance`).
+    /// What determines the bits: numerical version, crates, target (see `results::provenance`).
     pub fingerprint: String,
     /// blake3 of the resolved experiment without claims, hex.
     pub experiment_hash: String,
@@ -78,7 +78,7 @@ pub struct Band {
     pub name: String,
     /// Lower and upper wavelength, nm, where the experiment states them.
     pub range_nm: Option<[f64; 2]>,
-    /// Linear sRGB (D65) that one unit of this band's radiance shows as.
+    /// Linear sRGB (D65) in which one unit of this band's radiance is displayed.
     pub display_rgb: [f64; 3],
 }
 
@@ -156,8 +156,8 @@ impl ObservedRegion {
 pub struct EstimatorRun {
     /// The name the experiment gives it.
     pub estimator: String,
-    /// The estimator that this is a second arm of, for comparisons of CPU time: the same on streams of
-    /// its own, so that the two differ by chance and by the machine's noise alone.
+    /// The estimator of which this is a second arm, for comparisons of CPU time: the same estimator on separate
+    /// streams, so that the two differ only by chance and by noise of the machine.
     pub control_of: Option<String>,
     /// Its kind, as `path`.
     pub kind: String,
@@ -166,7 +166,7 @@ pub struct EstimatorRun {
     /// The model whose integral it estimates; none where it is light transport itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
-    /// Where its mean is known beforehand to be far from normal.
+    /// The bands and classes in which its mean is known beforehand to be far from normal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub heavy_tails: Vec<StatedTail>,
     /// Notes for the reader, such as transport that it cannot sample.
@@ -183,7 +183,7 @@ pub struct EstimatorRun {
     pub costs: String,
     /// The image, where the sensor has pixels.
     pub image: Option<Image>,
-    /// What guides its walks, where something does.
+    /// The guide of its walks, if they are guided.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub guide: Option<GuidePlane>,
     /// Deterministic counts of work done, summed over bands and passes.
@@ -244,7 +244,7 @@ impl Observable {
     }
 }
 
-/// What guides the walks of a run, in the plane of x and z through the middle of the body.
+/// The guide of the walks of a run, in the plane of x and z through the middle of the body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GuidePlane {
@@ -354,8 +354,8 @@ pub enum ExpectedOutcome {
     Invalid(InvalidReason),
 }
 
-/// Reasons for which a test of means is refused and that a control may expect. Whatever else voids a
-/// test, such as lost rays or missing passes, is a defect, and no control is green by it.
+/// Reasons for which a test of means is refused and that a control may expect. Any other reason that makes a
+/// test invalid, such as lost rays or missing passes, is a defect and makes no control green.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InvalidReason {
@@ -449,14 +449,14 @@ pub enum Against {
     },
 }
 
-/// What an estimator's work is measured by.
+/// The measure of an estimator's work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CostMeasure {
     /// Counts of rays, events and paths with fixed weights: the same on every machine.
     #[default]
     Counters,
-    /// CPU time. The estimators of a cell are interleaved, and the baseline is run twice, so that what
-    /// the machine adds is seen.
+    /// CPU time. The estimators of a cell are interleaved, and the baseline is run twice, to measure effects of
+    /// the machine.
     Cpu,
 }

@@ -29,7 +29,7 @@ use crate::stats::moments::Moments;
 /// The manifest's name in a results folder.
 pub const MANIFEST: &str = "manifest.json";
 
-/// What a report writes beside a record, besides pictures.
+/// Files that a report writes beside a record, except pictures.
 const VIEW_FOLDERS: [&str; 2] = ["plots", "tables"];
 const VIEW_FILES: [&str; 9] = [
     "comparisons.csv",
@@ -53,9 +53,9 @@ pub struct Stored {
     pub record: Record,
     /// Arrays of the record.
     pub arrays: Arrays,
-    /// Times, where they were measured; not part of the record, without a checksum.
+    /// Times, if they were measured; they are not part of the record and have no checksum.
     pub timing: Option<Timing>,
-    /// True where `timing.json` is of another record, as after a crash, and was left out.
+    /// True if `timing.json` belongs to another record, as after a crash, and was left out.
     pub has_foreign_timing: bool,
 }
 
@@ -75,7 +75,7 @@ pub fn pixels_path(cell: usize, run: usize) -> String {
     array_path(cell, run, "pixels")
 }
 
-/// Path of what guides a run's walks.
+/// Path of the guide of a run's walks.
 pub fn guide_path(cell: usize, run: usize) -> String {
     array_path(cell, run, "guide")
 }
@@ -96,7 +96,7 @@ impl Stored {
         cell.runs.iter().find(|run| run.estimator == quantity.estimator)
     }
 
-    /// blake3 over the checksums of all arrays, hex: equal where all numbers are.
+    /// blake3 hash of the checksums of all arrays, hex: equal if all numbers are equal.
     pub fn numbers(&self) -> String {
         hash_hex(canonical(&self.record.checksums).as_bytes())
     }
@@ -225,8 +225,8 @@ impl RecordFolder {
         self.record_dir().join("record.json").exists() || self.aside().join("record.json").exists()
     }
 
-    /// Writes a record, with the checksums of its arrays filled in, and returns it as written. An
-    /// earlier record stays as it was until this one is complete, and its views go with it.
+    /// Writes a record, with the checksums of its arrays filled in, and returns it as written. An earlier
+    /// record is kept until this one is complete, and is then removed together with its views.
     pub fn write(&self, mut record: Record, arrays: Arrays) -> Result<Stored> {
         let checksums = arrays.iter().map(|(name, array)| (name.clone(), hash_hex(&array.to_npy())));
         record.checksums = checksums.collect();
@@ -254,7 +254,7 @@ impl RecordFolder {
 
     /// Reads a record and checks version, checksums and shapes.
     pub fn read(&self) -> Result<Stored> {
-        // A writer may put another record in place meanwhile: what is found damaged is read again, if so.
+        // A writer may replace the record meanwhile: if it has, a record that seems damaged is read again.
         let mut stored = loop {
             let before = self.checksum_line();
             let stored = self.read_as_it_is();
@@ -294,8 +294,8 @@ impl RecordFolder {
         fs::read(self.readable_dir().join("record.json.b3")).ok()
     }
 
-    /// Where the record is: aside after a crash within the swap, which the next run finishes. Readers repair nothing,
-    /// for a writer may be at work.
+    /// The present path of the record. After a crash during the replacement of a record this is a temporary path, until
+    /// the next run completes the replacement. Readers repair nothing, because a writer may be at work.
     fn readable_dir(&self) -> PathBuf {
         let (dir, aside) = (self.record_dir(), self.aside());
         if !dir.exists() && aside.exists() { aside } else { dir }
@@ -306,7 +306,7 @@ impl RecordFolder {
         RecordFolder::new(self.root.join("retest"))
     }
 
-    /// The second look at `main`, where there is one of that very experiment and build.
+    /// The second look at `main`, if there is one of the same experiment and build.
     ///
     /// # Errors
     /// It is there and damaged.
@@ -326,12 +326,12 @@ impl RecordFolder {
         self.write_view("timing.json", canonical(timing).as_bytes())
     }
 
-    /// Reads `timing.json`, where it is there.
+    /// Reads `timing.json`, if it exists.
     pub fn read_timing(&self) -> Result<Option<Timing>> {
         self.read_json("timing.json")
     }
 
-    /// Writes `pictures.json`, or removes it where no picture is asked for.
+    /// Writes `pictures.json`, or removes it if no picture is requested.
     pub fn write_pictures(&self, pictures: &[Wanted]) -> Result<()> {
         let path = self.root.join("pictures.json");
         if !pictures.is_empty() {
@@ -345,7 +345,7 @@ impl RecordFolder {
         }
     }
 
-    /// Reads `pictures.json`; nothing where it is not there.
+    /// Reads `pictures.json`; nothing if it does not exist.
     pub fn read_pictures(&self) -> Result<Vec<Wanted>> {
         Ok(self.read_json("pictures.json")?.unwrap_or_default())
     }
@@ -355,19 +355,19 @@ impl RecordFolder {
         self.write_view("provenance.json", canonical(provenance).as_bytes())
     }
 
-    /// Reads `provenance.json`, where it is there.
+    /// Reads `provenance.json`, if it exists.
     pub fn read_provenance(&self) -> Result<Option<Provenance>> {
         self.read_json("provenance.json")
     }
 
-    /// Writes a file beside the record, creating folders on its way.
+    /// Writes a file beside the record, and creates its folders.
     pub fn write_view(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let path = self.root.join(name);
         atomic::create_folder(path.parent().unwrap_or(&self.root), "create the results folder")?;
         atomic::write(&path, bytes, "write results")
     }
 
-    /// Removes every view beside the record, so that none of an earlier record outlives it.
+    /// Removes every view beside the record, so that no view of an earlier record remains.
     pub fn clear_views(&self) -> Result<()> {
         if self.root.is_dir() {
             atomic::sweep(&self.root)?;
@@ -381,8 +381,8 @@ impl RecordFolder {
         self.clear_pictures()
     }
 
-    /// Removes the pictures of an earlier record from `images/`: what begins with the number of a cell
-    /// or `split-`, as every picture of a report does, and its lead picture.
+    /// Removes the pictures of an earlier record from `images/`: files whose names begin with the number of a
+    /// cell or with `split-`, as those of all pictures of a report do, and the lead picture.
     fn clear_pictures(&self) -> Result<()> {
         let folder = self.root.join("images");
         let Ok(entries) = fs::read_dir(&folder) else { return Ok(()) };
@@ -416,18 +416,18 @@ impl RecordFolder {
         self.root.join("record")
     }
 
-    /// Where a record is written before it takes its place.
+    /// Where a record is written before it is moved to its final path.
     fn stage(&self) -> PathBuf {
         self.root.join(".record.new")
     }
 
-    /// Where an earlier record waits while a new one takes its place.
+    /// Where an earlier record is kept while a new one is moved to its path.
     fn aside(&self) -> PathBuf {
         self.root.join(".record.old")
     }
 }
 
-/// Removes a folder, where it is there.
+/// Removes a folder, if it exists.
 fn remove_folder(path: &Path, doing: &str) -> Result<()> {
     match fs::remove_dir_all(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path, doing)(error)),
@@ -450,7 +450,7 @@ fn write_stage(stage: &Path, stored: &Stored) -> Result<()> {
     atomic::write(&stage.join("record.json.b3"), line.as_bytes(), "write the record")
 }
 
-/// The record's canonical JSON, which reads back as the same record: JSON has no NaN or infinity.
+/// The record's canonical JSON, after a check that reading it gives the same record: JSON has no NaN or infinity.
 fn readable<T: Serialize + DeserializeOwned + PartialEq>(value: &T, path: &Path) -> Result<String> {
     let text = canonical(value);
     match serde_json::from_str::<T>(&text) {
@@ -463,7 +463,7 @@ fn read_record(path: &Path) -> Result<Record> {
     let bytes = input::read(path, input::LARGEST_DATA).map_err(Error::io(path, "read the record"))?;
     let value: serde_json::Value = serde_json::from_slice(&bytes)
         .map_err(|e| Error::record(path, format!("truncated or not JSON ({e}); run it again")))?;
-    // The version first: another version's layout and hash mean nothing to this program.
+    // The version is checked first: this program cannot interpret the layout and hash of another version.
     let version = value.get("schema_version").and_then(|v| v.as_u64());
     if version != Some(u64::from(SCHEMA_VERSION)) {
         let found = version.map_or("none".to_string(), |v| v.to_string());

@@ -21,8 +21,8 @@ pub(crate) struct Job {
     pub label: String,
     /// The same for progress, the cell by its place on the axes: `alpha = 0.1 / mis`.
     pub title: String,
-    /// Hash of all that its result depends on except the number of passes, hex: its state is kept under
-    /// it.
+    /// Hash of everything that the result depends on except the number of passes, hex. It names the file of
+    /// the job's state.
     pub identity: String,
     /// The task.
     pub task: Task,
@@ -37,7 +37,7 @@ pub(crate) enum Task {
 }
 
 impl Job {
-    /// The passes, where the job is of an estimator.
+    /// The passes, if the job is of an estimator.
     pub(crate) fn passes(&self) -> Option<&Passes> {
         match &self.task {
             Task::Estimate(passes) => Some(passes),
@@ -45,7 +45,7 @@ impl Job {
         }
     }
 
-    /// The draws, where the job is of a sampler.
+    /// The draws, if the job is of a sampler.
     pub(crate) fn draws(&self) -> Option<&Draws> {
         match &self.task {
             Task::Estimate(_) => None,
@@ -59,7 +59,7 @@ impl Job {
 pub(crate) struct Arm {
     /// Name of the estimator, or of its control.
     pub name: String,
-    /// A second arm of the same estimator, on streams of its own.
+    /// A second arm of the same estimator, on separate streams.
     pub is_control: bool,
 }
 
@@ -73,19 +73,19 @@ pub(crate) struct Passes {
     pub arm: Arm,
     /// Stage that the passes belong to.
     pub stage: Stage,
-    /// Number of passes, where the budget does not state it.
+    /// Number of passes, if the budget does not state it.
     pub count: Option<u64>,
-    /// Passes that are run, where they are not all.
+    /// Passes that are run, if not all are.
     pub part: Option<PassRange>,
     /// Estimator that runs the passes.
     pub estimator: Box<dyn Estimator>,
-    /// What building and preparing it took.
+    /// CPU time of building and preparing the estimator.
     pub set_up: SetUp,
     /// Observables and bands of the scores.
     pub layout: Layout,
     /// Bands that one call runs together, with their streams.
     pub groups: Vec<Group>,
-    /// What the budget means for this run.
+    /// The budget of this run.
     pub terms: BudgetTerms,
 }
 
@@ -128,14 +128,14 @@ impl SetUp {
     }
 }
 
-/// What a budget means for one run.
+/// The budget of one run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct BudgetTerms {
     /// Observables whose relative error a budget may bound.
     pub targets: Vec<usize>,
-    /// PassRange of the budget's passes or seconds.
+    /// Share of the budget's passes or seconds.
     pub share: f64,
-    /// The budget itself, where the sweep sets one for the cell.
+    /// The budget itself, if the sweep sets one for the cell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub budget: Option<Budget>,
 }
@@ -173,11 +173,11 @@ pub(crate) struct Block {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Start {
-    /// Hashes of the claims: later claims are made with the result in sight.
+    /// Hashes of the claims: claims that are made later may depend on the result.
     pub claims: Vec<String>,
-    /// Hash of the budget that was turned into passes.
+    /// Hash of the budget that was converted into passes.
     pub budget: String,
-    /// Passes that the budget was turned into, fixed once.
+    /// Number of passes into which the budget was converted, fixed once.
     pub passes: u64,
 }
 
@@ -189,10 +189,10 @@ pub(crate) struct Work {
     pub cost: [u64; Cost::ALL.len()],
     /// CPU time of the passes alone, seconds.
     pub cpu_seconds: f64,
-    /// How many passes were interleaved with those of their rivals, by a worker that was warm.
+    /// Number of passes that were interleaved with those of the other arms, by a worker that was warm.
     pub settled: u64,
-    /// CPU time of those passes that were run twice for the sake of the clock, seconds: of the run that
-    /// counts, and of the other.
+    /// CPU time of the passes that were run twice as a control, seconds: of the run that counts, and of the
+    /// other one.
     pub twice: [f64; 2],
 }
 
@@ -206,7 +206,7 @@ impl Merge for Work {
     }
 }
 
-/// Counts and time that are not kept by batch and add up in any order.
+/// Counts and times that are not kept by batch and can be summed in any order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Tally {
@@ -216,7 +216,7 @@ pub(crate) struct Tally {
     pub wall_seconds: f64,
     /// Processes that ran some of the passes.
     pub processes: u64,
-    /// The longest that one of them took before its first pass, CPU seconds: a process alone would take as long.
+    /// The longest CPU time that one of them took before its first pass, seconds: a single process would take as long.
     pub set_up_seconds: f64,
 }
 
@@ -238,7 +238,7 @@ pub(crate) fn band_groups(band_use: BandUse, bands: usize) -> Vec<Vec<usize>> {
     }
 }
 
-/// Half the squared difference of two images of one expectation, averaged over the pixels, by band: its
+/// Half the squared difference of two images with the same expectation, averaged over the pixels, by band: its
 /// expectation is the variance of a pixel, averaged over the pixels.
 pub(crate) fn spread(a: &[f64], b: &[f64], bands: usize) -> Vec<Moments> {
     if a.is_empty() {
@@ -275,8 +275,8 @@ impl Block {
         self.work.nodes().iter().map(|node| node.value.cpu_seconds).sum()
     }
 
-    /// Pairs the image of the pass that comes next with that of the pass before it, where these two are
-    /// a pair and this block holds the first of them: its node has then merged with none.
+    /// Pairs the image of the next pass with that of the pass before it, if these two are a pair and this block
+    /// holds the first of them; the node of the first is then not merged yet.
     fn pair_with(&mut self, next: &[f64]) {
         let is_second = !self.next_pass().is_multiple_of(2);
         if is_second && let Some(first) = self.pixels.nodes().last() {
@@ -284,12 +284,12 @@ impl Block {
         }
     }
 
-    /// The pass that comes next.
+    /// The next pass.
     pub(crate) fn next_pass(&self) -> u64 {
         self.moments.next_pass()
     }
 
-    /// Marks all passes as interleaved with those of their rivals; `keep_level` is the block's own, and
+    /// Marks all passes as interleaved with those of the other arms; `keep_level` is that of the block, and
     /// `again` holds the same passes run a second time.
     pub(crate) fn settle(&mut self, keep_level: u32, again: Option<&Block>) {
         let mut settled = Counter::new(self.work.start(), keep_level);
@@ -360,8 +360,8 @@ impl Passes {
         self.layout.image().filter(|_| self.stage == Stage::Main)
     }
 
-    /// Runs passes `start..end`; only the run itself keeps an image. `stop` is asked between passes; a
-    /// stopped block is dropped whole.
+    /// Runs passes `start..end`; only the run itself keeps an image. `stop` is checked between passes; a
+    /// stopped block is discarded whole.
     pub(crate) fn run(
         &self,
         stage: Stage,

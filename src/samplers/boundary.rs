@@ -136,7 +136,7 @@ impl ViewSide {
 /// d omega_i / d omega_h = |sin b b'| / sin g. Reflection: b = 2g, 4 cos g. Refraction: b = pi + g -
 /// g_t, sin g_t = sin g / r: (cos g_t - cos g / r)^2 / cos g_t.
 ///
-/// Forced refraction is the piece of refraction alone; it fails beyond the piece's end, by a wrong side
+/// Forced refraction is the piece of refraction alone; it fails beyond the end of the piece, by a wrong side
 /// or by total reflection, whatever the reflectance: where q > q_w or else q > q_c.
 pub struct RoughSampler {
     boundary: Boundary,

@@ -43,7 +43,7 @@ impl NamedRng {
         NamedRng(ChaCha8Rng::from_seed(seed))
     }
 
-    /// Uniform in (0, 1), never an end.
+    /// Uniform in the open interval (0, 1).
     pub(super) fn uniform(&mut self) -> f64 {
         ((self.0.next_u64() >> 12) as f64 + 0.5) / (1u64 << 52) as f64
     }
@@ -210,19 +210,18 @@ const KINDS: [Kind; 10] = [
     },
 ];
 
-/// The weight e^(sigma d), d ~ Exp(lambda), if the flight was accepted (with probability e^(-sigma d)),
-/// else
-/// 0. Its mean is 1.
+/// The weight e^(sigma d), d ~ Exp(lambda), if the flight was accepted (with probability e^(-sigma d)), and
+/// zero otherwise. The mean of the weight is 1.
 fn reweighted(d: &mut NamedRng, lambda_over_sigma: f64) -> f64 {
     let tau = d.exponential() / lambda_over_sigma;
     if d.uniform() < (-tau).exp() { tau.exp() } else { 0.0 }
 }
 
-/// The levels whose rejections are counted: a distance between distributions does not bound their
-/// tails.
+/// The levels at which rejections are counted, because a distance between distributions does not bound
+/// their tails.
 const LEVELS: [f64; 2] = [1e-2, 1e-3];
 
-/// Each check of a kind may alarm by chance with this probability.
+/// Probability that a check of a kind raises a false alarm.
 const ALARM: f64 = 1e-4;
 
 /// Result of many runs of a null hypothesis.
@@ -263,15 +262,15 @@ fn null_p_values(kind: &Kind, runs: u64) -> Vec<f64> {
 static SHORT: LazyLock<BTreeMap<&str, Vec<f64>>> =
     LazyLock::new(|| KINDS.iter().map(|kind| (kind.name, null_p_values(kind, 600))).collect());
 
-/// The smallest number of p-values below 1e-2, and the smallest distance, that alarm over `runs`.
+/// The smallest number of p-values below 1e-2, and the smallest distance, that raise an alarm over `runs`.
 fn alarming(runs: u64) -> (u64, f64) {
     let count = (runs / 100..).find(|k| 2.0 * binomial_upper(*k, runs, 1e-2) < ALARM);
     let distance = (1..).map(|i| f64::from(i) * 1e-3).find(|d| kolmogorov_smirnov(*d, runs) < ALARM);
     (count.expect("a count"), distance.expect("a distance"))
 }
 
-// 600 runs a kind: a distance of 0.092 from the uniform distribution alarms, and a test that rejects 5 %
-// at the level 1e-2 alarms with a probability of 98 %. The published calibration has 4000 runs.
+// 600 runs per kind: a distance of 0.092 from the uniform distribution raises an alarm, and a test that rejects
+// 5 % at the level 1e-2 does so with a probability of 98 %. The published calibration has 4000 runs.
 #[test]
 fn every_kind_of_test_keeps_its_level() {
     let (count, distance) = alarming(600);
@@ -286,7 +285,7 @@ fn every_kind_of_test_keeps_its_level() {
     }
 }
 
-// What the calibration is for: p-values that are wrong, at the size of the short version.
+// The calibration must detect wrong p-values, with the number of runs of the short version.
 #[test]
 fn planted_p_values_are_caught() {
     let caught = |name: &str, p: Vec<f64>, promise| {
@@ -324,8 +323,8 @@ fn heavy_tails(lambda_over_sigma: f64, runs: u64) -> Calibration {
     Calibration::of(p_values, Promise::Conservative)
 }
 
-// Why a mean of weights of infinite variance is refused and not tested: at finite variance the z-test
-// keeps its level; at infinite variance it alarms 12 % and 37 % of the time at the level 1 %.
+// The reason why means of weights of infinite variance are refused and not tested: at finite variance the z-test
+// keeps its level; at infinite variance 12 % and 37 % of tests at the level 1 % are false alarms.
 #[test]
 fn a_z_test_does_not_survive_heavy_tails() {
     for (ratio, at_least, at_most) in [(4.0, 0.0, 0.03), (0.5, 0.06, 0.2), (0.25, 0.27, 0.47)] {
@@ -402,9 +401,9 @@ const SHAPES: [Distribution; 6] = [
 /// The variance of a lognormal 1, e (e - 1).
 const LOGNORMAL: f64 = 4.670_774_270_471_604;
 
-/// 64 blocks of 256 passes of two interleaved arms, with costs as CPU times have them: what is drawn
-/// costs more (up to half as much again, by its square), blocks of both arms share a drift of 10 %, and
-/// every block has 1 % of its own. `offsets` are what the machine does to either arm for the whole run.
+/// 64 blocks of 256 passes of two interleaved arms, with costs that behave like CPU times: large scores cost
+/// more (up to half as much again, by their square), blocks of both arms share a drift of 10 %, and every block
+/// has an independent variation of 1 %. `offsets` are the effects of the machine on either arm for the whole run.
 fn costed(d: &mut NamedRng, shape: &Distribution, offsets: [f64; 2]) -> [Vec<JackknifeBlock>; 2] {
     let mut arms = [vec![], vec![]];
     for _ in 0..64 {
@@ -423,9 +422,9 @@ fn costed(d: &mut NamedRng, shape: &Distribution, offsets: [f64; 2]) -> [Vec<Jac
     arms
 }
 
-/// Of intervals at 95 and 99.9 %, over 64 blocks of 256 passes an arm: how often they hold the true
-/// ratio, 1; the median width of the former in the logarithm; how often the ratio was resolved; and how
-/// often an F interval at 95 % holds it.
+/// Intervals at 95 and 99.9 %, over 64 blocks of 256 passes per arm: how often they contain the true ratio, 1;
+/// the median width of the former in the logarithm; how often the ratio was resolved; and how often an F
+/// interval at 95 % contains the true ratio.
 struct Coverage {
     runs: u64,
     at_95: u64,
@@ -457,10 +456,9 @@ fn coverage(shape: &Distribution, runs: u64) -> Coverage {
     c
 }
 
-// 500 runs know a coverage within +-0.01 (one standard deviation). Bounds: 93 to 97 % for arms of one
-// shape and 91 % for the mixed row, 3.3 standard deviations further out, so that a true 95 % (92 %)
-// passes and the 25 % of an F interval does not. The published calibration has 2000 runs and the bounds
-// themselves.
+// 500 runs determine a coverage to +-0.01 (one standard deviation). Bounds: 93 to 97 % for arms of one shape and
+// 91 % for the mixed row, widened by 3.3 standard deviations, so that a true 95 % (92 %) passes and the 25 % of
+// an F interval does not. The published calibration has 2000 runs and uses the bounds themselves.
 #[test]
 fn efficiency_intervals_cover() {
     for (shape, low, high) in [(1, 0.90, 0.99), (2, 0.90, 0.99), (5, 0.87, 0.98)] {
@@ -472,9 +470,9 @@ fn efficiency_intervals_cover() {
     }
 }
 
-/// How often an interval of 95 % holds the true ratio of two arms of exponential values where the machine
-/// favours one arm by an amount of standard deviation `offset` for the whole run, and the controls of
-/// `cells` cells show other such amounts: with what the controls add, and without.
+/// How often a 95 % interval contains the true ratio of two arms of exponential values, if the machine favours
+/// one arm by an amount of standard deviation `offset` for the whole run, and the controls of `cells` cells show
+/// independent amounts of this kind: with the variance that the controls add, and without.
 fn clock_coverage(offset: f64, cells: usize, runs: u64) -> [f64; 2] {
     let mut draws = NamedRng::of(&format!("a clock that favours an arm by {offset}, {cells} cells"));
     let mut held = [0, 0];
@@ -494,9 +492,9 @@ fn clock_coverage(offset: f64, cells: usize, runs: u64) -> [f64; 2] {
     held.map(|held| held as f64 / runs as f64)
 }
 
-// 300 runs know a coverage of 95 % within +-0.0126 (one standard deviation), one of 88 % within +-0.019;
-// the bounds are 3 of these below. What the control is for shows at 0.1: without it the interval is the
-// scatter's alone. One control alone may by chance be smaller than what it is to show.
+// 300 runs determine a coverage of 95 % to +-0.0126 (one standard deviation), one of 88 % to +-0.019; the bounds
+// are 3 of these below. The effect of the control is seen at 0.1: without it the interval covers the scatter
+// alone. A single control may by chance be smaller than the effect of the machine.
 #[test]
 fn intervals_of_cpu_time_cover_with_their_control() {
     for (offset, cells, least) in
