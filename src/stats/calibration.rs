@@ -457,7 +457,7 @@ fn coverage(shape: &Distribution, runs: u64) -> Coverage {
 }
 
 // 500 runs determine a coverage to +-0.01 (one standard deviation). Bounds: 93 to 97 % for arms of one shape and
-// 91 % for the mixed row, widened by 3.3 standard deviations, so that a true 95 % (92 %) passes and the 25 % of
+// 91 % for the mixed row, widened by 3.3 standard deviations, so that a true 95 % (92 %) passes and the 23 % of
 // an F interval does not. The published calibration has 2000 runs and uses the bounds themselves.
 #[test]
 fn efficiency_intervals_cover() {
