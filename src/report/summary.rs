@@ -144,8 +144,12 @@ pub(crate) fn means(stored: &Stored, rows: &[Measurement]) -> Option<TableBlock>
         column: row.estimator.clone(),
         text: with_error(row.mean, row.std_error),
     };
+    let what = match observable.as_str() {
+        "mean" => "Image mean".to_string(),
+        other => format!("Mean of `{other}`"),
+    };
     let caption = format!(
-        "Mean of `{observable}`, all transport classes together; in brackets one standard error in units of the \
+        "{what}, all transport classes together; in brackets one standard error in units of the \
          last digit."
     );
     Some(TableBlock::new("means", caption, pivot(stored, &["band"], rows.iter().map(entry).collect())))

@@ -36,9 +36,8 @@ pub(super) fn section(stored: &Stored, rows: &[EfficiencyRow]) -> Section {
     }
     Section {
         heading: "Efficiency along the sweep".into(),
-        text: "Variance of a pass times its cost, of the first estimator over the other: above 1 the other is \
-               the better. Bands are 95 % intervals; hollow points are not resolved (more passes may move \
-               them)."
+        text: "A over B: variance of a pass times its cost, of B over that of A; above 1 A is the better. Bars and \
+               shaded areas are 95 % intervals; hollow points are not resolved (more passes may move them)."
             .into(),
         drawn,
         are_small: true,

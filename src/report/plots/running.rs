@@ -2,7 +2,7 @@
 //! each estimator and the expected value of a claim. A valid interval covers the expected value for 19
 //! of 20 estimators. With too heavy a tail the interval is narrow and lies beside it.
 
-use super::section::{PlotFigure, Section, joined};
+use super::section::{PlotFigure, Section, joined, mean_of};
 use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Size, Style};
 use crate::results::pictures::{Running, Wanted};
 use crate::results::record::{Against, Cell, EstimatorRun, Observable, Quantity};
@@ -68,7 +68,7 @@ fn plot(stored: &Stored, index: usize, cell: &Cell, running: &Running) -> Option
     let title = joined(&[&cell.title(), &observable.name, &observable.class, &running.band]);
     let plot = Plot {
         x: PlotAxis::log("passes"),
-        y: PlotAxis { range, ..PlotAxis::linear(format!("mean of {}", observable.name)) },
+        y: PlotAxis { range, ..PlotAxis::linear(mean_of(&observable.name)) },
         series,
         levels,
         size: Size::Wide,

@@ -140,6 +140,11 @@ pub(super) fn joined(parts: &[&str]) -> String {
     parts.iter().filter(|part| !part.is_empty()).copied().collect::<Vec<_>>().join(", ")
 }
 
+/// The mean of an observable in words; that of an image is called `mean` itself.
+pub(super) fn mean_of(observable: &str) -> String {
+    if observable == "mean" { "image mean".into() } else { format!("mean of {observable}") }
+}
+
 /// The name of a band in a title; empty if there is only one band.
 pub(super) fn band_name(stored: &Stored, band: usize) -> &str {
     if stored.record.bands.len() == 1 { "" } else { &stored.record.bands[band].name }

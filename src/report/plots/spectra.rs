@@ -1,6 +1,6 @@
 //! Means by wavelength, and the resulting colour.
 
-use super::section::{Content, PlotFigure, Section, runs};
+use super::section::{Content, PlotFigure, Section, mean_of, runs};
 use crate::report::number::with_error;
 use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Style};
 use crate::results::image::{gain, shown_bytes};
@@ -46,7 +46,7 @@ fn of_cell(stored: &Stored, index: usize, cell: &Cell) -> [PlotFigure; 2] {
     };
     let series = runs.iter().map(line).collect();
     let observable = runs.first().and_then(|(run, _)| run.observables.first());
-    let y = observable.map_or("mean".into(), |of| format!("mean of {}", of.name));
+    let y = observable.map_or("mean".into(), |of| mean_of(&of.name));
     let plot = Plot::small(PlotAxis::linear("wavelength / nm"), PlotAxis::linear(y), series);
     let stops = stored.record.resolved["display"]["exposure_stops"].as_f64().unwrap_or(0.0);
     let colours: Vec<(String, [Estimate; 3])> =
