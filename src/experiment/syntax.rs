@@ -1,4 +1,4 @@
-//! What is wrong with a text that is not TOML, and what was probably meant.
+//! Errors of TOML syntax, with what was probably meant.
 
 use std::collections::BTreeSet;
 
@@ -15,20 +15,20 @@ pub(super) fn finding(message: &str, place: Place) -> Diagnostic {
         let at = begin + line.find(number).unwrap_or(0);
         let help = Some(format!("write {}, with a point", number.replace(',', ".")));
         let place = Place { span: at..at + number.len(), ..place.clone() };
-        return Diagnostic { rule: format!("`{number}` is no number"), place: Some(place), help };
+        return Diagnostic { rule: format!("`{number}` is not a number"), place: Some(place), help };
     }
     let (rule, help) = match message {
         _ if is_value && here.contains(['\u{201c}', '\u{201d}', '\u{2018}', '\u{2019}']) => {
             said("a typographic quotation mark", "write the straight one: \"")
         }
         _ if is_value && here.contains("//") => {
-            said("`//` begins no comment", "a comment begins with #")
+            said("`//` does not begin a comment", "a comment begins with #")
         }
         _ if is_value && here.starts_with('(') => {
-            said("a list stands in brackets", "write [1, 2, 3], not (1, 2, 3)")
+            said("a list is written in brackets", "write [1, 2, 3], not (1, 2, 3)")
         }
         _ if is_value && here.starts_with(char::is_alphabetic) => {
-            ("a text stands in quotes".to_string(), Some(format!("write \"{here}\"")))
+            ("text is written in quotes".to_string(), Some(format!("write \"{here}\"")))
         }
         "duplicate key" => said(
             "duplicate key",
@@ -70,14 +70,14 @@ mod tests {
     #[test]
     fn slips_that_are_not_toml_are_answered_with_what_to_write() {
         for (text, at, rule, help) in [
-            ("name = base\n", (1, 8), "a text stands in quotes", "write \"base\""),
+            ("name = base\n", (1, 8), "text is written in quotes", "write \"base\""),
             ("name = \u{201c}base\u{201d}\n", (1, 8), "a typographic quotation mark", "straight one"),
-            ("seed = 1 // root\n", (1, 8), "`//` begins no comment", "begins with #"),
-            ("toward = (0, 0, -1)\n", (1, 10), "a list stands in brackets", "write [1, 2, 3]"),
+            ("seed = 1 // root\n", (1, 8), "`//` does not begin a comment", "begins with #"),
+            ("toward = (0, 0, -1)\n", (1, 10), "a list is written in brackets", "write [1, 2, 3]"),
             ("seed = 1\nseed = 2\n", (2, 1), "duplicate key", "remove one of the two"),
             ("a = .3\n", (1, 5), "a number begins with a digit", "0.5"),
             ("a = True\n", (1, 5), "invalid boolean", "small letters"),
-            ("a = 1,3\n", (1, 5), "`1,3` is no number", "write 1.3"),
+            ("a = 1,3\n", (1, 5), "`1,3` is not a number", "write 1.3"),
         ] {
             let findings = parse("x.toml", text).expect_err("it is not TOML");
             let [finding] = &findings[..] else { panic!("{text}: {findings:#?}") };
@@ -87,7 +87,7 @@ mod tests {
             assert_eq!(place, at, "{text}");
         }
         let inline = parse("x.toml", "b = { eta = 1,3 }\n").expect_err("it is not TOML");
-        assert!(inline.len() == 1 && inline[0].rule == "`1,3` is no number", "{inline:#?}");
+        assert!(inline.len() == 1 && inline[0].rule == "`1,3` is not a number", "{inline:#?}");
         assert!(parse("x.toml", "a = [1,3]\nb = { c = 1, d = 3 }\n").is_ok());
     }
 }
