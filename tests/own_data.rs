@@ -71,7 +71,7 @@ fn tables_that_do_not_fit_are_refused() {
         &TABLE.replace("700,", "500,"),
         &["wavelengths must increase, 500 nm follows 600 nm", "t.csv:4"],
     );
-    wrong(&with(""), &TABLE.replace("0.2", "x"), &["`x` in column `a` is no number", "t.csv:2"]);
+    wrong(&with(""), &TABLE.replace("0.2", "x"), &["`x` in column `a` is not a number", "t.csv:2"]);
     let rgb = edit("albedo = [0.9, 0.8, 0.7]", &format!("albedo = {}", column("")));
     wrong(&rgb, TABLE, &["a spectrum needs wavelengths, and band `R` has none", "bands.spectral"]);
     wrong(&with("extra = 1"), TABLE, &["unknown key `extra`"]);

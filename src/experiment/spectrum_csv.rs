@@ -233,7 +233,7 @@ impl WavelengthTable {
                 match text.parse::<f64>().ok().filter(|x| x.is_finite()) {
                     Some(number) => *value = number,
                     None => {
-                        let rule = format!("`{text}` in column `{}` is no number", &header[column]);
+                        let rule = format!("`{text}` in column `{}` is not a number", &header[column]);
                         let help = "remove the row, or give it a finite number";
                         findings.at(&place(line), rule, Some(help.into()));
                         return None;

@@ -38,7 +38,7 @@ pub(crate) const LARGEST_SKEW: f64 = 0.1;
 pub(crate) enum Refusal {
     /// No samples, or fewer than two bins that can hold any.
     Empty,
-    /// A probability or its error is no number in [0, 1].
+    /// A probability or its error is not a number in [0, 1].
     NotAProbability {
         /// The bin, counted from 0.
         bin: usize,

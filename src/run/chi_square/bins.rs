@@ -132,7 +132,7 @@ impl Partition {
         partition
     }
 
-    /// The leaf of a point; none where it lies outside the chart or is no number.
+    /// The leaf of a point; none where it lies outside the chart or is not a number.
     #[inline]
     pub(crate) fn leaf(&self, piece: usize, at: [f64; 2]) -> Option<usize> {
         match self.maps.get(piece)? {
