@@ -130,7 +130,9 @@ fn read(args: &Args, stored: &Stored, run: &EstimatorRun, names: &[String]) -> R
     let mut images = Vec::new();
     for (path, name) in args.images.iter().zip(names) {
         let image = read_exr(path).map_err(|error| match error {
-            Error::Record { .. } => Error::input(error.to_string()),
+            Error::Record { .. } => {
+                error.of_input("name linear OpenEXR images, as renderers write them")
+            }
             error => error,
         })?;
         images.push((name.clone(), image));

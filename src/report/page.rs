@@ -249,7 +249,7 @@ fn efficiency(data: &ReportData) -> Vec<PageBlock> {
     }
     let by_cpu: Vec<_> = data.comparisons.iter().filter(|row| row.cost == CostMeasure::Cpu).collect();
     let text = format!(
-        "Variance of a pass times its cost, of `against` over that of `candidate`: above 1 the candidate is the better. \
+        "Variance of a pass times its cost, of `against` over that of `candidate`: above 1, the candidate is the better. \
          In brackets the 95 % interval. By counters the cost is a weighted sum of counts, the same on every machine; \
          by CPU time it is this machine's, {}. A ratio is quoted where the two means agree; it is not resolved where \
          more passes could still change it or where a single pass may dominate it.",

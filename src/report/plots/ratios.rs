@@ -36,7 +36,7 @@ pub(super) fn section(stored: &Stored, rows: &[EfficiencyRow]) -> Section {
     }
     Section {
         heading: "Efficiency along the sweep".into(),
-        text: "A over B: variance of a pass times its cost, of B over that of A; above 1 A is the better. Bars and \
+        text: "A over B: variance of a pass times its cost, of B over that of A; above 1, A is the better. Bars and \
                shaded areas are 95 % intervals; hollow points are not resolved (more passes may move them)."
             .into(),
         drawn,
