@@ -64,7 +64,7 @@ fn unknown_keys_are_named_with_what_was_meant() {
 #[test]
 fn wrong_types_are_named() {
     let message = refused("radius_mm = 1.0", "radius_mm = \"1\"");
-    holds(&message, "expected a number, found a string", "4:37", "Radius, mm.");
+    holds(&message, "expected a number, found a string", "4:37", "write 1, without quotes");
     holds(&refused("seed = 1", "seed = 1.5"), "expected an integer, found 1.5", "2:8", "");
     let message = refused("eta = 1.3", "eta = true");
     holds(&message, "expected a number, an array or a table, found true", "5:34", "");
