@@ -145,23 +145,27 @@ impl Importance {
                 let Some(cells) = Cells::of(&scene.shape, nodes) else {
                     return vec![None; scene.bands()];
                 };
-                let borders = cells.borders(&scene.shape, &incidence);
                 let depth = cells.depth(&scene.shape);
+                let is_deep = |band: usize| {
+                    let Medium { sigma_t, albedo, phase, .. } = scene.medium[band];
+                    scatters(band) && depth * sigma_t * (1.0 - albedo * phase.g) >= least_depth
+                };
+                if !bands.clone().any(is_deep) {
+                    return vec![None; scene.bands()];
+                }
+                let borders = cells.borders(&scene.shape, &incidence);
                 let thinnest = scene.medium.iter().map(|medium| medium.sigma_t).filter(|s| *s > 0.0);
                 let reach = REACH / thinnest.fold(f64::INFINITY, f64::min);
                 let shores = cells.shores(&scene.shape, &incidence, reach);
                 let grid = |band: usize| {
-                    let Medium { sigma_t, albedo, phase, .. } = scene.medium[band];
-                    if depth * sigma_t * (1.0 - albedo * phase.g) < least_depth {
-                        return None;
-                    }
+                    let sigma_t = scene.medium[band].sigma_t;
                     let diffusion = Diffusion::of(scene, band);
                     let solved = cells.solve(&borders, band, diffusion)?;
                     let mut grid = cells.grid(&solved, 1.0 / sigma_t, ExitRule::of(scene, band));
                     cells.place_exits(&mut grid, &solved, &shores, band, diffusion);
                     Some(Importance::Grid(grid))
                 };
-                bands.map(|band| scatters(band).then(|| grid(band)).flatten()).collect()
+                bands.map(|band| is_deep(band).then(|| grid(band)).flatten()).collect()
             }
         }
     }
