@@ -128,6 +128,7 @@ fn budgets() {
 #[test]
 fn shards_that_are_not_what_is_needed_are_named() {
     let work = Work::with(&measured(301));
+    work.run("merge x.toml").exits(3).complains("there is no shard yet");
     shards(&work, 4);
     let folder = |name: &str| work.path(&format!("results/x/shards/{name}"));
     let refused = |parts: &[&str]| {

@@ -109,13 +109,19 @@ impl Shards {
             .chain(unfinished.iter().map(|s| s.count))
             .collect();
         let there: BTreeSet<Shard> = self.markers.iter().map(|marker| marker.shard).collect();
+        if counts.is_empty() {
+            return format!(
+                "there is no shard yet; run `scatterproof run {} --shard 1/N`",
+                file.display()
+            );
+        }
         let mut missing = Vec::new();
         for count in counts {
             let all = (1..=count).map(|index| Shard { index, count });
             missing.extend(all.filter(|shard| !there.contains(shard)));
         }
         let Some(first) = missing.first() else {
-            return "no shard of those that are there is missing: they are of another budget".into();
+            return "the shards are complete, but of another budget; run them again".into();
         };
         let state = |shard: &Shard| match unfinished.contains(shard) {
             true => format!("{shard} (not complete)"),
