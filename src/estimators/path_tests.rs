@@ -320,8 +320,10 @@ fn flights_at_once_are_flights_one_by_one() {
         for (boundary, g) in
             [(Boundary::Smooth { eta: 1.3 }, 0.0), (rough, 0.7), (Boundary::Matched, 0.2)]
         {
-            for roulette in ROULETTES {
-                let scene = scene(shape.clone(), boundary, medium(8.0, 0.95, g), sky(), off_axis());
+            // Without extinction a flight has no end.
+            let media = [medium(8.0, 0.95, g), medium(0.0, 0.95, g)];
+            for (roulette, medium) in ROULETTES.into_iter().flat_map(|r| media.map(|m| (r, m))) {
+                let scene = scene(shape.clone(), boundary, medium, sky(), off_axis());
                 let layout = Layout::new(&scene);
                 let field = Field::new(Arc::new(scene), roulette);
                 let key = StreamKey::named("flights_at_once_are_flights_one_by_one").pass(0);

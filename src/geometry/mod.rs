@@ -186,7 +186,8 @@ impl Shape {
     pub(crate) fn is_clear(&self, ray: &Ray, end: DVec3, t: f64) -> bool {
         const MARGIN: f64 = 1e-9;
         match *self {
-            Shape::HalfSpace => end.z < MARGIN * ray.origin.z,
+            // A flight without an end leaves a half-space at no point, and is not clear.
+            Shape::HalfSpace => end.z < MARGIN * ray.origin.z && t < f64::INFINITY,
             Shape::Slab { thickness } => {
                 end.z < -MARGIN * thickness && end.z > -(1.0 - MARGIN) * thickness
             }
