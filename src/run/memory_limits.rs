@@ -98,6 +98,14 @@ fn data_segment() -> Option<Available> {
     process_limit(Resource::Data, "VmData:", "limit of the data segment, ulimit -d")
 }
 
+/// Whether the limits of the process leave room for another thread. Beside its stack there must be room for what threads
+/// take as they start: a thread that finds none then aborts the program, where one that is not created is an error.
+pub(crate) fn has_room_for_thread() -> bool {
+    const STACK: usize = 2 << 20;
+    const STARTING: usize = 16 << 20;
+    [address_space(), data_segment()].into_iter().flatten().all(|left| left.bytes >= STACK + STARTING)
+}
+
 fn process_limit(resource: Resource, used: &str, limit: &'static str) -> Option<Available> {
     let most = getrlimit(resource).current? as usize;
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();

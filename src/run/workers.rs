@@ -19,6 +19,7 @@
 //! seconds, 1 to 3 % with every eighth turn.
 
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -30,6 +31,7 @@ use super::interrupt::Interrupt;
 use super::job::{Block, Finished, Job, PassRange, Passes, Start, Task};
 use super::keys::Stage;
 use super::live::Show;
+use super::memory_limits::has_room_for_thread;
 use super::pilot;
 use super::progress::Progress;
 use crate::error::{Error, Result};
@@ -198,7 +200,10 @@ pub(crate) fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed
     std::thread::scope(|scope| {
         for number in 1..=settings.threads {
             let (pool, sender) = (&pool, sender.clone());
-            let spawned = std::thread::Builder::new().spawn_scoped(scope, move || pool.work(&sender));
+            let spawned = match has_room_for_thread() {
+                true => std::thread::Builder::new().spawn_scoped(scope, move || pool.work(&sender)),
+                false => Err(ErrorKind::OutOfMemory.into()),
+            };
             if let Err(source) = spawned {
                 settings.interrupt.raise();
                 let what = format!("thread {number} of {}", settings.threads);
