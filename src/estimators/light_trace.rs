@@ -48,7 +48,6 @@ use serde::Deserialize;
 
 use super::choice::{choose_light, source_shares};
 use super::crossing::{other, radiance_scale};
-use super::flights::{Flights, clear_flights};
 use super::{
     Anomaly, Bias, Cost, Estimator, EstimatorKind, History, Scores, Sensors, Serves, read_options,
 };
@@ -327,17 +326,10 @@ impl<'a> Photon<'a> {
 
     /// Flies and scatters in the medium until the photon meets the boundary or is absorbed.
     fn walk_inside(&mut self) -> Option<Hit> {
-        let is_plain = self.measure.is_off();
         loop {
-            let (t, end) = if is_plain {
-                let t = self.fly_clear()?;
-                (t, self.scene.shape.end_of_unclear(&self.ray, self.from, t))
-            } else {
-                let t = sample_exponential(self.medium.sigma_t, self.stream.draw());
-                self.scores.count(Cost::Rays);
-                (t, self.scene.shape.end_of_flight(&self.ray, self.from, t))
-            };
-            match end {
+            let t = sample_exponential(self.medium.sigma_t, self.stream.draw());
+            self.scores.count(Cost::Rays);
+            match self.scene.shape.end_of_flight(&self.ray, self.from, t) {
                 Some(hit) => {
                     self.measure.fly(&self.ray, hit.t);
                     return Some(hit);
@@ -352,26 +344,6 @@ impl<'a> Photon<'a> {
                 None => self.scatter(t)?,
             }
         }
-    }
-
-    /// The length of the first flight that may reach the boundary, after those that certainly do not; `None` where the photon is
-    /// absorbed.
-    fn fly_clear(&mut self) -> Option<f64> {
-        let albedo = self.medium.albedo;
-        let survives = |stream: &mut Stream| stream.draw() < albedo;
-        let Flights { vertices, next } = clear_flights(
-            &self.scene.shape,
-            &self.medium,
-            &mut self.ray,
-            &mut self.stream,
-            self.scores,
-            survives,
-        );
-        if vertices > 0 {
-            self.from = None;
-            self.history.scatter_often(vertices);
-        }
-        next
     }
 
     /// A scattering event at distance `t`; `None` where the photon ends.
