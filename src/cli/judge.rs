@@ -7,11 +7,11 @@ use super::console::Console;
 use super::output::unwritable;
 use crate::error::{Error, Result};
 use crate::report::document::{FigureBlock, PictureFile};
-use crate::report::number::{per_cent, significant};
 use crate::report::outcome;
 use crate::report::tables::verdict_table;
 use crate::results::exr_file::{Part, read_exr, write_parts};
 use crate::results::image::write_diverging_png;
+use crate::results::number::{per_cent, significant};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::{
     atomic,
@@ -301,7 +301,7 @@ fn tell(
         args.verbose || !v.is_green() || ["mean", "pixels"].contains(&v.observable.as_str())
     });
     // Every row is of the same claim and cell.
-    let blank = |v: &Verdict| Verdict { claim: String::new(), cell: String::new(), ..v.clone() };
+    let blank = |v: &Verdict| Verdict { claim: String::new(), place: String::new(), ..v.clone() };
     let rows: Vec<Verdict> = shown.map(blank).collect();
     let console = Console::of_output();
     write!(out, "{}", console.outcomes(&console.laid_out(&verdict_table(&rows))))?;

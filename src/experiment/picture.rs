@@ -8,7 +8,7 @@ use crate::results::pictures::{self, Wanted};
 /// One picture: exactly one kind. Pictures are views of a record and change none of its bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{ "required": ["split"] }, { "required": ["running"] }]))]
+#[schemars(extend("oneOf" = [{ "required": ["split"] }, { "required": ["running"] }, { "required": ["strip"] }]))]
 pub struct PictureEntry {
     /// Two estimators side by side.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -16,7 +16,26 @@ pub struct PictureEntry {
     /// Means as passes add up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub running: Option<RunningEntry>,
+    /// One estimator's picture band by band.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strip: Option<StripEntry>,
 }
+
+/// A row of pictures per cell: all bands together as they are displayed, then bands by themselves in grey, all with
+/// the same exposure, so that a band is dark where the body is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StripEntry {
+    /// The estimator whose pictures are shown.
+    pub estimator: String,
+    /// How many bands are shown at most, evenly spaced; 8 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 64))]
+    pub bands: Option<u32>,
+}
+
+/// Bands of a strip without `bands`.
+const BANDS_OF_A_STRIP: u32 = 8;
 
 /// A plot per cell: the mean of one number over the first passes, with its interval, against the number of
 /// passes; and the value that an `equals` claim expects of it.
@@ -83,6 +102,12 @@ impl PictureEntry {
                 band: words.band.clone(),
             })
         });
-        split.or(running)
+        let strip = self.strip.as_ref().map(|words| {
+            Wanted::Strip(pictures::Strip {
+                estimator: words.estimator.clone(),
+                bands: words.bands.unwrap_or(BANDS_OF_A_STRIP) as usize,
+            })
+        });
+        split.or(running).or(strip)
     }
 }

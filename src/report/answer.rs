@@ -3,11 +3,11 @@
 
 use super::data::ReportData;
 use super::document::{BadgeKind, FigureBlock, PageBlock};
-use super::number::significant;
 use super::split;
 use super::summary::chosen;
 use super::terminal::reason;
 use crate::error::Result;
+use crate::results::number::significant;
 use crate::results::record::{CostMeasure, EstimatorRun, PIXELS};
 use crate::results::store::{RecordFolder, Stored};
 use crate::stats::hypothesis::{Estimate, critical_value};

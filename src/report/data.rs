@@ -34,6 +34,8 @@ pub(crate) struct ReportData {
     pub lead: Option<FigureBlock>,
     /// Grids of split pictures.
     pub splits: Vec<SplitFigure>,
+    /// Pictures band by band.
+    pub strips: Vec<FigureBlock>,
     /// Sections of plots, in the report's order.
     pub plots: Vec<Section>,
 }

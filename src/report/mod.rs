@@ -28,8 +28,6 @@ pub(crate) mod html;
 pub(crate) mod latex;
 /// Text as HTML shows it.
 mod markup;
-/// Numbers with their uncertainty.
-pub(crate) mod number;
 /// A page for verdicts without a record of their own.
 pub(crate) mod outcome;
 /// The content of the page.
@@ -42,6 +40,8 @@ pub(crate) mod plot;
 pub(crate) mod plots;
 /// Split pictures: two estimators in one picture.
 pub(crate) mod split;
+/// Pictures band by band.
+mod strip;
 /// Tables that papers quote: a row per cell and band.
 pub(crate) mod summary;
 /// Aligned text, Markdown and CSV.
@@ -81,6 +81,7 @@ pub(crate) fn write_judged(
     let viewers = viewer::viewers(&stored, &pictures)?;
     let wanted = folder.read_pictures()?;
     let mut splits = split::write_splits(folder, &stored, &split::wanted(&wanted))?;
+    let strips = strip::write_strips(folder, &stored, &wanted)?;
     viewer::keep_room(&viewers, splits.iter_mut().map(|split| &mut split.viewer));
     let comparisons = comparisons::comparisons(&stored);
     let model_errors = model_errors(&stored);
@@ -97,6 +98,7 @@ pub(crate) fn write_judged(
         model_errors,
         viewers,
         splits,
+        strips,
         plots,
     };
     let page = page::page(&data);

@@ -4,7 +4,6 @@
 use super::answer;
 use super::data::{FOREIGN_TIMING, ReportData};
 use super::document::{Document, PageBlock, TableBlock};
-use super::number::significant;
 use super::plots::Section;
 use super::summary;
 use super::table::Table;
@@ -14,6 +13,7 @@ use super::tables::{
 use super::undecided::{Undecided, two_digits_up, undecided};
 use crate::results::json::canonical;
 use crate::results::measurements::Measurement;
+use crate::results::number::significant;
 use crate::results::record::{CostMeasure, EstimatorRun};
 use crate::verify::levels::FAMILY_LEVEL;
 use crate::verify::verdict::Outcome;
@@ -37,6 +37,7 @@ pub(super) fn page(data: &ReportData) -> Document {
         blocks.extend(efficiency(data));
         blocks.extend(pictures(data));
         blocks.extend(super::split::blocks(&data.splits));
+        blocks.extend(super::strip::blocks(&data.strips));
         blocks.extend(model_errors(data));
         blocks.extend(data.plots.iter().flat_map(Section::blocks));
         blocks.extend(measured(data));

@@ -3,12 +3,12 @@
 //! the times are equal or by how much they differ.
 
 use super::document::{Document, FigureBlock, PageBlock, PictureFile, TableBlock, ViewerBlock};
-use super::number::significant;
 use super::table::Table;
 use super::viewer;
 use crate::error::Result;
 use crate::results::canvas::{Canvas, Unshown};
 use crate::results::image::{Picture, gain};
+use crate::results::number::significant;
 use crate::results::pictures::{Split, Wanted};
 use crate::results::record::{Cell, EstimatorRun};
 use crate::results::store::{RecordFolder, Stored};
@@ -17,13 +17,13 @@ use crate::results::store::{RecordFolder, Stored};
 const EQUAL: f64 = 1.1;
 /// The fraction of non-black pixels that are darker than the white level of a picture. It is below 1, so
 /// that a highlight does not darken the body.
-const WHITE: f64 = 0.95;
+pub(super) const WHITE: f64 = 0.95;
 /// A picture narrower than this is enlarged by an integer factor.
 const WIDE_ENOUGH: usize = 192;
 /// Gap between the halves of a picture, in pixels of the sheet.
 const SEAM: usize = 1;
 /// Gap between pictures, pixels.
-const GAP: usize = 6;
+pub(super) const GAP: usize = 6;
 
 /// A grid of split pictures in the report.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,7 +46,7 @@ pub(crate) struct SplitFigure {
 pub(super) fn wanted(all: &[Wanted]) -> Vec<Split> {
     let split = |wanted: &Wanted| match wanted {
         Wanted::Split(split) => Some(split.clone()),
-        Wanted::Running(_) => None,
+        Wanted::Running(_) | Wanted::Strip(_) => None,
     };
     all.iter().filter_map(split).collect()
 }
@@ -392,7 +392,7 @@ impl<'a> Grid<'a> {
         header.push("note".into());
         let mut table = Table { header, rows: Vec::new() };
         for (pair, unshown) in self.pairs.iter().zip(unshown) {
-            let mut row = vec![pair.cell.label.clone()];
+            let mut row = vec![pair.cell.title()];
             for half in &pair.halves {
                 row.push(half.run.map_or(String::new(), |run| run.passes.to_string()));
                 row.push(significant(half.seconds, 3));
@@ -477,13 +477,18 @@ fn white<'a>(halves: &[Half<'a>; 2], stops: Option<f64>) -> (f64, Option<&'a str
     let quiet = if halves[1].noise() < halves[0].noise() { &halves[1] } else { &halves[0] };
     let brightest = |rgb: [f64; 3]| rgb.into_iter().fold(f64::NEG_INFINITY, f64::max);
     let pixels = quiet.picture.iter().flat_map(|picture| picture.rgb()).map(brightest);
-    let mut lit: Vec<f64> = pixels.filter(|x| *x > 0.0 && x.is_finite()).collect();
-    lit.sort_by(f64::total_cmp);
-    let at = (WHITE * lit.len() as f64) as usize;
-    match lit.get(at.min(lit.len().saturating_sub(1))) {
-        Some(white) => (*white, quiet.run.map(|run| run.estimator.as_str())),
+    match white_level(pixels) {
+        Some(white) => (white, quiet.run.map(|run| run.estimator.as_str())),
         None => (1.0, None),
     }
+}
+
+/// The percentile [`WHITE`] of those values that are not black; none of a black picture.
+pub(super) fn white_level(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut lit: Vec<f64> = values.filter(|x| *x > 0.0 && x.is_finite()).collect();
+    lit.sort_by(f64::total_cmp);
+    let at = (WHITE * lit.len() as f64) as usize;
+    lit.get(at.min(lit.len().saturating_sub(1))).copied()
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! Tables that papers quote: a row for each cell and band, a column for each estimator.
 
 use super::document::TableBlock;
-use super::number::{significant, with_error};
 use super::table::Table;
 use super::tables::at_least;
 use crate::results::counted_work;
 use crate::results::measurements::Measurement;
+use crate::results::number::{significant, with_error};
 use crate::results::record::{Cell, CostMeasure, PIXELS};
 use crate::results::store::Stored;
 use crate::verify::comparisons::EfficiencyRow;

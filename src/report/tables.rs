@@ -1,8 +1,8 @@
 //! Tables of claims, verdicts, measurements, efficiencies and model errors.
 
-use super::number::{per_cent, significant, with_error};
 use super::table::Table;
 use crate::results::measurements::Measurement;
+use crate::results::number::{per_cent, significant, with_error};
 use crate::results::record::CostMeasure;
 use crate::verify::comparisons::{EfficiencyRow, measure_name};
 use crate::verify::model_errors::ModelError;
@@ -42,7 +42,7 @@ pub(crate) fn verdict_table(verdicts: &[Verdict]) -> Table {
         table.push(vec![
             v.outcome.to_string(),
             v.claim.clone(),
-            v.cell.clone(),
+            v.place.clone(),
             v.band.clone(),
             v.estimators.clone(),
             v.observable.clone(),

@@ -2,10 +2,10 @@
 
 use super::data::{FOREIGN_TIMING, ReportData};
 use super::document::TableBlock;
-use super::number::{per_cent, significant, with_error};
 use super::summary;
 use super::table::Table;
 use crate::results::measurements::Measurement;
+use crate::results::number::{per_cent, significant, with_error};
 use crate::results::record::CostMeasure;
 use crate::verify::comparisons::EfficiencyRow;
 use crate::verify::verdict::{TestKind, Verdict};

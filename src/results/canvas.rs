@@ -46,9 +46,34 @@ impl Canvas {
         zoom: usize,
         (x, y): (usize, usize),
     ) -> Unshown {
+        self.paint_pixels(picture.rgb(), picture.width, columns, gain, zoom, (x, y))
+    }
+
+    /// Paints one band of a picture in grey, as [`Canvas::paint`] does.
+    pub fn paint_band(
+        &mut self,
+        picture: &Picture,
+        band: usize,
+        gain: f64,
+        zoom: usize,
+        corner: (usize, usize),
+    ) -> Unshown {
+        let grey = picture.mean(band).map(|radiance| [radiance; 3]);
+        self.paint_pixels(grey, picture.width, 0..picture.width, gain, zoom, corner)
+    }
+
+    fn paint_pixels(
+        &mut self,
+        pixels: impl Iterator<Item = [f64; 3]>,
+        width: usize,
+        columns: Range<usize>,
+        gain: f64,
+        zoom: usize,
+        (x, y): (usize, usize),
+    ) -> Unshown {
         let mut unshown = Unshown::default();
-        for (index, rgb) in picture.rgb().enumerate() {
-            let (row, column) = (index / picture.width, index % picture.width);
+        for (index, rgb) in pixels.enumerate() {
+            let (row, column) = (index / width, index % width);
             if !columns.contains(&column) {
                 continue;
             }

@@ -28,6 +28,8 @@ pub mod manifest;
 pub mod measurements;
 /// NumPy's array files.
 pub mod npy;
+/// Numbers with their uncertainty.
+pub(crate) mod number;
 /// Pictures that an experiment asks for.
 pub mod pictures;
 /// Build and machine of a run.

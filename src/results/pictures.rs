@@ -11,6 +11,8 @@ pub enum Wanted {
     Split(Split),
     /// Means as passes add up.
     Running(Running),
+    /// One estimator's picture in every band.
+    Strip(Strip),
 }
 
 /// A grid of pictures, a picture a cell, whose left half is one estimator's and whose right half
@@ -42,4 +44,14 @@ pub struct Running {
     pub class: String,
     /// Band that is shown.
     pub band: String,
+}
+
+/// A row of pictures a cell: all bands together as they are displayed, then bands by themselves in grey.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Strip {
+    /// The estimator whose pictures are shown.
+    pub estimator: String,
+    /// How many bands are shown at most, evenly spaced.
+    pub bands: usize,
 }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use super::evidence::Evidence;
 use super::levels::{FIRST_LOOK, Looks, SECOND_LOOK};
 use super::verdict::{Objection, Outcome, Verdict, known};
+use crate::results::number::significant;
 use crate::stats::multiplicity::holm;
 
 /// One test of a family.
@@ -181,11 +182,16 @@ fn reason(found: &Outcome, evidence: &Evidence, detect: Option<f64>, verdict: &V
         | (Outcome::Fail, Evidence::Counts { said, .. }) => said.clone(),
         (Outcome::Fail, Evidence::Sum(_)) => "the table as a whole deviates".into(),
         (Outcome::Fail, _) => verdict.deviation(),
-        (Outcome::Underpowered, _) => format!(
-            "could have missed {:.2e}, {:.2e} must be found",
-            verdict.detectable.unwrap_or(f64::INFINITY),
-            detect.unwrap_or_default()
-        ),
+        (Outcome::Underpowered, _) => {
+            let [missed, wanted] =
+                [verdict.detectable.unwrap_or(f64::INFINITY), detect.unwrap_or_default()].map(|size| {
+                    match verdict.expected {
+                        Some(0.0) => significant(size, 3),
+                        _ => format!("{} %", significant(100.0 * size, 3)),
+                    }
+                });
+            format!("could have missed {missed}, {wanted} must be found")
+        }
         (Outcome::Pass, _) => String::new(),
     }
 }

@@ -195,6 +195,9 @@ pub(crate) struct Verdict {
     pub experiment: String,
     /// Cell label; `a vs b` across two.
     pub cell: String,
+    /// The cell by its place on the axes of the sweep, for people; `a vs b` across two.
+    #[serde(skip)]
+    pub place: String,
     /// Band name; `a vs b` across two.
     pub band: String,
     /// Transport class.

@@ -17,6 +17,9 @@ pub(crate) fn picture(at: At, picture: &PictureEntry, known: &Known) {
         }
         band(at.to("band"), &words.band, known);
     }
+    if let Some(words) = &picture.strip {
+        estimator(at.to("strip").to("estimator"), &words.estimator, known);
+    }
 }
 
 fn split(at: At, words: &SplitEntry, known: &Known) {
@@ -42,13 +45,14 @@ fn split(at: At, words: &SplitEntry, known: &Known) {
     }
 }
 
-/// Split pictures need pixels: `at` is the list of pictures, `sensor` that of a cell.
+/// Pictures need pixels: `at` is the list of pictures, `sensor` that of a cell.
 pub(crate) fn has_pixels(at: At, sensor: &SensorEntry) {
-    let first = (0..at.count()).find(|i| at.item(*i).has("split"));
-    let Some(first) = first else { return };
+    let kinds = [("split", "a split picture"), ("strip", "a strip of bands")];
+    let of = |i: usize| kinds.iter().find(|(key, _)| at.item(i).has(key)).map(|(_, kind)| (i, kind));
+    let Some((first, kind)) = (0..at.count()).find_map(of) else { return };
     if !sensor.has_pixels() {
         at.item(first).report_help(
-            "a split picture needs pixels, and the sensor has none",
+            format!("{kind} needs pixels, and the sensor has none"),
             "take an `orthographic` or a `perspective` sensor in every cell, or drop the picture",
         );
     }

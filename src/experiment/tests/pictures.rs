@@ -35,7 +35,11 @@ fn pictures_name_estimators_and_axes() {
     holds(&message, "rows and columns are the same axis", "21:63", "");
     let message = picture("left = \"mis\", right = \"snee\", exposure_stops = nan");
     assert!(message.contains("exposure_stops"), "{message}");
-    assert!(errors(&text("")).contains("`split`, `running` is needed"), "{}", errors(&text("")));
+    assert!(
+        errors(&text("")).contains("`split`, `running`, `strip` is needed"),
+        "{}",
+        errors(&text(""))
+    );
 }
 
 #[test]
@@ -44,6 +48,18 @@ fn pictures_need_pixels() {
     let message =
         errors(&format!("{GOOD}[[estimator]]\nname = \"snee\"\nsnee = {{}}\n[[picture]]\n{split}\n"));
     assert!(message.contains("a split picture needs pixels, and the sensor has none"), "{message}");
+    let message = errors(&format!("{GOOD}[[picture]]\nstrip = {{ estimator = \"mis\" }}\n"));
+    assert!(message.contains("a strip of bands needs pixels, and the sensor has none"), "{message}");
+}
+
+#[test]
+fn strips_name_an_estimator_and_have_a_band() {
+    let strip = |words: &str| errors(&text(&format!("strip = {{ {words} }}")));
+    holds(&strip("estimator = \"mos\""), "unknown estimator `mos`", "21:23", "did you mean `mis`?");
+    assert!(strip("estimator = \"mis\", bands = 0").contains("bands"));
+    let wanted = wanted(&good(&text("strip = { estimator = \"mis\" }")).file.picture);
+    let [Wanted::Strip(strip)] = &wanted[..] else { panic!("{wanted:?}") };
+    assert_eq!((strip.estimator.as_str(), strip.bands), ("mis", 8));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Axes: from values to places in a picture, and the round values at the ticks.
 
 use crate::math::log10;
-use crate::report::number::significant;
+use crate::results::number::significant;
 
 /// Label, scale and range of an axis.
 #[derive(Clone, Debug, Default, PartialEq)]

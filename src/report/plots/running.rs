@@ -18,7 +18,7 @@ const CONFIDENCE: f64 = 0.95;
 pub(super) fn section(stored: &Stored, wanted: &[Wanted]) -> Section {
     let running = wanted.iter().filter_map(|wanted| match wanted {
         Wanted::Running(running) => Some(running),
-        Wanted::Split(_) => None,
+        Wanted::Split(_) | Wanted::Strip(_) => None,
     });
     let mut drawn = Vec::new();
     for (number, running) in running.enumerate() {

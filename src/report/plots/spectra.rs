@@ -1,9 +1,9 @@
 //! Means by wavelength, and the resulting colour.
 
 use super::section::{Content, PlotFigure, Section, mean_of, runs};
-use crate::report::number::with_error;
 use crate::report::plot::{Plot, PlotAxis, PlotPoint, Series, Style};
 use crate::results::image::{gain, shown_bytes};
+use crate::results::number::with_error;
 use crate::results::record::{Band, Cell, EstimatorRun};
 use crate::results::store::Stored;
 use crate::stats::hypothesis::Estimate;

@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use super::base64;
 use super::document::{FigureBlock, ViewerBlock};
-use super::number::significant;
 use super::pictures::{RunPicture, few_bands};
 use crate::error::Result;
 use crate::results::image::{Picture, to_byte_png, to_linear_png};
+use crate::results::number::significant;
 use crate::results::record::{Cell, EstimatorRun, StatedBias};
 use crate::results::store::Stored;
 use crate::stats::tails::student_two_sided;
