@@ -21,8 +21,8 @@ pub struct PictureEntry {
     pub strip: Option<StripEntry>,
 }
 
-/// A row of pictures per cell: all bands together as they are displayed, then bands by themselves in grey, all with
-/// the same exposure, so that a band is dark where the body is.
+/// A row of pictures per cell: all bands together as they are displayed, then bands by themselves in grey, all of
+/// them with the same exposure, so that a band is dark where the body is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StripEntry {

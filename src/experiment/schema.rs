@@ -666,8 +666,8 @@ pub enum Budget {
     RelativeError(RelativeError),
 }
 
-/// Runs that take a share of the budget, for estimators or cells that need fewer passes than others for the
-/// same error. If several entries match a run, their shares are multiplied.
+/// Runs that take a multiple of the budget, for estimators or cells that need fewer or more passes than others for
+/// the same error. If several entries match a run, their shares are multiplied.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BudgetShare {
@@ -677,8 +677,8 @@ pub struct BudgetShare {
     /// Only these estimators, and their controls; all by default.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub estimators: Vec<String>,
-    /// Part of the passes, or of the CPU seconds.
-    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
+    /// Multiplies the passes, or the CPU seconds.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1000.0))]
     pub share: f64,
 }
 

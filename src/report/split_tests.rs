@@ -92,7 +92,10 @@ fn halves_are_whose_they_should_be_and_share_a_white() {
     // Beside it the caption, and each picture alone.
     let path = |name: &str| folder.path().join("images").join(name);
     let caption = std::fs::read_to_string(path("split-1.md")).expect("a caption");
-    assert!(caption.contains("| rough, sun") && caption.contains(&figure.caption), "{caption}");
+    assert!(
+        caption.contains("| boundary = rough, light = sun") && caption.contains(&figure.caption),
+        "{caption}"
+    );
     let alone = std::fs::read(path("split-1-cell-002.png")).expect("a picture");
     assert_eq!(decoded(&alone).0, 193);
     assert_eq!(std::fs::read(path("split-1.png")).expect("the grid"), figure.png);
@@ -157,7 +160,10 @@ fn axes_that_are_neither_rows_nor_columns_give_grids() {
     let stems: Vec<&str> = figures.iter().map(|figure| figure.stem.as_str()).collect();
     assert_eq!(stems, ["images/split-1-1", "images/split-1-2"]);
     assert_eq!(figures[1].title, "mis | snee, boundary smooth");
-    assert_eq!(column(&figures[1], "cell"), ["smooth, sun", "smooth, sky"]);
+    assert_eq!(
+        column(&figures[1], "cell"),
+        ["boundary = smooth, light = sun", "boundary = smooth, light = sky"]
+    );
 }
 
 #[test]

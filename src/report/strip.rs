@@ -1,5 +1,5 @@
 //! Pictures band by band: a row for each cell, with all bands together as they are displayed, and then bands by
-//! themselves in grey. The bands of a row have one exposure, so that a band is dark where the body is.
+//! themselves in grey. All pictures of a column, and all in grey, have one exposure: a band is dark where the body is.
 
 use super::document::{FigureBlock, PageBlock, PictureFile};
 use super::split::{GAP, WHITE, white_level};
@@ -60,21 +60,26 @@ fn write(folder: &RecordFolder, stored: &Stored, index: usize, strip: &Strip) ->
     let width = rows.iter().map(|row| row.picture.width).max().unwrap_or(1);
     let height = rows.iter().map(|row| row.picture.height).max().unwrap_or(1);
     let zoom = WIDE_ENOUGH.div_ceil(width).max(1);
-    let (width, height) = (width * zoom, height * zoom);
+    let names = bands.iter().map(|band| record.bands[*band].name.as_str());
+    let widest = names.clone().map(Canvas::label_width).max().unwrap_or(0);
+    let (width, height) = ((width * zoom).max(widest), height * zoom);
     let sheet = |count: usize, length: usize| (count * (length + GAP)).saturating_sub(GAP).max(1);
     let label = Canvas::LABEL_HEIGHT;
     let mut canvas = Canvas::new(sheet(1 + bands.len(), width), label + sheet(rows.len(), height));
-    for (number, band) in bands.iter().enumerate() {
-        canvas.label(&record.bands[*band].name, ((1 + number) * (width + GAP), 0), false);
+    for (number, name) in names.enumerate() {
+        canvas.label(name, ((1 + number) * (width + GAP), 0), false);
     }
+    let brightest = |row: &Row| -> Vec<f64> {
+        row.picture.rgb().map(|rgb| rgb.into_iter().fold(f64::NEG_INFINITY, f64::max)).collect()
+    };
+    let in_bands = |row: &Row| -> Vec<f64> { bands.iter().flat_map(|b| row.picture.mean(*b)).collect() };
+    let colour = 1.0 / white_level(rows.iter().flat_map(brightest)).unwrap_or(1.0);
+    let grey = 1.0 / white_level(rows.iter().flat_map(in_bands)).unwrap_or(1.0);
     for (number, Row { picture, .. }) in rows.iter().enumerate() {
         let y = label + number * (height + GAP);
-        let colours = picture.rgb().map(|rgb| rgb.into_iter().fold(f64::NEG_INFINITY, f64::max));
-        let gain = 1.0 / white_level(colours).unwrap_or(1.0);
-        canvas.paint(picture, 0..picture.width, gain, zoom, (0, y));
-        let gain = 1.0 / white_level(bands.iter().flat_map(|band| picture.mean(*band))).unwrap_or(1.0);
+        canvas.paint(picture, 0..picture.width, colour, zoom, (0, y));
         for (number, band) in bands.iter().enumerate() {
-            canvas.paint_band(picture, *band, gain, zoom, ((1 + number) * (width + GAP), y));
+            canvas.paint_band(picture, *band, grey, zoom, ((1 + number) * (width + GAP), y));
         }
     }
     let png = canvas.to_png()?;
@@ -92,7 +97,7 @@ fn write(folder: &RecordFolder, stored: &Stored, index: usize, strip: &Strip) ->
 fn caption(cells: usize, rows: &[Row]) -> String {
     let mut text = format!(
         "From the left: all bands together, then bands by themselves in grey. White is the {:.0}th percentile of the \
-         pixels that are not black, of the bands of a row together; clipped to sRGB.",
+         pixels that are not black, for all pictures in colour, and for all in grey; clipped to sRGB.",
         100.0 * WHITE
     );
     if cells > 1 {

@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn verdicts_show_what_they_could_see() {
         let text = verdict_table(&judge_alone(&sample::judged(&[("holds", 1.0)]))).to_text();
-        assert!(text.contains("pass     holds  smooth  R     mis"), "{text}");
+        assert!(text.contains("pass     holds  boundary = smooth  R     mis"), "{text}");
         assert!(text.contains(" %"), "{text}");
     }
 }

@@ -346,7 +346,7 @@ fn claimed<'a>(
     experiment.file.only_claimed.then(|| here.map(|quantity| quantity.estimator.as_str()).collect())
 }
 
-/// The part of the budget that an estimator takes in a cell.
+/// The multiple of the budget that an estimator takes in a cell.
 fn share(experiment: &Experiment, cell: &CellSpec, estimator: &str) -> f64 {
     let shares = experiment.file.budget_share.iter();
     let of_estimator = |names: &[String]| names.is_empty() || names.iter().any(|name| name == estimator);

@@ -110,7 +110,7 @@ fn shares_of_the_budget_name_what_is_there() {
     let message = share("share = 0.5\nwhere = { light = \"sky\" }");
     assert!(message.contains("unknown axis `light`"), "{message}");
     assert!(share("share = 0").contains("must be greater than 0, is 0"));
-    assert!(share("share = 2").contains("must be at most 1, is 2"));
+    assert!(share("share = 1001").contains("must be at most 1000, is 1001"));
     let error = "budget.relative_error = { at_most = 0.1 }";
     let message =
         errors(&format!("{}[[budget_share]]\nshare = 0.5\n", GOOD.replace("budget.passes = 16", error)));
