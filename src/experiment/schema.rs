@@ -710,7 +710,7 @@ pub struct SmallValues {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Display {
-    /// Stops by which PNG pictures are brightened.
+    /// Stops by which PNG pictures are brightened. With 0 the picture at the head of the report has a white level of its own.
     #[serde(default)]
     pub exposure_stops: f64,
 }

@@ -109,7 +109,8 @@ impl SplitFigure {
 /// The width that a lead picture has at least, in pixels.
 const LEAD_WIDE: usize = 640;
 
-/// Writes one picture labelled with the names of both estimators, their CPU seconds, and the result for their ratio.
+/// Writes one picture labelled with the names of both estimators, their CPU seconds, and the result for their ratio. Its exposure
+/// is that of the experiment's pictures, if the experiment sets one; otherwise the picture has a white level of its own.
 ///
 /// # Errors
 /// I/O.
@@ -121,7 +122,9 @@ pub(super) fn lead(
     ratio: &str,
 ) -> Result<FigureBlock> {
     let [left, right] = [left, right].map(String::from);
-    let split = Split { left, right, rows: None, columns: None, exposure_stops: None };
+    let exposure_stops =
+        stored.record.resolved["display"]["exposure_stops"].as_f64().filter(|s| *s != 0.0);
+    let split = Split { left, right, rows: None, columns: None, exposure_stops };
     let mut grid = Grid::new(stored, &split, &[cell]);
     let (single, pair) = (split.left == split.right, &grid.pairs[0]);
     let label = |half: &Half, name: &str| match half.seconds {

@@ -174,3 +174,22 @@ fn a_missing_image_is_noted() {
     assert_eq!(column(&figures[0], "note")[3], "no image of snee");
     assert_eq!(column(&figures[0], "white of")[3], "mis");
 }
+
+/// The picture at the head of the report: `snee`, the right half, shows 2 everywhere but in its last pixel.
+#[test]
+fn the_lead_has_the_exposure_of_the_experiment() {
+    let mut stored = grid(|_| 1.0, [2.0, 2.0]);
+    let red = |stored: &Stored| {
+        let temp = tempfile::tempdir().expect("a folder");
+        let folder = RecordFolder::new(temp.path());
+        let cell = (0, &stored.record.cells[0]);
+        let figure = lead(&folder, stored, cell, ["mis", "snee"], "").expect("a picture");
+        let PictureFile::Png(png) = figure.picture else { panic!("no PNG") };
+        let (width, height, data) = decoded(&png);
+        data[3 * (height / 4 * width + 3 * width / 4)]
+    };
+    let shown = |x: f64| (255.0 * (1.055 * x.powf(1.0 / 2.4) - 0.055)).round() as u8;
+    assert_eq!(red(&stored), shown(2.0 / 40.0), "white is the brightest of the few pixels");
+    stored.record.resolved = serde_json::json!({ "display": { "exposure_stops": -2.0 } });
+    assert_eq!(red(&stored), shown(2.0 * 0.25));
+}
