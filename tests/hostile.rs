@@ -1,6 +1,6 @@
 //! Mutated input of every kind: no panic, no signal, no hang, no memory above 1 GiB.
 //!
-//! `SCATTERPROOF_HOSTILE_SECONDS` is the time per kind (10 without it), `SCATTERPROOF_HOSTILE_SEED` another sequence.
+//! `SCATTERPROOF_HOSTILE_SECONDS` is the time per kind, which is a test (10 without it), `SCATTERPROOF_HOSTILE_SEED` another sequence.
 
 use std::fs;
 use std::process::{Command, Stdio};
@@ -96,13 +96,25 @@ fn mutated(seed: &[u8], chance: &mut Chance) -> Vec<u8> {
     bytes
 }
 
-/// Writes mutations of a file and runs a command on each, in at most 1 GiB and 20 s.
-fn withstands(work: &Work, name: &str, command: &str, sign: bool) {
-    let number = |name: &str, default: u64| {
-        std::env::var(name).map_or(default, |text| text.parse().expect("a whole number"))
-    };
-    let time = Duration::from_secs(number("SCATTERPROOF_HOSTILE_SECONDS", 10));
+/// A file and a command that reads it.
+type Target<'a> = (&'a str, &'a str);
+
+/// Writes mutations of files of one kind and runs a command on each, in at most 1 GiB and 20 s. The targets share the time of
+/// the kind.
+fn withstand(work: &Work, targets: &[Target<'_>]) {
+    let seconds = number("SCATTERPROOF_HOSTILE_SECONDS", 10) as f64;
+    let time = Duration::from_secs_f64(seconds / targets.len() as f64);
+    targets.iter().for_each(|target| withstands(work, *target, time));
+}
+
+fn number(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| text.parse().expect("a whole number"))
+}
+
+fn withstands(work: &Work, (name, command): Target<'_>, time: Duration) {
     let first = number("SCATTERPROOF_HOSTILE_SEED", 1);
+    // A record is signed, and what is behind the signature is to be read.
+    let sign = name.ends_with("record.json");
     let seed = fs::read(work.path(name)).expect("a seed");
     let script = format!("ulimit -v 1048576; exec timeout -s KILL 20 \"$0\" {command}");
     let (begun, mut tried) = (Instant::now(), 0);
@@ -146,8 +158,7 @@ fn with_table() -> String {
 fn hostile_experiments_and_tables() {
     let work = Work::with(&with_table());
     work.write("t.csv", TABLE);
-    withstands(&work, "x.toml", "check x.toml", false);
-    withstands(&work, "t.csv", "check x.toml", false);
+    withstand(&work, &[("x.toml", "check x.toml"), ("t.csv", "check x.toml")]);
 }
 
 #[test]
@@ -161,7 +172,7 @@ fn hostile_meshes() {
         "# a tetrahedron\no a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nvt 0 0\ng b\ns off\n\
          f 1 3 2\nf 1//1 2//1 4//1\nf 2/1/1 3/1/1 4/1/1\nf -2 -4 -1\n",
     );
-    withstands(&work, "m.obj", "check x.toml", false);
+    withstand(&work, &[("m.obj", "check x.toml")]);
 }
 
 #[test]
@@ -175,9 +186,9 @@ fn hostile_images() {
     for name in ["m.exr", "other.exr"] {
         fs::write(work.path(name), image).expect("an image");
     }
-    withstands(&work, "m.exr", "judge --reference results/x --estimator mis m.exr other.exr", false);
     work.write("y.toml", &edit("environment = { radiance = 0.2 }", "environment = { map = \"m.exr\" }"));
-    withstands(&work, "m.exr", "check y.toml", false);
+    let judge = "judge --reference results/x --estimator mis m.exr other.exr";
+    withstand(&work, &[("m.exr", judge), ("m.exr", "check y.toml")]);
 }
 
 #[test]
@@ -185,16 +196,15 @@ fn hostile_images() {
 fn hostile_records() {
     let work = Work::with(&edit("passes = 100", "passes = 4"));
     work.run("run x.toml -q").exits(0);
-    for (name, sign) in [
-        ("record/record.json", true),
-        ("record/cells/000/000.observables.npy", false),
-        ("timing.json", false),
-        ("provenance.json", false),
-        ("manifest.json", false),
-    ] {
-        withstands(&work, &format!("results/x/{name}"), "verify results/x", sign);
-        withstands(&work, &format!("results/x/{name}"), "report results/x", sign);
-    }
+    let files = [
+        "results/x/record/record.json",
+        "results/x/record/cells/000/000.observables.npy",
+        "results/x/timing.json",
+        "results/x/provenance.json",
+        "results/x/manifest.json",
+    ];
+    let targets = files.map(|name| [(name, "verify results/x"), (name, "report results/x")]);
+    withstand(&work, targets.as_flattened());
 }
 
 #[test]
@@ -206,7 +216,7 @@ fn hostile_states_and_shards() {
     }
     let states = work.files("results/x/shards/1-of-2/state");
     let state = states.keys().find(|name| name.ends_with(".state")).expect("a state");
-    withstands(&work, "results/x/shards/1-of-2/shard.json", "merge x.toml --no-report", false);
     let state = format!("results/x/shards/1-of-2/state/{state}");
-    withstands(&work, &state, "run x.toml -q --shard 1/2", false);
+    let shard = "results/x/shards/1-of-2/shard.json";
+    withstand(&work, &[(shard, "merge x.toml --no-report"), (&state, "run x.toml -q --shard 1/2")]);
 }
