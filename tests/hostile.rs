@@ -1,6 +1,7 @@
 //! Mutated input of every kind: no panic, no signal, no hang, no memory above 1 GiB.
 //!
-//! `SCATTERPROOF_HOSTILE_SECONDS` is the time per kind, which is a test (10 without it), `SCATTERPROOF_HOSTILE_SEED` another sequence.
+//! Each test is a kind. `SCATTERPROOF_HOSTILE_SECONDS` is its time (10 by default), `SCATTERPROOF_HOSTILE_SEED` another
+//! sequence.
 
 use std::fs;
 use std::process::{Command, Stdio};

@@ -252,13 +252,13 @@ fn a_budget_in_seconds_comes_again_by_the_passes_of_its_record() {
     work.run("compare first/x third/x").says("the records are not byte-identical");
 }
 
-/// The shares of the budget that match a run multiply, and its passes are the first of those that the
-/// whole budget pays for.
+/// The shares of the budget that match a run multiply, and its passes are the first of those of any larger budget.
 #[test]
 fn a_share_of_the_budget_is_its_first_passes() {
     let sweep = "[[sweep]]\nkey = \"object.medium.coefficients.albedo\"\nvalues = [0.9, 0.5]\n";
     let shares = "[[budget_share]]\nestimators = [\"analog\"]\nshare = 0.5\n\
-                  [[budget_share]]\nwhere = { albedo = \"0.5\" }\nshare = 0.25\n";
+                  [[budget_share]]\nwhere = { albedo = \"0.5\" }\nshare = 0.25\n\
+                  [[budget_share]]\nwhere = { albedo = \"0.9\" }\nshare = 2\n";
     let text = probe() + sweep;
     let work = Work::with(&format!("{text}{shares}"));
     work.run("run x.toml -q --set budget.passes=64").exits(0);
@@ -266,7 +266,7 @@ fn a_share_of_the_budget_is_its_first_passes() {
     let record = json(&shared);
     let passes = |cell: usize, run: usize| record["cells"][cell]["runs"][run]["passes"].as_u64();
     let all = [passes(0, 0), passes(0, 1), passes(1, 0), passes(1, 1)];
-    assert_eq!(all, [64, 32, 16, 8].map(Some));
+    assert_eq!(all, [128, 64, 16, 8].map(Some));
     let quarter = Work::with(&text);
     quarter.run("run x.toml -q --set budget.passes=16").exits(0);
     let quarter = observables(&quarter.record("results"));

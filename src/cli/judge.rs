@@ -301,7 +301,7 @@ fn tell(
         args.verbose || !v.is_green() || ["mean", "pixels"].contains(&v.observable.as_str())
     });
     // Every row is of the same claim and cell.
-    let blank = |v: &Verdict| Verdict { claim: String::new(), place: String::new(), ..v.clone() };
+    let blank = |v: &Verdict| Verdict { claim: String::new(), cell_title: String::new(), ..v.clone() };
     let rows: Vec<Verdict> = shown.map(blank).collect();
     let console = Console::of_output();
     write!(out, "{}", console.outcomes(&console.laid_out(&verdict_table(&rows))))?;

@@ -19,10 +19,14 @@ pub(crate) struct RunPicture {
 /// The bands that have pictures of their own: up to three bands all of them, else the first, the
 /// middle and the last.
 pub(super) fn few_bands(count: usize) -> Vec<usize> {
-    match count {
-        0..=3 => (0..count).collect(),
-        _ => vec![0, count / 2, count - 1],
-    }
+    spread_bands(count, 3)
+}
+
+/// At most `most` of `count` bands, evenly spaced, the first and the last among them; the middle one if `most` is 1.
+pub(super) fn spread_bands(count: usize, most: usize) -> Vec<usize> {
+    let shown = most.min(count);
+    let nearest = |i: usize| (i * (count - 1) + (shown - 1) / 2) / (shown - 1);
+    (0..shown).map(|i| if shown > 1 { nearest(i) } else { count / 2 }).collect()
 }
 
 /// Writes the picture of every run as OpenEXR and PNG into `images/`.
@@ -84,4 +88,18 @@ fn write_picture(
         caption,
     };
     Ok(RunPicture { cell: cell.label.clone(), figure })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_are_evenly_spaced() {
+        assert_eq!(spread_bands(20, 8), [0, 3, 5, 8, 11, 14, 16, 19]);
+        assert_eq!(spread_bands(3, 8), [0, 1, 2]);
+        assert_eq!(spread_bands(5, 1), [2]);
+        assert!(spread_bands(0, 8).is_empty());
+        assert_eq!([few_bands(4), few_bands(31)], [[0, 2, 3], [0, 15, 30]]);
+    }
 }

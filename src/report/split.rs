@@ -478,12 +478,16 @@ fn white<'a>(halves: &[Half<'a>; 2], stops: Option<f64>) -> (f64, Option<&'a str
         return (1.0 / gain(stops), None);
     }
     let quiet = if halves[1].noise() < halves[0].noise() { &halves[1] } else { &halves[0] };
-    let brightest = |rgb: [f64; 3]| rgb.into_iter().fold(f64::NEG_INFINITY, f64::max);
     let pixels = quiet.picture.iter().flat_map(|picture| picture.rgb()).map(brightest);
     match white_level(pixels) {
         Some(white) => (white, quiet.run.map(|run| run.estimator.as_str())),
         None => (1.0, None),
     }
+}
+
+/// The largest channel.
+pub(super) fn brightest(rgb: [f64; 3]) -> f64 {
+    rgb.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// The percentile [`WHITE`] of those values that are not black; none of a black picture.

@@ -1,13 +1,13 @@
 //! Pictures band by band: a row for each cell, with all bands together as they are displayed, and then bands by
-//! themselves in grey. All pictures of a column, and all in grey, have one exposure: a band is dark where the body is.
+//! themselves in grey. All pictures in colour have one exposure, and all in grey have one: a band is dark where the body is.
 
 use super::document::{FigureBlock, PageBlock, PictureFile};
-use super::split::{GAP, WHITE, white_level};
+use super::pictures::spread_bands;
+use super::split::{GAP, WHITE, brightest, white_level};
 use crate::error::Result;
-use crate::results::canvas::Canvas;
+use crate::results::canvas::{Canvas, Unshown};
 use crate::results::image::Picture;
 use crate::results::pictures::{Strip, Wanted};
-use crate::results::record::Cell;
 use crate::results::store::{RecordFolder, Stored};
 
 /// Cells that a strip shows at most.
@@ -15,13 +15,7 @@ const MOST_CELLS: usize = 16;
 /// A picture narrower than this is enlarged by an integer factor.
 const WIDE_ENOUGH: usize = 96;
 
-/// A row of pictures.
-struct Row<'a> {
-    picture: Picture<'a>,
-    title: String,
-}
-
-/// Writes every strip that the experiment requests into `images/`.
+/// Writes every strip that the experiment requests into `images/`; none of an estimator without pictures.
 ///
 /// # Errors
 /// I/O.
@@ -34,7 +28,9 @@ pub(super) fn write_strips(
         Wanted::Strip(strip) => Some(strip),
         Wanted::Split(_) | Wanted::Running(_) => None,
     });
-    strips.enumerate().map(|(index, strip)| write(folder, stored, index, strip)).collect()
+    let sheets =
+        strips.enumerate().filter_map(|(index, strip)| Some((index, Sheet::new(stored, strip)?)));
+    sheets.map(|(index, sheet)| sheet.write(folder, index)).collect()
 }
 
 /// The section of the page.
@@ -43,71 +39,101 @@ pub(super) fn blocks(strips: &[FigureBlock]) -> Vec<PageBlock> {
     heading.into_iter().chain(strips.iter().cloned().map(PageBlock::Wide)).collect()
 }
 
-/// At most `most` of `count` bands, evenly spaced, the first and the last among them.
-fn shown_bands(count: usize, most: usize) -> Vec<usize> {
-    let shown = most.min(count);
-    (0..shown).map(|i| if shown > 1 { i * (count - 1) / (shown - 1) } else { count / 2 }).collect()
+/// The pictures of a strip, and their places.
+struct Sheet<'a> {
+    estimator: &'a str,
+    /// From the top: the title of the cell, and its picture.
+    rows: Vec<(String, Picture<'a>)>,
+    /// Cells with pictures, shown or not.
+    cells: usize,
+    /// From the left: index and name of the band.
+    bands: Vec<(usize, &'a str)>,
+    zoom: usize,
+    /// Pixels of the sheet that a picture takes.
+    tile: (usize, usize),
 }
 
-fn write(folder: &RecordFolder, stored: &Stored, index: usize, strip: &Strip) -> Result<FigureBlock> {
-    let record = &stored.record;
-    let row = |cell: &Cell| {
-        let run = cell.runs.iter().find(|run| run.estimator == strip.estimator)?;
-        Some(Row { picture: Picture::of(stored, run)?, title: cell.title() })
-    };
-    let rows: Vec<Row> = record.cells.iter().take(MOST_CELLS).filter_map(row).collect();
-    let bands = shown_bands(record.bands.len(), strip.bands);
-    let width = rows.iter().map(|row| row.picture.width).max().unwrap_or(1);
-    let height = rows.iter().map(|row| row.picture.height).max().unwrap_or(1);
-    let zoom = WIDE_ENOUGH.div_ceil(width).max(1);
-    let names = bands.iter().map(|band| record.bands[*band].name.as_str());
-    let widest = names.clone().map(Canvas::label_width).max().unwrap_or(0);
-    let (width, height) = ((width * zoom).max(widest), height * zoom);
-    let sheet = |count: usize, length: usize| (count * (length + GAP)).saturating_sub(GAP).max(1);
-    let label = Canvas::LABEL_HEIGHT;
-    let mut canvas = Canvas::new(sheet(1 + bands.len(), width), label + sheet(rows.len(), height));
-    for (number, name) in names.enumerate() {
-        canvas.label(name, ((1 + number) * (width + GAP), 0), false);
-    }
-    let brightest = |row: &Row| -> Vec<f64> {
-        row.picture.rgb().map(|rgb| rgb.into_iter().fold(f64::NEG_INFINITY, f64::max)).collect()
-    };
-    let in_bands = |row: &Row| -> Vec<f64> { bands.iter().flat_map(|b| row.picture.mean(*b)).collect() };
-    let colour = 1.0 / white_level(rows.iter().flat_map(brightest)).unwrap_or(1.0);
-    let grey = 1.0 / white_level(rows.iter().flat_map(in_bands)).unwrap_or(1.0);
-    for (number, Row { picture, .. }) in rows.iter().enumerate() {
-        let y = label + number * (height + GAP);
-        canvas.paint(picture, 0..picture.width, colour, zoom, (0, y));
-        for (number, band) in bands.iter().enumerate() {
-            canvas.paint_band(picture, *band, grey, zoom, ((1 + number) * (width + GAP), y));
+impl<'a> Sheet<'a> {
+    fn new(stored: &'a Stored, strip: &'a Strip) -> Option<Sheet<'a>> {
+        let record = &stored.record;
+        let mut rows: Vec<(String, Picture)> = Vec::new();
+        for cell in &record.cells {
+            let run = cell.runs.iter().find(|run| run.estimator == strip.estimator);
+            rows.extend(run.and_then(|run| Some((cell.title(), Picture::of(stored, run)?))));
         }
+        let cells = rows.len();
+        rows.truncate(MOST_CELLS);
+        let bands = spread_bands(record.bands.len(), strip.bands).into_iter();
+        let bands: Vec<(usize, &str)> =
+            bands.map(|band| (band, record.bands[band].name.as_str())).collect();
+        let width = rows.iter().map(|(_, picture)| picture.width).max()?;
+        let height = rows.iter().map(|(_, picture)| picture.height).max()?;
+        let zoom = WIDE_ENOUGH.div_ceil(width).max(1);
+        let widest_label = bands.iter().map(|(_, name)| Canvas::label_width(name)).max()?;
+        let tile = ((width * zoom).max(widest_label), height * zoom);
+        Some(Sheet { estimator: &strip.estimator, rows, cells, bands, zoom, tile })
     }
-    let png = canvas.to_png()?;
-    let path = format!("images/strip-{}.png", index + 1);
-    folder.write_view(&path, &png)?;
-    let title = format!("{} by band", strip.estimator);
-    Ok(FigureBlock {
-        path,
-        picture: PictureFile::Png(png),
-        title,
-        caption: caption(record.cells.len(), &rows),
-    })
-}
 
-fn caption(cells: usize, rows: &[Row]) -> String {
-    let mut text = format!(
-        "From the left: all bands together, then bands by themselves in grey. White is the {:.0}th percentile of the \
-         pixels that are not black, for all pictures in colour, and for all in grey; clipped to sRGB.",
-        100.0 * WHITE
-    );
-    if cells > 1 {
-        let titles: Vec<&str> = rows.iter().map(|row| row.title.as_str()).collect();
-        text += &format!(" Rows from the top: {}.", titles.join(" | "));
+    fn write(&self, folder: &RecordFolder, index: usize) -> Result<FigureBlock> {
+        let (canvas, unshown) = self.painted();
+        let png = canvas.to_png()?;
+        let path = format!("images/strip-{}.png", index + 1);
+        folder.write_view(&path, &png)?;
+        let (title, caption) = (format!("{} by band", self.estimator), self.caption(unshown));
+        Ok(FigureBlock { path, picture: PictureFile::Png(png), title, caption })
     }
-    if cells > rows.len() {
-        text += &format!(" {} of {cells} cells are shown.", rows.len());
+
+    fn painted(&self) -> (Canvas, Unshown) {
+        let (width, height) = self.tile;
+        let (across, down) = (width + GAP, height + GAP);
+        let columns = 1 + self.bands.len();
+        let mut canvas =
+            Canvas::new(columns * across - GAP, Canvas::LABEL_HEIGHT + self.rows.len() * down - GAP);
+        for (column, (_, name)) in (1..).zip(&self.bands) {
+            canvas.label(name, (column * across, 0), false);
+        }
+        let pictures = || self.rows.iter().map(|(_, picture)| picture);
+        let colours = pictures().flat_map(|picture| picture.rgb()).map(brightest);
+        let greys =
+            pictures().flat_map(|picture| self.bands.iter().flat_map(|(band, _)| picture.mean(*band)));
+        let colour = 1.0 / white_level(colours).unwrap_or(1.0);
+        let grey = 1.0 / white_level(greys).unwrap_or(1.0);
+        let mut all = Unshown::default();
+        let mut add = |Unshown { clipped, out_of_gamut }| {
+            all.clipped += clipped;
+            all.out_of_gamut += out_of_gamut;
+        };
+        for (row, picture) in pictures().enumerate() {
+            let y = Canvas::LABEL_HEIGHT + row * down;
+            add(canvas.paint(picture, 0..picture.width, colour, self.zoom, (0, y)));
+            for (column, (band, _)) in (1..).zip(&self.bands) {
+                add(canvas.paint_band(picture, *band, grey, self.zoom, (column * across, y)));
+            }
+        }
+        (canvas, all)
     }
-    text
+
+    fn caption(&self, unshown: Unshown) -> String {
+        let mut text = format!(
+            "From the left: all bands together, then bands by themselves in grey. White is the {:.0}th percentile of \
+             the pixels that are not black, for all pictures in colour, and for all in grey; clipped to sRGB.",
+            100.0 * WHITE
+        );
+        if self.cells > 1 {
+            let titles: Vec<&str> = self.rows.iter().map(|(title, _)| title.as_str()).collect();
+            text += &format!(" Rows from the top: {}.", titles.join(" | "));
+        }
+        if self.cells > self.rows.len() {
+            text += &format!(" {} of {} cells are shown.", self.rows.len(), self.cells);
+        }
+        if unshown.clipped > 0 {
+            text += &format!(" Pixels too bright: {}.", unshown.clipped);
+        }
+        if unshown.out_of_gamut > 0 {
+            text += &format!(" Pixels outside the gamut or not finite: {}.", unshown.out_of_gamut);
+        }
+        text
+    }
 }
 
 #[cfg(test)]
@@ -115,14 +141,6 @@ mod tests {
     use super::*;
     use crate::results::image::decoded;
     use crate::results::sample;
-
-    #[test]
-    fn bands_are_evenly_spaced() {
-        assert_eq!(shown_bands(20, 8), [0, 2, 5, 8, 10, 13, 16, 19]);
-        assert_eq!(shown_bands(3, 8), [0, 1, 2]);
-        assert_eq!(shown_bands(5, 1), [2]);
-        assert!(shown_bands(0, 8).is_empty());
-    }
 
     /// The sample's picture has 3 x 2 pixels; red is 0.2 i and green 0.2 i + 0.1 in pixel i.
     #[test]
@@ -134,6 +152,8 @@ mod tests {
         let figures = write_strips(&folder, &stored, &[Wanted::Strip(strip)]).expect("a strip");
         let [figure] = &figures[..] else { panic!("{figures:?}") };
         assert_eq!(figure.path, "images/strip-1.png");
+        // 6 pixels in 3 pictures: 95 % of the 5 that are not black are below the brightest.
+        assert!(figure.caption.ends_with("clipped to sRGB."), "{}", figure.caption);
         let PictureFile::Png(png) = &figure.picture else { panic!("no PNG") };
         let (width, height, data) = decoded(png);
         assert_eq!((width, height), (3 * 96 + 2 * GAP, Canvas::LABEL_HEIGHT + 64));

@@ -42,7 +42,7 @@ pub(crate) fn verdict_table(verdicts: &[Verdict]) -> Table {
         table.push(vec![
             v.outcome.to_string(),
             v.claim.clone(),
-            v.place.clone(),
+            v.cell_title.clone(),
             v.band.clone(),
             v.estimators.clone(),
             v.observable.clone(),

@@ -204,7 +204,7 @@ impl RunPair<'_> {
         let mut verdict = Verdict {
             experiment: self.a.record.experiment.clone(),
             cell: self.cell().label.clone(),
-            place: self.cell().title(),
+            cell_title: self.cell().title(),
             band: self.a.record.bands[bands[0]].name.clone(),
             class: observable.class.clone(),
             estimators: self.runs[0].estimator.clone(),

@@ -183,14 +183,13 @@ fn reason(found: &Outcome, evidence: &Evidence, detect: Option<f64>, verdict: &V
         (Outcome::Fail, Evidence::Sum(_)) => "the table as a whole deviates".into(),
         (Outcome::Fail, _) => verdict.deviation(),
         (Outcome::Underpowered, _) => {
-            let [missed, wanted] =
-                [verdict.detectable.unwrap_or(f64::INFINITY), detect.unwrap_or_default()].map(|size| {
-                    match verdict.expected {
-                        Some(0.0) => significant(size, 3),
-                        _ => format!("{} %", significant(100.0 * size, 3)),
-                    }
-                });
-            format!("could have missed {missed}, {wanted} must be found")
+            // Relative to the expected value, absolute where that is 0; three digits tell 2.04 % from 2 %.
+            let shown = |size: f64| match verdict.expected {
+                Some(0.0) => significant(size, 3),
+                _ => format!("{} %", significant(100.0 * size, 3)),
+            };
+            let missed = shown(verdict.detectable.unwrap_or(f64::INFINITY));
+            format!("could have missed {missed}, {} must be found", shown(detect.unwrap_or_default()))
         }
         (Outcome::Pass, _) => String::new(),
     }

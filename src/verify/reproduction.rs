@@ -23,7 +23,7 @@ pub(super) fn trials(stored: &Stored) -> Vec<Trial> {
                 let found = record.replays.iter().find(is_own);
                 let verdict = Verdict {
                     cell: about.label.clone(),
-                    place: about.title(),
+                    cell_title: about.title(),
                     estimators: run.estimator.clone(),
                     test: Some(TestKind::Replay),
                     value: found.map(|replay| replay.passes as f64),

@@ -105,7 +105,7 @@ fn whole(stored: &Stored, quantity: &Quantity) -> Option<f64> {
 /// A verdict with the names of two quantities; `a vs b` where they differ.
 fn named(record: &Record, claim: &Claim, a: &Quantity, b: &Quantity) -> Verdict {
     let cell = |q: &Quantity| record.cells.get(q.cell).map_or("?", |c| &c.label).to_string();
-    let place = |q: &Quantity| record.cells.get(q.cell).map_or("?".into(), Cell::title);
+    let cell_title = |q: &Quantity| record.cells.get(q.cell).map_or("?".into(), Cell::title);
     let band = |q: &Quantity| record.bands.get(q.band).map_or("?", |b| &b.name).to_string();
     let both = |name: &dyn Fn(&Quantity) -> String| {
         let (a, b) = (name(a), name(b));
@@ -113,7 +113,7 @@ fn named(record: &Record, claim: &Claim, a: &Quantity, b: &Quantity) -> Verdict 
     };
     Verdict {
         cell: both(&cell),
-        place: both(&place),
+        cell_title: both(&cell_title),
         band: both(&band),
         class: both(&|q| q.observable.class.clone()),
         estimators: both(&|q| q.estimator.clone()),

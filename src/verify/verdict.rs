@@ -197,7 +197,7 @@ pub(crate) struct Verdict {
     pub cell: String,
     /// The cell by its place on the axes of the sweep, for people; `a vs b` across two.
     #[serde(skip)]
-    pub place: String,
+    pub cell_title: String,
     /// Band name; `a vs b` across two.
     pub band: String,
     /// Transport class.

@@ -200,7 +200,7 @@ impl BandQuestion<'_> {
         let verdict = Verdict {
             experiment: record.experiment.clone(),
             cell: record.cells[self.question.cell].label.clone(),
-            place: record.cells[self.question.cell].title(),
+            cell_title: record.cells[self.question.cell].title(),
             band: record.bands[self.index].name.clone(),
             class: self.question.class.into(),
             estimators: self.question.estimator.into(),
