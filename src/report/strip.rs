@@ -29,7 +29,7 @@ pub(super) fn write_strips(
         Wanted::Split(_) | Wanted::Running(_) => None,
     });
     let sheets =
-        strips.enumerate().filter_map(|(index, strip)| Some((index, Sheet::new(stored, strip)?)));
+        strips.enumerate().filter_map(|(index, strip)| Some((index, StripSheet::new(stored, strip)?)));
     sheets.map(|(index, sheet)| sheet.write(folder, index)).collect()
 }
 
@@ -40,7 +40,7 @@ pub(super) fn blocks(strips: &[FigureBlock]) -> Vec<PageBlock> {
 }
 
 /// The pictures of a strip, and their places.
-struct Sheet<'a> {
+struct StripSheet<'a> {
     estimator: &'a str,
     /// From the top: the title of the cell, and its picture.
     rows: Vec<(String, Picture<'a>)>,
@@ -53,8 +53,8 @@ struct Sheet<'a> {
     tile: (usize, usize),
 }
 
-impl<'a> Sheet<'a> {
-    fn new(stored: &'a Stored, strip: &'a Strip) -> Option<Sheet<'a>> {
+impl<'a> StripSheet<'a> {
+    fn new(stored: &'a Stored, strip: &'a Strip) -> Option<StripSheet<'a>> {
         let record = &stored.record;
         let mut rows: Vec<(String, Picture)> = Vec::new();
         for cell in &record.cells {
@@ -71,7 +71,7 @@ impl<'a> Sheet<'a> {
         let zoom = WIDE_ENOUGH.div_ceil(width).max(1);
         let widest_label = bands.iter().map(|(_, name)| Canvas::label_width(name)).max()?;
         let tile = ((width * zoom).max(widest_label), height * zoom);
-        Some(Sheet { estimator: &strip.estimator, rows, cells, bands, zoom, tile })
+        Some(StripSheet { estimator: &strip.estimator, rows, cells, bands, zoom, tile })
     }
 
     fn write(&self, folder: &RecordFolder, index: usize) -> Result<FigureBlock> {
