@@ -70,6 +70,14 @@ pub(super) trait Rivals: Sized {
         [1.0, 1.0]
     }
 
+    /// What the walk has scored, once for each score, also by [`CameraWalk::score_with`].
+    #[inline]
+    fn scored(&mut self, _value: f64) {}
+
+    /// The next score is divided by this sum of densities, which the rivals' latest [`Self::densities`] are a part of.
+    #[inline]
+    fn weigh(&mut self, _sum: f64) {}
+
     /// Sum over the rivals of their densities of the path that ends at `exit` and continues towards
     /// `wi`, light `light`, relative to the density of the walk's medium vertices.
     fn densities<B: WalkBands>(
@@ -555,18 +563,21 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                 if bsdf == 0.0 {
                     continue;
                 }
-                let weight = match (self.drawn, &self.exit) {
+                let (own, sum) = match (self.drawn, &self.exit) {
                     (DirectionDraw::Alone, Some(exit)) if rivals > 0.0 => {
                         // A delta lobe's density is its probability.
                         let own = self.boundary.transmittance_smooth(exit.wo);
-                        own / (walks * own + rivals)
+                        (own, walks * own + rivals)
                     }
-                    (DirectionDraw::Alone, _) => 1.0 / walks,
+                    (DirectionDraw::Alone, _) => (1.0, walks),
                     (DirectionDraw::Competing(own), _) => {
-                        own / (walks * (own + by_light * (self.choice[index] * pdf)) + rivals)
+                        (own, walks * (own + by_light * (self.choice[index] * pdf)) + rivals)
                     }
                 };
-                let value = self.throughput * weight * radiance;
+                if rivals > 0.0 {
+                    self.rivals.weigh(sum);
+                }
+                let value = self.throughput * (own / sum) * radiance;
                 self.score(class, index, self.ray.origin, value);
             }
         }
@@ -595,6 +606,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         for (slot, factor) in self.measure.slots(slot) {
             self.bands.score(self.scores, ScorePlace { slot, ..place }, factor * value);
         }
+        self.rivals.scored(value);
     }
 
     /// The same for a path that has left the walk, with the changes of the bands since then. Its end is not known
@@ -603,6 +615,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     pub(super) fn score_with(&mut self, bands: &B, class: TransportClass, light: usize, value: f64) {
         let place = ScorePlace { slot: self.slot, band: self.band, class, light };
         bands.score(self.scores, place, value);
+        self.rivals.scored(value);
     }
 
     /// The probability with which light sampling chooses a light.

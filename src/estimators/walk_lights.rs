@@ -103,13 +103,17 @@ impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
         }
         let rivals = self.rival_densities(index, wi);
         let walks = self.bands.density();
-        let estimate = match pdf {
+        let (density, sum) = match pdf {
             Some(pdf) => {
                 let density = choice * pdf;
-                value / density * (density / (walks * (density + bsdf * own) + rivals))
+                (density, walks * (density + bsdf * own) + rivals)
             }
-            None => value / choice * (choice / (walks * choice + rivals)),
+            None => (choice, walks * choice + rivals),
         };
+        if rivals > 0.0 {
+            self.rivals.weigh(sum);
+        }
+        let estimate = value / density * (density / sum);
         let score = self.throughput * estimate;
         self.score(self.history.class(), index, entry, score);
     }

@@ -184,6 +184,8 @@ fn estimator_run(
     let counts = |names: Vec<&str>, values: &[u64]| {
         names.into_iter().map(str::to_string).zip(values.iter().copied()).collect()
     };
+    // Merged shards have been prepared elsewhere, and notes may tell what was learned.
+    job.estimator.prepare();
     EstimatorRun {
         estimator: job.arm.name.clone(),
         control_of: job.arm.is_control.then(|| entry.name.clone()),

@@ -24,6 +24,7 @@
 use super::end::{End, Leg, Middle};
 use super::expected;
 use super::last_vertex::{self, GuidedEnd};
+use super::learned_calls::CalledTechnique;
 use super::specular;
 use super::state::{Connections, Slot};
 use super::subdivision::{self, Subdivided};
@@ -44,12 +45,14 @@ impl Rivals for Connections<'_> {
             && (is_free || !is_first)
             && let Some(found) = last_vertex::draw(walk, technique)
         {
+            walk.rivals.begin(Some(CalledTechnique::LastVertex));
             score_guided(walk, &found);
         }
         if let Some(technique) = &walk.rivals.setup.specular
             && (is_free || !is_first)
             && let Some(connected) = specular::draw(walk, technique)
         {
+            walk.rivals.begin(Some(CalledTechnique::Connection));
             for root in &connected.roots {
                 if let Some(found) = connected.end(walk, root) {
                     score_guided(walk, &found);
@@ -61,6 +64,7 @@ impl Rivals for Connections<'_> {
             && (is_free || is_first)
             && let Some(edge) = subdivision::draw_edge(walk)
         {
+            walk.rivals.begin(Some(CalledTechnique::Subdivision));
             if options.strategies.top_to_bottom
                 && let Some(found) = subdivision::top_to_bottom(walk, &edge)
             {
@@ -71,6 +75,19 @@ impl Rivals for Connections<'_> {
             {
                 score_subdivided(walk, &found);
             }
+        }
+        walk.rivals.begin(None);
+    }
+
+    fn scored(&mut self, value: f64) {
+        if let Some(notes) = self.notes {
+            notes.borrow_mut().score(value);
+        }
+    }
+
+    fn weigh(&mut self, sum: f64) {
+        if let Some(notes) = self.notes {
+            notes.borrow_mut().weigh(self.parts.map(|part| part / sum));
         }
     }
 
@@ -117,15 +134,17 @@ impl Rivals for Connections<'_> {
         let x_j = walk.rivals.vertex(Slot::Latest);
         let dir = -exit.frame.to_world(exit.wo);
         let leg = Leg { dir, length: (exit.hit.point - x_j.point).length() };
-        let mut sum = last_vertex::density(walk, Slot::Latest, &leg, &end)
-            + specular::density(walk, Slot::Latest, &leg, exit, &end);
+        let by_last = last_vertex::density(walk, Slot::Latest, &leg, &end);
+        let by_connection = specular::density(walk, Slot::Latest, &leg, exit, &end);
+        let mut by_subdivision = 0.0;
         if walk.rivals.count >= 2 && setup.options.strategies.subdivides() && walk.sees(exit) {
             let x_i = walk.rivals.vertex(Slot::Previous);
             if let Some(middle) = Middle::new(x_i.point, x_j.point, &exit.hit) {
-                sum += subdivision::density(walk, Slot::Previous, &middle, exit, &end);
+                by_subdivision = subdivision::density(walk, Slot::Previous, &middle, exit, &end);
             }
         }
-        sum
+        walk.rivals.parts = [by_subdivision, by_last, by_connection];
+        by_last + by_connection + by_subdivision
     }
 }
 
@@ -142,14 +161,15 @@ pub(super) fn score_guided<B: WalkBands>(
         return;
     }
     let x_j = walk.rivals.vertex(Slot::Latest);
-    let mut rivals = last_vertex::density(walk, Slot::Latest, leg, &end)
-        + specular::density(walk, Slot::Latest, leg, exit, &end);
+    let by_last = last_vertex::density(walk, Slot::Latest, leg, &end);
+    let by_connection = specular::density(walk, Slot::Latest, leg, exit, &end);
+    let mut by_subdivision = 0.0;
     if walk.rivals.count >= 2 && setup.options.strategies.subdivides() {
         let x_i = walk.rivals.vertex(Slot::Previous);
         if let Some(middle) = Middle::new(x_i.point, x_j.point, &exit.hit)
             && walk.sees_point(x_i.point, exit.hit.point)
         {
-            rivals += subdivision::density(walk, Slot::Previous, &middle, exit, &end);
+            by_subdivision = subdivision::density(walk, Slot::Previous, &middle, exit, &end);
         }
     }
     if walk.is_shadowed(exit.hit.point, exit.hit.face, *w_l) {
@@ -158,7 +178,11 @@ pub(super) fn score_guided<B: WalkBands>(
     let mut bands = walk.bands.clone();
     bands.turn(&walk.scene.medium, x_j.point, x_j.arrival, leg.dir);
     bands.flight(&walk.scene.medium, leg.length, false);
-    let score = walk.throughput * end.value / (bands.density() * end.unidirectional + rivals);
+    let rivals = by_last + by_connection + by_subdivision;
+    let sum = bands.density() * end.unidirectional + rivals;
+    walk.rivals.parts = [by_subdivision, by_last, by_connection];
+    walk.rivals.weigh(sum);
+    let score = walk.throughput * end.value / sum;
     walk.score_with(&bands, walk.history.class(), guide.light, score);
 }
 
@@ -182,11 +206,12 @@ pub(super) fn score_subdivided<B: WalkBands>(
     walk.rivals.hold(Slot::Drawn, drawn);
     bands.turn(media, *x_j, middle.to_j.dir, middle.to_k.dir);
     bands.flight(media, middle.to_k.length, false);
-    let rivals = subdivision::density(walk, Slot::Latest, middle, exit, &end)
-        + last_vertex::density(walk, Slot::Drawn, &middle.to_k, &end)
-        + specular::density(walk, Slot::Drawn, &middle.to_k, exit, &end);
+    let by_subdivision = subdivision::density(walk, Slot::Latest, middle, exit, &end);
+    let by_last = last_vertex::density(walk, Slot::Drawn, &middle.to_k, &end);
+    let by_connection = specular::density(walk, Slot::Drawn, &middle.to_k, exit, &end);
     let survival = walk.bands.survival(&walk.medium);
-    let value = walk.throughput * survival * end.value / (bands.density() * end.unidirectional + rivals);
+    let sum = bands.density() * end.unidirectional + (by_subdivision + by_last + by_connection);
+    let value = walk.throughput * survival * end.value / sum;
     if value == 0.0 || walk.is_shadowed(exit.hit.point, exit.hit.face, *w_l) {
         return;
     }
@@ -194,6 +219,8 @@ pub(super) fn score_subdivided<B: WalkBands>(
     if !walk.sees_point(x_i.point, *x_j) || !walk.sees_point(*x_j, exit.hit.point) {
         return;
     }
+    walk.rivals.parts = [by_subdivision, by_last, by_connection];
+    walk.rivals.weigh(sum);
     let mut history = walk.history;
     history.scatter();
     walk.score_with(&bands, history.class(), guide.light, value);

@@ -111,7 +111,7 @@ fn pass<B: WalkBands>(
 
 fn see<B: WalkBands>(walk: &mut CameraWalk<'_, Connections<'_>, B>, view: &View, bands: &B) {
     let &View { way, from, face, towards, factor } = view;
-    for guide in &walk.rivals.setup.guides {
+    for guide in walk.rivals.setup.guides.iter() {
         if !Connections::is_expected(walk, way, guide.light, towards)
             || walk.is_shadowed(from, face, towards)
         {

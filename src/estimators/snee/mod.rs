@@ -20,6 +20,7 @@ mod expected;
 mod guess;
 mod guide;
 mod last_vertex;
+mod learned_calls;
 mod options;
 mod probe;
 mod snee_connect;
@@ -28,9 +29,10 @@ mod state;
 mod subdivision;
 mod two_bounce;
 
-use std::sync::Arc;
+use std::cell::RefCell;
+use std::sync::{Arc, OnceLock};
 
-use super::bands::{MAX_SHARED, OneBand, SharedBands};
+use super::bands::{MAX_SHARED, OneBand, SharedBands, WalkBands};
 use super::connection::{self, Conic};
 use super::field::Path;
 use super::guidance::GuidedBand;
@@ -45,12 +47,14 @@ use crate::sampling::stream::{PassKey, Purpose};
 use crate::scene::{Light, Scene};
 
 use guide::Guide;
+use learned_calls::{CallNotes, ChosenCalls};
 use specular::Specular;
 use state::Connections;
 
 pub use bidirectional::Bidirectional;
 pub use end::Call;
 pub use last_vertex::LastVertex;
+pub use learned_calls::LearnedCalls;
 pub use options::{EdgeTechnique, JointKind, SneeChoices, SneeOptions, SneePreset, Strategies};
 pub use probe::ProbeShares;
 pub use specular::ConnectionCall;
@@ -61,19 +65,29 @@ pub use two_bounce::TwoBounce;
 const NEAR: f64 = 0.1;
 
 /// Data of connections, for one band.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct BandSetup {
     options: Arc<SneeOptions>,
-    guides: Vec<Guide>,
+    guides: Arc<[Guide]>,
     /// Extinction that steers samplers, 1/mm: the medium's, or the least of those that share a walk.
     sigma: f64,
-    joint: JointDirections,
+    joint: Arc<JointDirections>,
     specular: Option<Specular>,
     /// Number of sensor rays per walk at which lights are scored by expectation; 1 where none is.
     views: u32,
+    /// What has been learned of its calls.
+    chosen: Option<ChosenCalls>,
 }
 
 impl BandSetup {
+    /// The same with the calls of these options.
+    fn calling(&self, options: SneeOptions) -> BandSetup {
+        let specular = self.specular.as_ref().and_then(|Specular { solver, .. }| {
+            options.connection.map(|call| Specular { call, solver: solver.clone() })
+        });
+        BandSetup { options: Arc::new(options), specular, ..self.clone() }
+    }
+
     /// Whether every light that shines in the band is connected to as a whole.
     fn connects_to_all(&self, lights: &[Light], band: usize) -> bool {
         lights.iter().enumerate().all(|(index, light)| {
@@ -88,8 +102,10 @@ impl BandSetup {
 pub struct Snee {
     walks: TaughtField,
     options: Arc<SneeOptions>,
-    /// Per band; one for all where they share walks.
+    /// As the options ask for, per band; one for all where bands share walks.
     setups: Vec<BandSetup>,
+    /// The same with learned calls.
+    learned: OnceLock<Vec<BandSetup>>,
 }
 
 impl Snee {
@@ -150,7 +166,15 @@ impl Snee {
             let is_looked_for = (options.expected_reflection || options.expected_passage)
                 && guides.iter().any(|guide| !scene.lights[guide.light].is_directional());
             let views = if is_looked_for { options.views } else { 1 };
-            BandSetup { options: options.clone(), guides, sigma, joint, specular, views }
+            BandSetup {
+                options: options.clone(),
+                guides: guides.into(),
+                sigma,
+                joint: Arc::new(joint),
+                specular,
+                views,
+                chosen: None,
+            }
         };
         let count = if options.share_bands { 1 } else { scene.bands() };
         let setups: Vec<BandSetup> = (0..count).map(setup).collect();
@@ -164,7 +188,16 @@ impl Snee {
         if options.walk.is_guided() && options.strategies.bsdf {
             walks = walks.finding_even_lights();
         }
-        Ok(Snee { walks, options, setups })
+        Ok(Snee { walks, options, setups, learned: OnceLock::new() })
+    }
+
+    /// The setups of passes; the first to ask waits until calls have been learned.
+    #[inline]
+    fn setups_in_use(&self) -> &[BandSetup] {
+        match self.options.learned_calls {
+            None => &self.setups,
+            Some(lesson) => self.learned.get_or_init(|| learned_calls::learn(self, lesson)),
+        }
     }
 }
 
@@ -189,30 +222,22 @@ fn check_shared(scene: &Scene) -> Result<()> {
 impl Estimator for Snee {
     fn prepare(&self) {
         self.walks.field();
+        self.setups_in_use();
     }
 
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         let field = self.walks.field();
+        let setups = self.setups_in_use();
         let rays = field.scene.sensor.rays_per_pass();
         if self.options.share_bands {
-            let media = &field.scene.medium;
             for index in 0..rays {
-                let u = key.stream(index as u64, Purpose::Hero).draw();
-                let hero = ((u * media.len() as f64) as usize).min(media.len() - 1);
-                let path = Path { field, band: hero, index, key };
-                self.trace(0, path, scores, SharedBands::new(media, hero));
+                let path = Path { field, band: self.hero(key, index), index, key };
+                self.trace(&setups[0], None, path, scores);
             }
         } else {
             for &band in bands {
                 for index in 0..rays {
-                    let path = Path { field, band, index, key };
-                    match field.guidance(band) {
-                        Some(guidance) => {
-                            let medium = &field.scene.medium[band];
-                            self.trace(band, path, scores, GuidedBand::new(guidance, medium));
-                        }
-                        None => self.trace(band, path, scores, OneBand),
-                    }
+                    self.trace(&setups[band], None, Path { field, band, index, key }, scores);
                 }
             }
         }
@@ -239,6 +264,9 @@ impl Estimator for Snee {
         } else {
             missing_notes(scene, "subdivision from its end")
         };
+        if let Some(learned) = self.learned.get() {
+            notes.extend(learned_calls::notes(learned));
+        }
         if !(bsdf && light) {
             notes.push(
                 "`strategies` leaves out a part of unidirectional sampling: of paths whose last two medium vertices \
@@ -267,20 +295,46 @@ fn missing_notes(scene: &Scene, technique: &str) -> Vec<String> {
 }
 
 impl Snee {
-    fn trace<B: super::bands::WalkBands>(
+    /// The band that steers a walk shared by all.
+    fn hero(&self, key: &PassKey, index: usize) -> usize {
+        let bands = self.walks.scene().bands();
+        let u = key.stream(index as u64, Purpose::Hero).draw();
+        ((u * bands as f64) as usize).min(bands - 1)
+    }
+
+    fn trace(
         &self,
-        setup: usize,
+        setup: &BandSetup,
+        notes: Option<&RefCell<CallNotes>>,
         path: Path,
         scores: &mut Scores,
-        bands: B,
     ) {
-        let setup = &self.setups[setup];
-        if setup.guides.is_empty() {
-            CameraWalk::trace(path, scores, Unrivalled, bands);
+        let (field, band) = (path.field, path.band);
+        let media = &field.scene.medium;
+        if self.options.share_bands {
+            trace_with(setup, notes, path, scores, SharedBands::new(media, band));
+        } else if let Some(guidance) = field.guidance(band) {
+            trace_with(setup, notes, path, scores, GuidedBand::new(guidance, &media[band]));
         } else {
-            let stream = path.key.stream(path.index as u64, Purpose::Connection);
-            CameraWalk::trace(path, scores, Connections::new(setup, stream), bands);
+            trace_with(setup, notes, path, scores, OneBand);
         }
+    }
+}
+
+fn trace_with<B: WalkBands>(
+    setup: &BandSetup,
+    notes: Option<&RefCell<CallNotes>>,
+    path: Path,
+    scores: &mut Scores,
+    bands: B,
+) {
+    if setup.guides.is_empty() {
+        CameraWalk::trace(path, scores, Unrivalled, bands);
+    } else {
+        let stream = path.key.stream(path.index as u64, Purpose::Connection);
+        let mut connections = Connections::new(setup, stream);
+        connections.notes = notes;
+        CameraWalk::trace(path, scores, connections, bands);
     }
 }
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::end::Call;
 use super::last_vertex::LastVertex;
+use super::learned_calls::LearnedCalls;
 use super::probe::ProbeShares;
 use super::specular::ConnectionCall;
 use crate::error::{Error, Result};
@@ -46,6 +47,8 @@ pub struct SneeOptions {
     pub least_concentration: f64,
     /// Whether all bands share a walk.
     pub share_bands: bool,
+    /// The warm-up that chooses the probabilities of calls, if there is one.
+    pub learned_calls: Option<LearnedCalls>,
 }
 
 /// Which techniques make the paths whose last two medium vertices follow each other.
@@ -132,6 +135,11 @@ pub struct SneeChoices {
     /// Whether each band has separate walks or all bands share them.
     #[serde(default)]
     pub bands: BandWalks,
+    /// A warm-up that chooses how often `call`, `call_alone`, `last_vertex` and `connection` are called (`most`), from the
+    /// variance and the cost that it predicts.
+    ///
+    /// Without it, the given probabilities are used.
+    pub learned_calls: Option<LearnedCalls>,
 }
 
 /// A set of options with a name.
@@ -222,6 +230,7 @@ impl SneePreset {
                 views: 1,
                 least_concentration: 1.0,
                 share_bands: false,
+                learned_calls: None,
             },
             SneePreset::Guided => SneeOptions {
                 roulette: Roulette::default(),
@@ -239,6 +248,7 @@ impl SneePreset {
                 views: 1,
                 least_concentration: 10.0,
                 share_bands: false,
+                learned_calls: None,
             },
         }
     }
@@ -265,6 +275,7 @@ impl SneeChoices {
             views: self.views.unwrap_or(preset.views),
             least_concentration: self.least_concentration.unwrap_or(preset.least_concentration),
             share_bands: self.bands == BandWalks::Shared,
+            learned_calls: self.learned_calls,
             ..preset
         };
         if let Some(strategies) = &self.strategies {

@@ -157,6 +157,7 @@ pub(super) fn draw<'a, B: WalkBands>(
     roots.clear();
     let mut work = SolverWork::default();
     technique.solver.roots(&walk.scene.shape, &query, &mut work, &mut |root| roots.push(root));
+    walk.rivals.search(&work);
     (0..work.wrong_side).for_each(|_| walk.scores.note(Anomaly::WrongSide));
     Some(LitVertex { guide, w_l: sample.wi, radiance: sample.radiance, roots })
 }

@@ -1,10 +1,13 @@
 //! State that a walk carries for connections.
 
+use std::cell::RefCell;
+
 use super::BandSetup;
 use super::guess::Guess;
 use super::guide::Guide;
+use super::learned_calls::{CallNotes, CalledTechnique};
 use crate::estimators::bands::WalkBands;
-use crate::estimators::connection::Root;
+use crate::estimators::connection::{Root, SolverWork};
 use crate::estimators::vertices::{WalkExit, WalkVertex};
 use crate::estimators::walk::CameraWalk;
 use crate::math::DVec3;
@@ -44,14 +47,42 @@ pub(super) struct Connections<'a> {
     seen: Option<(DVec3, bool)>,
     /// Memory for the roots of a connection.
     pub roots: Vec<Root>,
+    /// What the techniques add to the sum of densities that was formed last, in the order of [`CalledTechnique`].
+    pub parts: [f64; CalledTechnique::COUNT],
+    /// What a warm-up writes down.
+    pub notes: Option<&'a RefCell<CallNotes>>,
 }
 
 impl<'a> Connections<'a> {
     pub(super) fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
         let nowhere = WalkVertex { point: DVec3::NAN, arrival: DVec3::Z, walks: 1.0 };
         let held = [Held { vertex: nowhere, guess: None }; 3];
-        let roots = Vec::new();
-        Connections { setup, stream, held, count: 0, is_edge_alone: false, seen: None, roots }
+        Connections {
+            setup,
+            stream,
+            held,
+            count: 0,
+            is_edge_alone: false,
+            seen: None,
+            roots: Vec::new(),
+            parts: [0.0; CalledTechnique::COUNT],
+            notes: None,
+        }
+    }
+
+    /// What the walk scores next belongs to a call of this technique; to the walk itself where there is none.
+    #[inline]
+    pub(super) fn begin(&self, technique: Option<CalledTechnique>) {
+        if let Some(notes) = self.notes {
+            notes.borrow_mut().begin(technique);
+        }
+    }
+
+    /// A connection was searched for.
+    pub(super) fn search(&self, work: &SolverWork) {
+        if let Some(notes) = self.notes {
+            notes.borrow_mut().search(work);
+        }
     }
 
     /// The walk has come to a new medium vertex.

@@ -130,7 +130,7 @@ pub(super) fn density<B: WalkBands>(
 
 impl SneeOptions {
     /// How often an edge is subdivided for a guide.
-    fn call_for(&self, boundary: &Boundary, guide: &Guide) -> Call {
+    pub(super) fn call_for(&self, boundary: &Boundary, guide: &Guide) -> Call {
         let is_smooth = matches!(boundary, Boundary::Smooth { .. });
         let is_alone = is_smooth && guide.half_angle == 0.0 && self.connection.is_none();
         if is_alone { self.call_alone } else { self.call }

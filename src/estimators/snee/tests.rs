@@ -35,6 +35,7 @@ fn guided() -> SneeOptions {
         views: 1,
         least_concentration: 10.0,
         share_bands: false,
+        learned_calls: None,
     }
 }
 

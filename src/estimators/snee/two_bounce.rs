@@ -49,6 +49,9 @@ impl TwoBounce {
         if options.walk != (WalkDraw::Plain {}) {
             return Err(Error::input("two_bounce has no walk to guide; leave out `walk`"));
         }
+        if options.learned_calls.is_some() {
+            return Err(Error::input("two_bounce has no walk to learn from; leave out `learned_calls`"));
+        }
         Ok(TwoBounce(Snee::set_up(scene, options)?))
     }
 }
