@@ -147,11 +147,10 @@ fn means_stay() {
         let measure = |snee: &Snee, test: &str| {
             bands_of_flux(&scene, snee, 20_000, &format!("means_stay {name} {test}"))
         };
-        let means = [measure(&given, "given"), measure(&learned, "learned")];
+        let pairs = measure(&given, "given").into_iter().zip(measure(&learned, "learned"));
         let chosen: Vec<_> = learned.setups_in_use().iter().map(|setup| setup.chosen).collect();
         count += chosen.iter().flatten().filter(|chosen| chosen.factors.is_some()).count();
-        for band in 0..2 {
-            let [(a, of_a), (b, of_b)] = [means[0][band], means[1][band]];
+        for (band, ((a, of_a), (b, of_b))) in pairs.enumerate() {
             let error = (of_a * of_a + of_b * of_b).sqrt();
             println!("{name}, {band}: {a:.4} +- {of_a:.4}, learned {b:.4} +- {of_b:.4}, {chosen:?}");
             assert!((a - b).abs() < 4.0 * error, "{name}, {band}: {a} +- {of_a}, learned {b} +- {of_b}");
