@@ -200,6 +200,47 @@ fn the_example_is_no_shipped_experiment() {
     }
 }
 
+/// What the scripts of continuous integration ask of experiments is accepted: files, settings, overrides.
+#[test]
+fn commands_of_the_scripts_are_accepted() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let work = Work::new();
+    let mut count = 0;
+    for script in ["run", "nightly", "weekly"] {
+        let text = std::fs::read_to_string(root.join(".ci").join(script)).expect("a script");
+        for line in text.replace("\\\n", " ").lines() {
+            let words: Vec<&str> = line.split_whitespace().map(|word| word.trim_matches('"')).collect();
+            let Some(start) = words
+                .windows(2)
+                .position(|two| two[0] == "$program" && ["run", "verify"].contains(&two[1]))
+            else {
+                continue;
+            };
+            let words = &words[start + 2..];
+            let after = |option: &str| {
+                let place = words.iter().position(|word| *word == option);
+                place.map_or(String::new(), |place| format!("{option} {}", words[place + 1]))
+            };
+            // Without a file it is those that `verify` knows.
+            let Some(file) = words.iter().find(|word| word.ends_with(".toml")) else { continue };
+            let materials = ["marble", "skin", "milk", "ketchup", "spectral-skin"];
+            let files: Vec<String> = if file.contains("$material") {
+                materials.map(|material| file.replace("$material", material)).into()
+            } else {
+                vec![file.to_string()]
+            };
+            for file in files {
+                let file = root.join(file);
+                let arguments =
+                    format!("check {} {} {}", file.display(), after("--setting"), after("--set"));
+                work.run(&arguments).exits(0);
+                count += 1;
+            }
+        }
+    }
+    assert!(count >= 10, "{count} commands");
+}
+
 /// All shipped experiments.
 fn shipped() -> Vec<std::path::PathBuf> {
     let mut folders =
