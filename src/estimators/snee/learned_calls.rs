@@ -12,8 +12,8 @@
 //! what the walk scores, S_c what call c scores, and B_c is 1 with probability f of the call's technique, all of them
 //! independent. So
 //!   E[score^2 | path] = (W + sum_c f_c S_c)^2 + sum_c f_c (1 - f_c) S_c^2,
-//! whose mean over paths is the second moment for every f at once, without error. The squared mean of a pixel does not depend on
-//! f; paths come in pairs of one pixel, and the mean product of a pair is an unbiased estimate of it. The cost is
+//! whose mean over paths is an unbiased estimate of the second moment, for every f at once. The squared mean of a pixel does not
+//! depend on f; paths come in pairs of one pixel, and the mean product of a pair is an unbiased estimate of it. The cost is
 //!   cost of walks + sum_t f_t cost of calls,
 //! by counted work ([`Prices`]), so that no bit depends on a clock. Chosen are the factors with the least variance times cost
 //! on a fixed ladder. A choice that only one half of the pairs prefers to the given options is noise; then these stay.
@@ -256,13 +256,12 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
     let setup = snee.setups[index].calling(upper.clone());
     let used = used_probabilities(snee, &setup, index);
     // The given options are the first candidate.
-    let given_factors = used(given)
-        .into_iter()
-        .zip(used(&upper))
-        .map(|(given, upper)| if upper > 0.0 { given / upper } else { 1.0 });
-    let given_factors: Vec<f64> = given_factors.collect();
-    let mut candidates: Vec<PerTechnique> = vec![[given_factors[0], given_factors[1], given_factors[2]]];
-    let ladders = used(&upper).map(|most| if most > 0.0 { &LADDER[..] } else { &LADDER[..1] });
+    let (asked, most) = (used(given), used(&upper));
+    let of_given = |technique: usize| {
+        if most[technique] > 0.0 { asked[technique] / most[technique] } else { 1.0 }
+    };
+    let mut candidates: Vec<PerTechnique> = vec![std::array::from_fn(of_given)];
+    let ladders = most.map(|most| if most > 0.0 { &LADDER[..] } else { &LADDER[..1] });
     for &a in ladders[0] {
         for &b in ladders[1] {
             candidates.extend(ladders[2].iter().map(|&c| [a, b, c]));
