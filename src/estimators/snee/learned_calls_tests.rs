@@ -123,7 +123,7 @@ fn predicted_second_moments_are_those_of_runs() {
 }
 
 /// Means with learned calls are those of the given options: bodies with flat and interpolated normals, not convex, two
-/// lights, two bands, forward scattering, plain, guided and shared walks.
+/// lights, two bands, forward scattering, plain, guided and shared walks. (Plain walks of `snee` are a claim of `verify`.)
 #[test]
 fn means_stay() {
     let media = [medium(4.0, 0.95, 0.0), medium(2.0, 0.8, 0.7)];
@@ -132,7 +132,6 @@ fn means_stay() {
     let lamps = [Lamp::WideDisc, Lamp::Sky];
     let mut count = 0;
     for (name, shape, boundary, connects, walk, bands) in [
-        ("rough ring", ring(), ROUGH, false, plain, BandWalks::Alone),
         ("smooth ring", ring(), SMOOTH, true, guided, BandWalks::Alone),
         ("rough bumps", bumps(false), ROUGH, false, guided, BandWalks::Alone),
         ("smooth bumps", bumps(true), SMOOTH, true, plain, BandWalks::Alone),
