@@ -217,9 +217,9 @@ fn commands_of_the_scripts_are_accepted() {
                 continue;
             };
             let words = &words[start + 2..];
-            let after = |option: &str| {
-                let place = words.iter().position(|word| *word == option);
-                place.map_or(String::new(), |place| format!("{option} {}", words[place + 1]))
+            let of = |option: &str| {
+                let pairs = words.windows(2).filter(|two| two[0] == option);
+                pairs.map(|two| two.join(" ")).collect::<Vec<_>>().join(" ")
             };
             // Without a file it is those that `verify` knows.
             let Some(file) = words.iter().find(|word| word.ends_with(".toml")) else { continue };
@@ -231,8 +231,7 @@ fn commands_of_the_scripts_are_accepted() {
             };
             for file in files {
                 let file = root.join(file);
-                let arguments =
-                    format!("check {} {} {}", file.display(), after("--setting"), after("--set"));
+                let arguments = format!("check {} {} {}", file.display(), of("--setting"), of("--set"));
                 work.run(&arguments).exits(0);
                 count += 1;
             }
