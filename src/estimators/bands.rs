@@ -24,9 +24,6 @@ use crate::sampling::stream::Stream;
 
 /// How a walk is drawn, and the state that it keeps for it.
 pub(super) trait WalkBands: Clone {
-    /// The walk is drawn as its medium scatters and keeps no state.
-    const IS_PLAIN: bool = false;
-
     /// The walk goes on inside from a boundary point with this outward normal, along `dir`.
     #[inline]
     fn enter(&mut self, _at: DVec3, _normal: DVec3, _dir: DVec3) {}
@@ -120,8 +117,6 @@ pub(super) struct ScorePlace {
 pub(super) struct OneBand;
 
 impl WalkBands for OneBand {
-    const IS_PLAIN: bool = true;
-
     #[inline]
     fn flight(&mut self, _: &[Medium], _: f64, _: bool) {}
 

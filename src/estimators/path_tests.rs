@@ -1,9 +1,11 @@
 //! Identities, closed forms and published numbers for the path tracer.
 
-use super::super::bands::WalkBands;
+use super::super::bands::{SharedBands, WalkBands};
 use super::super::field::Field;
 use super::super::roulette::roulette;
 use super::super::testing;
+use super::super::vertices::WalkExit;
+use super::super::walk::Rivals;
 use super::super::{Cost, Layout};
 use super::*;
 use crate::geometry::{Ray, Shape, procedural};
@@ -286,22 +288,44 @@ fn scaled_scenes_give_the_same_bits() {
     }
 }
 
-/// A plain walk whose flights are traced one by one.
-#[derive(Clone)]
+/// No technique either, but flights are traced one by one.
 struct OneByOne;
 
-impl WalkBands for OneByOne {
-    fn flight(&mut self, _: &[Medium], _: f64, _: bool) {}
+impl Rivals for OneByOne {
+    fn call<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>) {}
 
-    fn turn(&mut self, _: &[Medium], _: DVec3, _: DVec3, _: DVec3) {}
+    fn depart<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>) {}
 
-    fn density(&self) -> f64 {
-        1.0
+    fn densities<B: WalkBands>(
+        _: &mut CameraWalk<'_, Self, B>,
+        _: &WalkExit,
+        _: usize,
+        _: DVec3,
+    ) -> f64 {
+        0.0
     }
 }
 
-/// Flights that surely end in the medium are traced together: scores, counters, anomalies and random numbers are those of
-/// flights one by one, to the last bit.
+/// The same paths with flights traced together and one by one: scores, counters, anomalies and random numbers are the same, to
+/// the last bit. Returns how many medium events there were.
+fn assert_the_same_one_by_one<B: WalkBands>(field: &Field, bands: B) -> u64 {
+    let layout = Layout::new(&field.scene);
+    let key = StreamKey::named("flights_at_once_are_flights_one_by_one").pass(0);
+    let mut both = [Scores::new(layout.clone()), Scores::new(layout)];
+    let [at_once, one_by_one] = &mut both;
+    for index in 0..300 {
+        let path = Path { field, band: 0, index, key: &key };
+        let draws = CameraWalk::trace(path, at_once, Unrivalled, bands.clone());
+        assert_eq!(draws, CameraWalk::trace(path, one_by_one, OneByOne, bands.clone()));
+    }
+    let bits = |scores: &Scores| scores.observables.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(at_once), bits(one_by_one));
+    assert_eq!(at_once.cost, one_by_one.cost);
+    assert_eq!(at_once.anomalies, one_by_one.anomalies);
+    at_once.cost[Cost::MediumEvents as usize]
+}
+
+/// Flights that surely end in the medium are traced together, of plain, guided and shared walks.
 #[test]
 fn flights_at_once_are_flights_one_by_one() {
     let sky = || vec![environment(1.0, DVec3::Z, 0.5, "half")];
@@ -315,7 +339,9 @@ fn flights_at_once_are_flights_one_by_one() {
         || Shape::HalfSpace,
     ];
     let shapes = shapes.into_iter().map(|shape| shape()).chain([mesh()]);
-    let mut events = 0;
+    let by_solution = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0, near_lights: true };
+    let walks = [WalkDraw::Dwivedi { share: 0.5 }, by_solution];
+    let [mut plain, mut guided, mut shared] = [0; 3];
     for shape in shapes {
         for (boundary, g) in
             [(Boundary::Smooth { eta: 1.3 }, 0.0), (rough, 0.7), (Boundary::Matched, 0.2)]
@@ -323,25 +349,20 @@ fn flights_at_once_are_flights_one_by_one() {
             // Without extinction a flight has no end.
             let media = [medium(8.0, 0.95, g), medium(0.0, 0.95, g)];
             for (roulette, medium) in ROULETTES.into_iter().flat_map(|r| media.map(|m| (r, m))) {
-                let scene = scene(shape.clone(), boundary, medium, sky(), off_axis());
-                let layout = Layout::new(&scene);
-                let field = Field::new(Arc::new(scene), roulette);
-                let key = StreamKey::named("flights_at_once_are_flights_one_by_one").pass(0);
-                let mut both = [Scores::new(layout.clone()), Scores::new(layout)];
-                let [at_once, one_by_one] = &mut both;
-                for index in 0..300 {
-                    let path = Path { field: &field, band: 0, index, key: &key };
-                    let draws = CameraWalk::trace(path, at_once, Unrivalled, OneBand);
-                    assert_eq!(draws, CameraWalk::trace(path, one_by_one, Unrivalled, OneByOne));
+                let scene = Arc::new(scene(shape.clone(), boundary, medium, sky(), off_axis()));
+                let field = Field::new(scene.clone(), roulette);
+                plain += assert_the_same_one_by_one(&field, OneBand);
+                shared += assert_the_same_one_by_one(&field, SharedBands::new(&scene.medium, 0));
+                for walk in walks {
+                    let field = Field::with_walks(scene.clone(), roulette, walk);
+                    if let Some(guidance) = field.guidance(0) {
+                        let bands = GuidedBand::new(guidance, &scene.medium[0]);
+                        guided += assert_the_same_one_by_one(&field, bands);
+                    }
                 }
-                let bits =
-                    |scores: &Scores| scores.observables.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-                assert_eq!(bits(at_once), bits(one_by_one));
-                assert_eq!(at_once.cost, one_by_one.cost);
-                assert_eq!(at_once.anomalies, one_by_one.anomalies);
-                events += at_once.cost[Cost::MediumEvents as usize];
             }
         }
     }
-    assert!(events > 50_000, "{events} events");
+    assert!(plain > 50_000 && shared == plain, "{plain} and {shared} events");
+    assert!(guided > 50_000, "{guided} events");
 }

@@ -30,7 +30,7 @@ impl Roulette {
         self,
         [throughput, survival]: [&mut f64; 2],
         factor: f64,
-        importance: f64,
+        importance: impl FnOnce() -> f64,
         stream: &mut Stream,
     ) -> Option<()> {
         match self {
@@ -38,7 +38,7 @@ impl Roulette {
             Roulette::Below(threshold) => {
                 *throughput *= factor;
                 *survival *= factor;
-                let expected = *survival * importance;
+                let expected = *survival * importance();
                 if expected < threshold {
                     let probability = roulette(expected, threshold, || stream.draw())?;
                     *throughput /= probability;

@@ -20,7 +20,7 @@ use super::bands::{ScorePlace, WalkBands};
 use super::choice::choose_light;
 use super::crossing::{other, radiance_scale};
 use super::field::Path;
-use super::flights::{Flights, clear_flights};
+use super::flights::{Flights, Flying};
 use super::roulette::Roulette;
 use super::vertices::{Unscattered, WalkExit};
 use super::{Anomaly, Cost, History, Scores, TransportClass};
@@ -324,10 +324,10 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         if !self.matched() {
             R::depart(self);
         }
-        let is_plain =
-            R::IS_SILENT && B::IS_PLAIN && !self.matched() && !self.emits && self.measure.is_off();
+        // A medium vertex takes roulette and a turn alone.
+        let is_silent = R::IS_SILENT && !self.matched() && !self.emits && self.measure.is_off();
         loop {
-            let (t, end) = if is_plain {
+            let (t, end) = if is_silent {
                 let t = self.fly_clear()?;
                 (t, self.scene.shape.end_of_unclear(&self.ray, self.from, t))
             } else {
@@ -361,20 +361,14 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// The length of the first flight that may reach the boundary, after those that certainly do not; `None` where the
     /// path ends.
     fn fly_clear(&mut self) -> Option<f64> {
-        let (roulette, albedo) = (self.roulette, self.medium.albedo);
-        let (mut throughput, mut survival) = (self.throughput, self.survival);
-        let survives = |stream: &mut Stream| {
-            roulette.survive([&mut throughput, &mut survival], albedo, 1.0, stream).is_some()
+        let flying = Flying {
+            ray: &mut self.ray,
+            stream: &mut self.stream,
+            weights: [&mut self.throughput, &mut self.survival],
+            bands: &mut self.bands,
         };
-        let Flights { vertices, next } = clear_flights(
-            &self.scene.shape,
-            &self.medium,
-            &mut self.ray,
-            &mut self.stream,
-            self.scores,
-            survives,
-        );
-        (self.throughput, self.survival) = (throughput, survival);
+        let Flights { vertices, next } =
+            flying.fly(self.scene, &self.medium, self.roulette, self.scores);
         if vertices > 0 {
             (self.from, self.unscattered) = (None, Unscattered::No);
             self.history.scatter_often(vertices);
@@ -459,10 +453,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Multiplies the path's weight by `factor`, or ends the path by roulette.
     #[inline]
     fn survive(&mut self, factor: f64) -> Option<()> {
-        let importance = match self.roulette {
-            Roulette::Analog {} => 1.0,
-            Roulette::Below(_) => self.bands.importance(self.ray.origin),
-        };
+        let importance = || self.bands.importance(self.ray.origin);
         let weights = [&mut self.throughput, &mut self.survival];
         self.roulette.survive(weights, factor, importance, &mut self.stream)
     }

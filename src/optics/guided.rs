@@ -223,7 +223,7 @@ impl GuidedTurns {
     }
 
     /// Density of a turn from `from` to `to`, over that of the phase function.
-    #[inline]
+    #[inline(always)]
     pub fn ratio(&self, pull: &Pull, from: DVec3, to: DVec3) -> f64 {
         if pull.level == 0 {
             return 1.0;
@@ -242,7 +242,7 @@ impl GuidedTurns {
     }
 
     /// A turn that is guided with probability `share`, else as the phase function has it; and how the step is drawn.
-    #[inline]
+    #[inline(always)]
     pub fn sample_mixed(
         &self,
         share: f64,
@@ -261,7 +261,7 @@ impl GuidedTurns {
     }
 
     /// What [`Self::sample_mixed`] says of the step that goes on along `to`.
-    #[inline]
+    #[inline(always)]
     pub fn heading(&self, share: f64, guide: &StepGuide, from: DVec3, to: DVec3) -> Heading {
         let StepGuide { pull, escape } = guide;
         let mut heading = Heading {
@@ -286,6 +286,7 @@ impl GuidedTurns {
     /// together, since the phase function has the same value there, and one of them is taken in proportion to its f. With m and mu
     /// the cosines of `from` to the axis and to the direction, the two have m' = m mu +- c; the mean of their P_1 is m mu, and no
     /// other |P_l| exceeds 1, so that the mean of their f is at most c_1 |m| and the other coefficients, which are positive.
+    #[inline(always)]
     pub fn sample(&self, pull: &Pull, from: DVec3, mut draw: impl FnMut() -> f64) -> DVec3 {
         if pull.level == 0 {
             return self.phase.sample(from, [draw(), draw()]);

@@ -192,7 +192,7 @@ impl Importance {
     }
 
     /// What guides a step from a point of the body, and phi; 0 where nothing is known.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(&self, x: DVec3, guide: &mut StepGuide) -> f64 {
         let escape = |rule: &ExitRule, exit: &Option<ExitPlane>| {
             exit.as_ref().map_or(Escape::NONE, |exit| rule.escape(exit, x))
@@ -242,7 +242,7 @@ impl Importance {
 
 impl ImportanceGrid {
     /// Of the cell that holds the point.
-    #[inline]
+    #[inline(always)]
     fn at(&self, x: DVec3, guide: &mut StepGuide) -> f64 {
         let counts = self.counts;
         let place = (x - self.low) * self.per_spacing;

@@ -182,7 +182,7 @@ impl Guidance {
 
     /// The guide of a step from a point, and phi (0 where it is unknown), for a walk that last entered at a boundary point with
     /// this normal. Written in place, since a walk calls this at every step.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(&self, x: DVec3, normal: DVec3, guide: &mut StepGuide) -> f64 {
         match &self.aim {
             Aim::Normal(growth) => {

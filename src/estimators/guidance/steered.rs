@@ -10,6 +10,8 @@
 //!
 //! Roulette compares weight times importance with its value where the walk entered; along a walk of zero variance this
 //! ratio is always 1.
+//!
+//! All that a step calls is inlined: it is a chain of short dependent operations, of which calls would cost a tenth.
 
 use super::Guidance;
 use crate::estimators::bands::WalkBands;
@@ -53,7 +55,7 @@ impl<'a> GuidedBand<'a> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn at(&mut self, x: DVec3) -> &StepGuide {
         let (last, guide, phi) = &mut self.last;
         if *last != x {
@@ -75,7 +77,7 @@ impl WalkBands for GuidedBand<'_> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn draw_turn(&mut self, _: &Medium, arrival: &Ray, stream: &mut Stream) -> DVec3 {
         let Guidance { turns, share, .. } = self.guidance;
         let guide = self.at(arrival.origin);
@@ -84,7 +86,7 @@ impl WalkBands for GuidedBand<'_> {
         dir
     }
 
-    #[inline]
+    #[inline(always)]
     fn draw_flight(&mut self, medium: &Medium, u: f64) -> f64 {
         let (drawn, u) = match self.drawn {
             Some(drawn) => (drawn, u),
@@ -93,13 +95,13 @@ impl WalkBands for GuidedBand<'_> {
         self.heading.sample_distance(medium.sigma_t, drawn, u)
     }
 
-    #[inline]
+    #[inline(always)]
     fn turn(&mut self, _: &[Medium], at: DVec3, from: DVec3, to: DVec3) {
         let Guidance { turns, share, .. } = self.guidance;
         self.heading = turns.heading(*share, self.at(at), from, to);
     }
 
-    #[inline]
+    #[inline(always)]
     fn flight(&mut self, _: &[Medium], t: f64, scatters: bool) {
         let over_plain = if scatters { Heading::flight_ratio } else { Heading::passage_ratio };
         let flown = over_plain(&self.heading, self.sigma_t, t);
@@ -116,7 +118,7 @@ impl WalkBands for GuidedBand<'_> {
     /// A passage is not drawn.
     fn passage(&mut self, _: &[Medium], _: f64) {}
 
-    #[inline]
+    #[inline(always)]
     fn importance(&mut self, at: DVec3) -> f64 {
         self.at(at);
         let importance = self.last.2 * self.per_entry;
