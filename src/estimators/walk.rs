@@ -304,17 +304,25 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// guided walks do.
     fn follow_both(&mut self, hit: &Hit) {
         let Some((frame, wo)) = self.meet(hit, Side::Outside) else { return };
-        let samples = self.boundary.sample_both(wo, self.stream.draw3());
-        let (ray, from, exit) = (self.ray, self.from, self.exit);
-        let (throughput, survival) = (self.throughput, self.survival);
-        let (history, measure, bands) = (self.history, self.measure, self.bands.clone());
-        for sample in samples.into_iter().flatten() {
-            if let Some(side) = self.leave(hit, Side::Outside, &frame, sample) {
-                self.follow(*hit, side);
-            }
+        let [reflection, refraction] = self.boundary.sample_both(wo, self.stream.draw3());
+        if let Some(sample) = reflection {
+            let (ray, from, exit) = (self.ray, self.from, self.exit);
+            let (throughput, survival) = (self.throughput, self.survival);
+            let (history, measure, bands) = (self.history, self.measure, self.bands.clone());
+            self.follow_sample(hit, &frame, sample);
             (self.ray, self.from, self.exit) = (ray, from, exit);
             (self.throughput, self.survival) = (throughput, survival);
-            (self.history, self.measure, self.bands) = (history, measure, bands.clone());
+            (self.history, self.measure, self.bands) = (history, measure, bands);
+        }
+        if let Some(sample) = refraction {
+            self.follow_sample(hit, &frame, sample);
+        }
+    }
+
+    /// Goes on from a first hit in a sampled direction until the path ends.
+    fn follow_sample(&mut self, hit: &Hit, frame: &Frame, sample: BoundarySample) {
+        if let Some(side) = self.leave(hit, Side::Outside, frame, sample) {
+            self.follow(*hit, side);
         }
     }
 

@@ -16,19 +16,16 @@ const FACETS: usize = 3;
 /// Where facets send light, of one lobe.
 #[derive(Clone, Copy)]
 struct FacetLobe {
-    facets: usize,
     weights: [f64; FACETS],
     directions: [DVec3; FACETS],
 }
 
 impl FacetLobe {
-    fn of(facets: usize) -> FacetLobe {
-        FacetLobe { facets, weights: [0.0; FACETS], directions: [DVec3::Z; FACETS] }
-    }
+    const NONE: FacetLobe = FacetLobe { weights: [0.0; FACETS], directions: [DVec3::Z; FACETS] };
 
     /// Mean over the facets.
     fn weight(&self) -> f64 {
-        self.weights.iter().sum::<f64>() / self.facets as f64
+        self.weights.iter().sum::<f64>() / FACETS as f64
     }
 
     /// One direction, in proportion to its weight; `None` where none weighs anything.
@@ -65,30 +62,37 @@ impl Boundary {
     /// Both lobes in place of a choice between them, each out of several facets where the surface has them: reflection and
     /// refraction, weighing together what [`Self::sample_of_several`] weighs; without what weighs nothing or fails.
     pub fn sample_both(&self, wo: DVec3, u: [f64; 3]) -> [Option<BoundarySample>; 2] {
-        if *self == Boundary::Matched {
-            return [None, self.sample(wo, u)];
+        match self {
+            Boundary::Matched => [None, self.sample(wo, u)],
+            Boundary::Smooth { .. } => self.both_of_smooth(wo),
+            Boundary::Rough { .. } => {
+                let [reflections, refractions] = self.lobes(wo, [u[1], u[2]]);
+                [(reflections, Event::Reflect), (refractions, Event::Refract)].map(|(lobe, event)| {
+                    let wi = lobe.choose(u[0])?;
+                    Some(self.sample_of(wo, wi, event, lobe.weight()))
+                })
+            }
         }
-        let of_lobe = |(lobe, event): (FacetLobe, Event)| {
-            let wi = lobe.choose(u[0])?;
-            Some(self.sample_of(wo, wi, event, lobe.weight()))
-        };
-        let [reflections, refractions] = self.lobes(wo, [u[1], u[2]]);
-        [(reflections, Event::Reflect), (refractions, Event::Refract)].map(of_lobe)
+    }
+
+    /// Both directions of a smooth surface, which has one facet.
+    fn both_of_smooth(&self, wo: DVec3) -> [Option<BoundarySample>; 2] {
+        let Some((h, relative)) = self.facet(wo, [0.0; 2]) else { return [None; 2] };
+        choices(wo, h, relative).map(|(probability, choice)| {
+            let (wi, event) = (probability > 0.0).then(|| split(wo, h, relative, choice))?;
+            Some(self.sample_of(wo, wi, event, probability))
+        })
     }
 
     /// Where several facets reflect and refract `wo`. They are the points of a lattice that `u` shifts, each of them
     /// uniform, and together spread evenly, so that their mean varies less than that of independent ones.
     fn lobes(&self, wo: DVec3, u: [f64; 2]) -> [FacetLobe; 2] {
-        let count = if self.is_delta() { 1 } else { FACETS };
-        let mut lobes = [FacetLobe::of(count), FacetLobe::of(count)];
-        for facet in 0..count {
+        let mut lobes = [FacetLobe::NONE; 2];
+        for facet in 0..FACETS {
             let i = facet as f64;
-            let shifted = [(u[0] + i / count as f64).fract(), (u[1] + i * GOLDEN).fract()];
+            let shifted = [(u[0] + i / FACETS as f64).fract(), (u[1] + i * GOLDEN).fract()];
             let Some((h, relative)) = self.facet(wo, shifted) else { continue };
-            let reflectance = fresnel(wo.dot(h), relative).reflectance;
-            // `split` reflects at 0, where there is reflection, and refracts at 1.
-            let choices = [(reflectance, 0.0), (1.0 - reflectance, 1.0)];
-            for (lobe, (probability, choice)) in lobes.iter_mut().zip(choices) {
+            for (lobe, (probability, choice)) in lobes.iter_mut().zip(choices(wo, h, relative)) {
                 if probability > 0.0 {
                     let (wi, event) = split(wo, h, relative, choice);
                     lobe.directions[facet] = wi;
@@ -98,6 +102,12 @@ impl Boundary {
         }
         lobes
     }
+}
+
+/// Probabilities of reflection and of refraction, each with the number at which `split` takes it, where there is any.
+fn choices(wo: DVec3, h: DVec3, relative: f64) -> [(f64, f64); 2] {
+    let reflectance = fresnel(wo.dot(h), relative).reflectance;
+    [(reflectance, 0.0), (1.0 - reflectance, 1.0)]
 }
 
 #[cfg(test)]

@@ -85,8 +85,9 @@ struct Lattice {
     counts: [usize; 3],
 }
 
-/// What a walk asks for, small since the grid is to stay in the cache.
+/// What a walk asks for: small, since the grid is to stay in the cache, and aligned, so that no node is in two cache lines.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
 struct Node {
     /// Unit, in single precision: [`unit`].
     axis: Vec3,
