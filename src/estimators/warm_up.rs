@@ -22,7 +22,7 @@ use super::roulette::Roulette;
 use super::walk::{CameraWalk, Unrivalled};
 use super::{GuideSlice, Layout, Scores};
 use crate::geometry::Ray;
-use crate::math::DVec3;
+use crate::math::{DVec3, GOLDEN};
 use crate::optics::medium::Medium;
 use crate::sampling::stream::{Stream, StreamKey};
 use crate::scene::Scene;
@@ -97,7 +97,6 @@ fn learn(field: &Field, band: usize, lessons: Lessons) -> Guidance {
     let medium = &scene.medium[band];
     let cells = LearningCells::new(scene, band, cells);
     let key = StreamKey::named("what walks learn from");
-    let rays = scene.sensor.rays_per_pass() as u64;
     let mut scores = Scores::new(Layout::new(scene));
     let mut known = LearnedPulls::new(cells, &vec![FoundLight::default(); cells.count()], medium);
     let mut done = 0;
@@ -106,8 +105,9 @@ fn learn(field: &Field, band: usize, lessons: Lessons) -> Guidance {
         let guidance = Guidance::learned(share, medium, known);
         let notes = RefCell::new(Notes::new(cells));
         for path in done..until {
-            let pass = key.pass(path / rays * scene.bands() as u64 + band as u64);
-            let path = Path { field, band, index: (path % rays) as usize, key: &pass };
+            let pass = key.pass(path * scene.bands() as u64 + band as u64);
+            let index = training_ray(path, scene.sensor.rays_per_pass());
+            let path = Path { field, band, index, key: &pass };
             let walk = GuidedBand::new(&guidance, medium);
             CameraWalk::trace(path, &mut scores, Unrivalled, Lesson { walk, turns: 0, notes: &notes });
             notes.borrow_mut().close(0);
@@ -116,6 +116,12 @@ fn learn(field: &Field, band: usize, lessons: Lessons) -> Guidance {
         known = LearnedPulls::new(cells, &notes.into_inner().found, medium);
     }
     Guidance::learned(share, medium, known)
+}
+
+/// The sensor's ray of a training path: the rays of every training round are spread over the image, however few they are.
+fn training_ray(path: u64, rays: usize) -> usize {
+    let place = (path as f64 * GOLDEN).fract();
+    ((place * rays as f64) as usize).min(rays - 1)
 }
 
 /// What walks found.

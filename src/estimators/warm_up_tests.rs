@@ -1,5 +1,7 @@
 //! Tests of learned walks.
 
+use std::ops::Range;
+
 use super::*;
 use crate::estimators::path::{PathOptions, PathTracer};
 use crate::estimators::testing::measure;
@@ -45,6 +47,30 @@ fn walks_learn_where_the_light_is() {
     }
     // Of plain turns 2000 go outwards, with a standard error of 32.
     assert!(outwards > 2130, "{outwards}");
+}
+
+/// Every training round sees the whole image, of more or fewer rays than the round has paths: 64 parts of the image and 64
+/// of the width of its rows have their share of the round's paths.
+#[test]
+fn training_rays_are_spread_over_the_image() {
+    const PARTS: usize = 64;
+    for width in [128, 256, 1000] {
+        let rays = width * width;
+        for round in [0..2184, 2184..6553, 6553..15291, 15291..32768] {
+            let paths: Range<u64> = round;
+            let (mut rows, mut columns) = ([0; PARTS], [0; PARTS]);
+            for path in paths.clone() {
+                let ray = training_ray(path, rays);
+                rows[ray * PARTS / rays] += 1;
+                columns[ray % width * PARTS / width] += 1;
+            }
+            let share = (paths.end - paths.start) as f64 / PARTS as f64;
+            for count in rows.into_iter().chain(columns) {
+                let share = f64::from(count) / share;
+                assert!((0.5..1.6).contains(&share), "{width} {paths:?}: {share}");
+            }
+        }
+    }
 }
 
 /// The same lessons teach the same.
