@@ -223,11 +223,14 @@ fn commands_of_the_scripts_are_accepted() {
             };
             // Without a file it is those that `verify` knows.
             let Some(file) = words.iter().find(|word| word.ends_with(".toml")) else { continue };
-            let materials = ["marble", "skin", "milk", "ketchup", "spectral-skin"];
-            let files: Vec<String> = if file.contains("$material") {
-                materials.map(|material| file.replace("$material", material)).into()
-            } else {
-                vec![file.to_string()]
+            // The script's loop over materials, or the one file.
+            let materials = text.lines().find_map(|line| line.strip_prefix("for material in "));
+            let files: Vec<String> = match materials.filter(|_| file.contains("$material")) {
+                Some(names) => {
+                    let names = names.trim_end_matches("; do").split(' ');
+                    names.map(|name| file.replace("$material", name)).collect()
+                }
+                None => vec![file.to_string()],
             };
             for file in files {
                 let file = root.join(file);

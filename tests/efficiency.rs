@@ -178,16 +178,19 @@ fn cpu_time_follows_the_counters() {
     let rounds: Vec<Vec<_>> = (0..ROUNDS).map(round).collect();
     let fastest = |k: usize| rounds.iter().map(|round| round[k].1).fold(0.0, f64::max);
     let mut found: BTreeMap<&str, f64> = BTreeMap::new();
-    let mut of_path = f64::NAN;
+    let mut path = 0;
     for (k, ([cell, estimator, kind], _)) in rounds[0].iter().enumerate() {
         if estimator == "path" {
-            of_path = fastest(k); // the first of its cell
+            path = k; // the first of its cell
             continue;
         }
-        let ratio = fastest(k) / of_path;
+        let ratio = fastest(k) / fastest(path);
+        let of_rounds = rounds.iter().map(|round| round[k].1 / round[path].1);
+        let [least, largest] =
+            [of_rounds.clone().fold(f64::INFINITY, f64::min), of_rounds.fold(0.0, f64::max)];
         let most = found.entry(kind).or_insert(1.0);
         *most = most.max(ratio).max(1.0 / ratio);
-        println!("{cell:32} {estimator:14} {ratio:.3}");
+        println!("{cell:32} {estimator:14} {ratio:.3}, by rounds {least:.3} to {largest:.3}");
     }
     for (kind, stated) in FACTORS {
         println!("{kind:>16}: {:.2} times, stated {stated}", found[kind]);

@@ -50,8 +50,8 @@ impl<B: WalkBands> Flying<'_, B> {
             vertices += 1;
             ray.origin = end;
             bands.flight(&scene.medium, t, true);
-            let weights = [&mut throughput, &mut survival];
-            if roulette.survive(weights, factor, || bands.importance(end), &mut stream).is_none() {
+            let local = [&mut throughput, &mut survival];
+            if roulette.survive(local, factor, || bands.importance(end), &mut stream).is_none() {
                 break None;
             }
             let dir = bands.draw_turn(medium, &ray, &mut stream);

@@ -1,7 +1,5 @@
 //! Tests of learned walks.
 
-use std::ops::Range;
-
 use super::*;
 use crate::estimators::path::{PathOptions, PathTracer};
 use crate::estimators::testing::measure;
@@ -56,8 +54,7 @@ fn training_rays_are_spread_over_the_image() {
     const PARTS: usize = 64;
     for width in [128, 256, 1000] {
         let rays = width * width;
-        for round in [0..2184, 2184..6553, 6553..15291, 15291..32768] {
-            let paths: Range<u64> = round;
+        for paths in [0..2184_u64, 2184..6553, 6553..15291, 15291..32768] {
             let (mut rows, mut columns) = ([0; PARTS], [0; PARTS]);
             for path in paths.clone() {
                 let ray = training_ray(path, rays);

@@ -62,26 +62,22 @@ impl Boundary {
     /// Both lobes in place of a choice between them, each out of several facets where the surface has them: reflection and
     /// refraction, weighing together what [`Self::sample_of_several`] weighs; without what weighs nothing or fails.
     pub fn sample_both(&self, wo: DVec3, u: [f64; 3]) -> [Option<BoundarySample>; 2] {
-        match self {
-            Boundary::Matched => [None, self.sample(wo, u)],
-            Boundary::Smooth { .. } => self.both_of_smooth(wo),
-            Boundary::Rough { .. } => {
-                let [reflections, refractions] = self.lobes(wo, [u[1], u[2]]);
-                [(reflections, Event::Reflect), (refractions, Event::Refract)].map(|(lobe, event)| {
+        if !self.is_delta() {
+            let [reflections, refractions] = self.lobes(wo, [u[1], u[2]]);
+            return [(reflections, Event::Reflect), (refractions, Event::Refract)].map(
+                |(lobe, event)| {
                     let wi = lobe.choose(u[0])?;
                     Some(self.sample_of(wo, wi, event, lobe.weight()))
-                })
-            }
+                },
+            );
         }
-    }
-
-    /// Both directions of a smooth surface, which has one facet.
-    fn both_of_smooth(&self, wo: DVec3) -> [Option<BoundarySample>; 2] {
-        let Some((h, relative)) = self.facet(wo, [0.0; 2]) else { return [None; 2] };
-        choices(wo, h, relative).map(|(probability, choice)| {
-            let (wi, event) = (probability > 0.0).then(|| split(wo, h, relative, choice))?;
-            Some(self.sample_of(wo, wi, event, probability))
-        })
+        match self.facet(wo, [u[1], u[2]]) {
+            None => [None, self.sample(wo, u)],
+            Some((h, relative)) => choices(wo, h, relative).map(|(probability, choice)| {
+                let (wi, event) = (probability > 0.0).then(|| split(wo, h, relative, choice))?;
+                Some(self.sample_of(wo, wi, event, probability))
+            }),
+        }
     }
 
     /// Where several facets reflect and refract `wo`. They are the points of a lattice that `u` shifts, each of them
