@@ -58,6 +58,13 @@ pub(super) trait WalkBands: Clone {
         false
     }
 
+    /// What light finds that leaves the body at a boundary point, over what it finds that is reflected back inside; 1 where a
+    /// walk knows nothing of it.
+    #[inline]
+    fn gain_of_leaving(&mut self, _at: DVec3) -> f64 {
+        1.0
+    }
+
     /// The factor that roulette sees at a scattering event, for the medium of the walk's own band.
     #[inline]
     fn survival(&self, medium: &Medium) -> f64 {

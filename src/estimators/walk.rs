@@ -486,7 +486,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let (frame, wo) = self.meet(hit, side)?;
         let u = self.stream.draw3();
         let sample = if self.bands.refines_boundary() {
-            self.boundary.sample_of_several(wo, u)?
+            let gain = if side == Side::Inside { self.bands.gain_of_leaving(hit.point) } else { 1.0 };
+            self.boundary.sample_of_several(wo, u, gain)?
         } else {
             self.boundary.sample(wo, u)?
         };

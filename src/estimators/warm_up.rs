@@ -192,6 +192,10 @@ impl WalkBands for Lesson<'_> {
         self.walk.refines_boundary()
     }
 
+    fn gain_of_leaving(&mut self, at: DVec3) -> f64 {
+        self.walk.gain_of_leaving(at)
+    }
+
     fn importance(&mut self, at: DVec3) -> f64 {
         self.walk.importance(at)
     }

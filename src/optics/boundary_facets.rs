@@ -5,77 +5,90 @@
 //! variance of a weight is 0.054 (directions by cosine). The mean weight of a few facets, with a direction chosen in proportion to
 //! theirs (resampled importance sampling, Talbot et al. 2005), has the same expectation.
 
-use super::{Boundary, BoundarySample, Event, split};
+use super::{Boundary, BoundarySample, Event, through};
 use crate::math::{DVec3, GOLDEN};
 use crate::optics::fresnel::fresnel;
-use crate::sampling::discrete::{choose, choose_share};
+use crate::sampling::discrete::choose;
 
 /// Facets out of which one is chosen.
-const FACETS: usize = 3;
+const FACETS: usize = 5;
+
+/// The points of a lattice, one per facet.
+const LATTICE: [[f64; 2]; FACETS] = {
+    let mut points = [[0.0; 2]; FACETS];
+    let mut i = 0;
+    while i < FACETS {
+        points[i] = [i as f64 / FACETS as f64, (i as f64 * GOLDEN) % 1.0];
+        i += 1;
+    }
+    points
+};
 
 /// Where facets send light, of one lobe.
 #[derive(Clone, Copy)]
 struct FacetLobe {
+    event: Event,
     weights: [f64; FACETS],
     directions: [DVec3; FACETS],
 }
 
 impl FacetLobe {
-    const NONE: FacetLobe = FacetLobe { weights: [0.0; FACETS], directions: [DVec3::Z; FACETS] };
+    fn none(event: Event) -> FacetLobe {
+        FacetLobe { event, weights: [0.0; FACETS], directions: [DVec3::Z; FACETS] }
+    }
 
     /// Mean over the facets.
     fn weight(&self) -> f64 {
-        self.weights.iter().sum::<f64>() / FACETS as f64
+        self.weights.iter().sum::<f64>() * (1.0 / FACETS as f64)
     }
 
     /// One direction, in proportion to its weight; `None` where none weighs anything.
     fn choose(&self, u: f64) -> Option<DVec3> {
-        let sum: f64 = self.weights.iter().sum();
-        if sum == 0.0 {
-            return None;
+        let mut rest = u * self.weights.iter().sum::<f64>();
+        let mut chosen = None;
+        for (weight, direction) in self.weights.iter().zip(&self.directions) {
+            if *weight > 0.0 {
+                chosen = Some(*direction); // the last one where rounding leaves a rest
+                if rest < *weight {
+                    break;
+                }
+            }
+            rest -= weight;
         }
-        let (index, _) = choose_share(self.weights.iter().map(|weight| weight / sum), u)?;
-        Some(self.directions[index])
+        chosen
     }
 }
 
 impl Boundary {
     /// [`Boundary::sample`] out of several facets, which a rough surface has, and both lobes of each: one direction in
-    /// proportion to its weight, with the mean weight of a facet. Its density is that of [`Self::sample`]: weights of the
-    /// balance heuristic may use it, since they need but sum to 1.
-    pub fn sample_of_several(&self, wo: DVec3, u: [f64; 3]) -> Option<BoundarySample> {
-        if self.is_delta() {
-            return self.sample(wo, u);
+    /// proportion to its weight, times `gain` where it is refracted, and weighted accordingly. With a gain of 1 the weight is
+    /// the mean weight of a facet; with what refracted light finds over what reflected light finds, the product of weight and
+    /// light found is the same for both. Its density is that of [`Self::sample`]: weights of the balance heuristic may use
+    /// it, since they need but sum to 1.
+    pub fn sample_of_several(&self, wo: DVec3, u: [f64; 3], gain: f64) -> Option<BoundarySample> {
+        if !self.is_delta() {
+            let lobes = self.lobes(wo, [u[1], u[2]]);
+            let (lobe, weight, u) = choose_lobe(lobes.each_ref().map(FacetLobe::weight), gain, u[0])?;
+            return Some(self.sample_of(wo, lobes[lobe].choose(u)?, lobes[lobe].event, weight));
         }
-        let [reflections, refractions] = self.lobes(wo, [u[1], u[2]]);
-        let [reflected, refracted] = [&reflections, &refractions].map(FacetLobe::weight);
-        let sum = reflected + refracted;
-        if sum == 0.0 {
-            return None;
-        }
-        let (reflects, u) = choose(u[0], reflected / sum);
-        let (lobe, event) =
-            if reflects { (reflections, Event::Reflect) } else { (refractions, Event::Refract) };
-        Some(self.sample_of(wo, lobe.choose(u)?, event, sum))
+        let Some((h, relative)) = self.facet(wo, [u[1], u[2]]) else { return self.sample(wo, u) };
+        let ways = ways(wo, h, relative);
+        let (way, weight, _) = choose_lobe(ways.each_ref().map(|way| way.share), gain, u[0])?;
+        Some(self.sample_of(wo, ways[way].wi, ways[way].event, weight))
     }
 
     /// Both lobes in place of a choice between them, each out of several facets where the surface has them: reflection and
     /// refraction, weighing together what [`Self::sample_of_several`] weighs; without what weighs nothing or fails.
     pub fn sample_both(&self, wo: DVec3, u: [f64; 3]) -> [Option<BoundarySample>; 2] {
         if !self.is_delta() {
-            let [reflections, refractions] = self.lobes(wo, [u[1], u[2]]);
-            return [(reflections, Event::Reflect), (refractions, Event::Refract)].map(
-                |(lobe, event)| {
-                    let wi = lobe.choose(u[0])?;
-                    Some(self.sample_of(wo, wi, event, lobe.weight()))
-                },
-            );
+            return self
+                .lobes(wo, [u[1], u[2]])
+                .map(|lobe| Some(self.sample_of(wo, lobe.choose(u[0])?, lobe.event, lobe.weight())));
         }
         match self.facet(wo, [u[1], u[2]]) {
             None => [None, self.sample(wo, u)],
-            Some((h, relative)) => choices(wo, h, relative).map(|(probability, choice)| {
-                let (wi, event) = (probability > 0.0).then(|| split(wo, h, relative, choice))?;
-                Some(self.sample_of(wo, wi, event, probability))
+            Some((h, relative)) => ways(wo, h, relative).map(|Way { wi, event, share }| {
+                (share > 0.0).then(|| self.sample_of(wo, wi, event, share))
             }),
         }
     }
@@ -83,16 +96,16 @@ impl Boundary {
     /// Where several facets reflect and refract `wo`. They are the points of a lattice that `u` shifts, each of them
     /// uniform, and together spread evenly, so that their mean varies less than that of independent ones.
     fn lobes(&self, wo: DVec3, u: [f64; 2]) -> [FacetLobe; 2] {
-        let mut lobes = [FacetLobe::NONE; 2];
-        for facet in 0..FACETS {
-            let i = facet as f64;
-            let shifted = [(u[0] + i / FACETS as f64).fract(), (u[1] + i * GOLDEN).fract()];
+        // `f64::fract` is a library call on the baseline target.
+        let wrapped = |x: f64| if x < 1.0 { x } else { x - 1.0 };
+        let mut lobes = [Event::Reflect, Event::Refract].map(FacetLobe::none);
+        for (facet, point) in LATTICE.iter().enumerate() {
+            let shifted = [wrapped(u[0] + point[0]), wrapped(u[1] + point[1])];
             let Some((h, relative)) = self.facet(wo, shifted) else { continue };
-            for (lobe, (probability, choice)) in lobes.iter_mut().zip(choices(wo, h, relative)) {
-                if probability > 0.0 {
-                    let (wi, event) = split(wo, h, relative, choice);
+            for (lobe, Way { wi, event, share }) in lobes.iter_mut().zip(ways(wo, h, relative)) {
+                if share > 0.0 {
                     lobe.directions[facet] = wi;
-                    lobe.weights[facet] = probability * self.shadowing(wo, wi, event).unwrap_or(0.0);
+                    lobe.weights[facet] = share * self.shadowing(wo, wi, event).unwrap_or(0.0);
                 }
             }
         }
@@ -100,10 +113,36 @@ impl Boundary {
     }
 }
 
-/// Probabilities of reflection and of refraction, each with the number at which `split` takes it, where there is any.
-fn choices(wo: DVec3, h: DVec3, relative: f64) -> [(f64, f64); 2] {
-    let reflectance = fresnel(wo.dot(h), relative).reflectance;
-    [(reflectance, 0.0), (1.0 - reflectance, 1.0)]
+/// A way that light takes at a facet.
+#[derive(Clone, Copy)]
+struct Way {
+    wi: DVec3,
+    event: Event,
+    /// Of the light.
+    share: f64,
+}
+
+/// Reflection and refraction at a facet of normal `h`; of total reflection the second has no share.
+#[inline]
+fn ways(wo: DVec3, h: DVec3, relative: f64) -> [Way; 2] {
+    let cos = wo.dot(h);
+    let surface = fresnel(cos, relative);
+    let [reflected, refracted] = [2.0 * cos * h - wo, through(wo, h, relative, surface.cos_t)];
+    [
+        Way { wi: reflected, event: Event::Reflect, share: surface.reflectance },
+        Way { wi: refracted, event: Event::Refract, share: 1.0 - surface.reflectance },
+    ]
+}
+
+/// The index of one of the two lobes, chosen in proportion to its weight, that of refraction times `gain`; its weight divided by
+/// the probability of this choice; and a number that is uniform again. `None` where neither weighs anything.
+fn choose_lobe([reflected, refracted]: [f64; 2], gain: f64, u: f64) -> Option<(usize, f64, f64)> {
+    let sum = reflected + gain * refracted;
+    if sum == 0.0 {
+        return None;
+    }
+    let (reflects, u) = choose(u, reflected / sum);
+    Some(if reflects { (0, sum, u) } else { (1, sum / gain, u) })
 }
 
 #[cfg(test)]
@@ -114,8 +153,8 @@ mod tests {
     use crate::optics::microfacet::{MicrofacetKind, Microfacets};
     use crate::sampling::stream::{Purpose, StreamKey};
 
-    /// Several facets, and both lobes of each, are what one facet gives on average: weight, and a direction weighted by it;
-    /// with densities that are those of the directions.
+    /// Several facets, both lobes of each, and a choice that prefers refraction are what one facet gives on average: weight, and
+    /// a direction weighted by it; with densities that are those of the directions.
     #[test]
     fn several_facets_are_the_mean_of_one() {
         let smooth = [Boundary::Smooth { eta: 1.4 }, Boundary::Smooth { eta: 0.7 }, Boundary::Matched];
@@ -124,13 +163,15 @@ mod tests {
             for cos in [0.95, 0.4, 0.1, -0.1, -0.4, -0.95] {
                 let wo = direction(cos, 0.21);
                 // Per way of sampling and lobe: weight, weight times x, weight times z; sums and squares.
-                let mut sums = [[[[0.0; 2]; 3]; 2]; 3];
+                let mut sums = [[[[0.0; 2]; 3]; 2]; 4];
                 const COUNT: usize = 4000;
                 for _ in 0..COUNT {
                     let u = stream.draw3();
-                    let several = surface.sample_of_several(wo, stream.draw3());
+                    let several = surface.sample_of_several(wo, stream.draw3(), 1.0);
                     let [a, b] = surface.sample_both(wo, stream.draw3());
-                    let drawn = [[surface.sample(wo, u), None], [several, None], [a, b]];
+                    let leaving = surface.sample_of_several(wo, stream.draw3(), 2.5);
+                    let drawn =
+                        [[surface.sample(wo, u), None], [several, None], [a, b], [leaving, None]];
                     for (sums, drawn) in sums.iter_mut().zip(drawn) {
                         for s in drawn.into_iter().flatten() {
                             let own = match surface {
@@ -165,6 +206,33 @@ mod tests {
         }
     }
 
+    /// Whichever lobe is chosen, weight times gain is the same.
+    #[test]
+    fn what_is_found_does_not_depend_on_the_lobe() {
+        let smooth = [Boundary::Smooth { eta: 1.4 }, Boundary::Smooth { eta: 0.7 }];
+        let mut judged = 0;
+        for surface in rough_surfaces().chain(smooth) {
+            for (cos, v) in
+                [(-0.95, [0.2, 0.7]), (-0.8, [0.6, 0.1]), (-0.72, [0.9, 0.4]), (0.5, [0.3, 0.3])]
+            {
+                let wo = direction(cos, 0.21);
+                let inside_of_far = if cos < 0.0 { 1.0 / surface.eta() } else { surface.eta() };
+                for gain in [1.0, 1.7, 0.4] {
+                    let drawn =
+                        [0.0, 1.0 - 1e-12].map(|u| surface.sample_of_several(wo, [u, v[0], v[1]], gain));
+                    let [Some(reflected), Some(refracted)] = drawn else { continue };
+                    if reflected.event == refracted.event {
+                        continue;
+                    }
+                    judged += 1;
+                    let found = refracted.weight * inside_of_far * inside_of_far * gain;
+                    assert!((found / reflected.weight - 1.0).abs() < 1e-12, "{surface:?} {cos} {gain}");
+                }
+            }
+        }
+        assert!(judged > 30, "{judged}");
+    }
+
     /// What the head of this file says of one facet, and that several vary less: light from inside, even over the cosine.
     #[test]
     fn a_mean_over_facets_varies_less() {
@@ -177,7 +245,7 @@ mod tests {
         for _ in 0..COUNT {
             let wo = direction(-stream.draw().sqrt(), stream.draw());
             let one = surface.sample(wo, stream.draw3());
-            let several = surface.sample_of_several(wo, stream.draw3());
+            let several = surface.sample_of_several(wo, stream.draw3(), 1.0);
             failed += u32::from(one.is_none());
             for (sums, sample) in sums.iter_mut().zip([one, several]) {
                 // Without the squared index, which a crossing has.

@@ -20,7 +20,7 @@ pub const FACTORS: [(&str, f64); 8] = [
     ("point_cloud", 6.8),
     ("bssrdf_probe", 7.8),
     ("bssrdf_rays", 3.4),
-    ("bssrdf_density", 7.2),
+    ("bssrdf_density", 7.7),
 ];
 
 /// The factor by which a ratio of counted work between two kinds may be off: between runs of one kind

@@ -10,6 +10,9 @@
 //! samples directions in the cone. Under forward scattering, where most escapes turn too far, y has the factor 1 - g. The half
 //! is an empirical choice: results are unbiased for any probability of escapes, and with larger ones weights grow from step to
 //! step. e^{-tau / mu} is approximated by the square of a square, which has a finite range.
+//!
+//! A walk that meets the boundary from inside chooses between refraction and reflection with the same numbers: refracted light
+//! finds s, reflected light about phi, so that the lobe of refraction counts s / phi = 1 + x times its weight.
 
 use crate::math::{DVec3, Vec3, renormalized};
 use crate::optics::boundary::Boundary;
@@ -65,6 +68,13 @@ impl ExitRule {
             offset: normal.dot(at) as f32,
             chance: (y / (1.0 + y)) as f32,
         })
+    }
+
+    /// `found / phi` of [`Self::exit`].
+    #[inline]
+    pub(super) fn gain(&self, exit: &ExitPlane) -> f64 {
+        let chance = f64::from(exit.chance);
+        1.0 + chance / (1.0 - chance) / self.per_gain
     }
 
     /// From a point inside.

@@ -220,6 +220,19 @@ impl Importance {
         }
     }
 
+    /// What light finds that leaves the body at a boundary point, over phi there; 1 where there is no exit.
+    #[inline]
+    pub(super) fn gain_of_leaving(&self, at: DVec3) -> f64 {
+        let gain = |rule: &ExitRule, exit: Option<&ExitPlane>| exit.map_or(1.0, |exit| rule.gain(exit));
+        match self {
+            Importance::HalfSpace { rule, exit, .. } => gain(rule, exit.as_ref()),
+            Importance::Slab { thickness, rule, exits, .. } => {
+                gain(rule, exits[usize::from(at.z < -0.5 * thickness)].as_ref())
+            }
+            Importance::Grid(grid) => gain(&grid.rule, grid.exit(grid.node(at))),
+        }
+    }
+
     /// The largest phi.
     pub(super) fn largest(&self) -> f64 {
         match self {
@@ -242,16 +255,26 @@ impl Importance {
 }
 
 impl ImportanceGrid {
-    /// Of the cell that holds the point.
     #[inline(always)]
-    fn at(&self, x: DVec3, guide: &mut StepGuide) -> f64 {
+    fn node(&self, x: DVec3) -> &Node {
         let counts = self.counts;
         let place = (x - self.low) * self.per_spacing;
         // The cast takes what is negative to 0.
         let cell = |axis: usize| (place[axis] as u32 as usize).min(counts[axis] - 1);
-        let node = &self.nodes[(cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)];
+        &self.nodes[(cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)]
+    }
+
+    #[inline(always)]
+    fn exit(&self, node: &Node) -> Option<&ExitPlane> {
+        self.exits.get((node.level_and_exit >> 8) as usize)
+    }
+
+    /// Of the cell that holds the point.
+    #[inline(always)]
+    fn at(&self, x: DVec3, guide: &mut StepGuide) -> f64 {
+        let node = self.node(x);
         guide.pull = Pull { axis: unit(node.axis), level: (node.level_and_exit & 0xff) as usize };
-        match self.exits.get((node.level_and_exit >> 8) as usize) {
+        match self.exit(node) {
             Some(exit) => guide.escape = self.rule.escape(exit, x),
             None => guide.escape.chance = 0.0,
         }

@@ -197,6 +197,16 @@ impl Guidance {
         }
     }
 
+    /// What light finds that leaves the body at a boundary point, over what it finds that is reflected back inside; 1 where
+    /// that is unknown.
+    #[inline]
+    pub(super) fn gain_of_leaving(&self, at: DVec3) -> f64 {
+        match &self.aim {
+            Aim::Solution(importance) => importance.gain_of_leaving(at),
+            Aim::Normal(_) | Aim::Learned(_) => 1.0,
+        }
+    }
+
     /// Importance at the first hits of sensor rays, over its largest value in the body; 1 where it is unknown.
     pub(super) fn at_first_hits(&self, scene: &Scene) -> f64 {
         let Aim::Solution(importance) = &self.aim else { return 1.0 };

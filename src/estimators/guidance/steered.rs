@@ -115,6 +115,11 @@ impl WalkBands for GuidedBand<'_> {
         true
     }
 
+    #[inline]
+    fn gain_of_leaving(&mut self, at: DVec3) -> f64 {
+        self.guidance.gain_of_leaving(at)
+    }
+
     /// A passage is not drawn.
     fn passage(&mut self, _: &[Medium], _: f64) {}
 

@@ -152,6 +152,37 @@ fn ways_out() {
     assert_eq!(guide(&slab, DVec3::new(0.0, 0.0, -0.5)).escape.chance, 0.0);
 }
 
+/// What leaving gains: in a half-space 1 + 2 A D kappa under a sky and nothing in parallel light, the same on both sides of a
+/// thick slab, and on the grid of a thick flat box.
+#[test]
+fn gains_of_leaving() {
+    let medium = medium(10.0, 0.9, 0.3);
+    let half_space = |light: Light| {
+        let scene = scene(Shape::HalfSpace, SMOOTH, medium, vec![light]);
+        (solution(&scene, 4).gain_of_leaving(DVec3::X), scene)
+    };
+    let (gain, under_sky) = half_space(sky());
+    let diffusion = 1.0 / (3.0 * 10.0 * (1.0 - 0.9 * 0.3));
+    let Boundary::Smooth { eta } = under_sky.boundary[0] else { unreachable!() };
+    let mismatch = crate::optics::bssrdf::FresnelMoments::exact(eta).mismatch();
+    let expected = 1.0 + 2.0 * mismatch * diffusion * diffuse_growth(0.9, 0.3) * 10.0;
+    // The exit keeps its chance in single precision.
+    assert!((gain / expected - 1.0).abs() < 1e-5 && gain > 1.5, "{gain} {expected}");
+    assert_eq!(half_space(cap(DVec3::Z, 1e-3, 100.0)).0, 1.0);
+
+    let all_round = |shape: Shape| scene(shape, SMOOTH, medium, vec![sky()]);
+    let slab = solution(&all_round(Shape::Slab { thickness: 4.0 }), 4);
+    let flat = solution(&all_round(Shape::Box { half: DVec3::new(8.0, 8.0, 2.0) }), 128);
+    for (of_slab, of_box) in [(0.0, 2.0), (-4.0, -2.0)] {
+        let gains = [
+            slab.gain_of_leaving(DVec3::Z * of_slab),
+            flat.gain_of_leaving(DVec3::new(0.01, 0.01, of_box)),
+        ];
+        // `sky` is all directions: the underside is lit as the upper side is. A quadrature of the sky, and cells.
+        assert!(gains.iter().all(|own| (own / gain - 1.0).abs() < 0.1), "{gains:?} {gain}");
+    }
+}
+
 /// No light, no field; in parts thinner than a cell there is none, either, and walks are plain.
 #[test]
 fn where_nothing_guides() {
