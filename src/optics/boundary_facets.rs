@@ -11,7 +11,7 @@ use crate::optics::fresnel::fresnel;
 use crate::sampling::discrete::choose;
 
 /// Facets out of which one is chosen.
-const FACETS: usize = 5;
+const FACETS: usize = 3;
 
 /// The points of a lattice, one per facet.
 const LATTICE: [[f64; 2]; FACETS] = {

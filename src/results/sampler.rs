@@ -27,7 +27,8 @@ pub struct SamplerRun {
     pub null: NullMass,
     /// Draws where the density is 0 or not finite, or outside the chart: none can be right.
     pub outside: u64,
-    /// Draws whose own density differs from the density function's there by more than [`OWN_DENSITY`].
+    /// Draws whose own density differs from the density function's there by more than [`OWN_DENSITY`], and by more than the
+    /// rounding that the sampler states there.
     pub own_density_differs: u64,
     /// The largest such relative difference; at most 1e300.
     pub own_density_largest: f64,

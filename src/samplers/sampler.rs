@@ -16,6 +16,12 @@ pub trait Sampler: Send + Sync {
     /// Density of piece `piece` per unit of its chart, from the code's own density function.
     fn density(&self, piece: usize, at: [f64; 2]) -> f64;
 
+    /// How much the rounding of a draw changes this density, relative to it, where that may be more than
+    /// 1e-9: near a singularity the nearest numbers have different densities.
+    fn rounding(&self, _piece: usize, _at: [f64; 2]) -> f64 {
+        0.0
+    }
+
     /// The discrete outcomes of the distribution.
     fn deltas(&self) -> Vec<Discrete> {
         Vec::new()

@@ -7,7 +7,7 @@
 //! | `contrast NAME` | the mean of a function of the draw | Student's t |
 //! | `delta NAME` | a discrete outcome has its probability, and its value | exact binomial |
 //! | `null` | the sampler returns nothing as often as is stated, or never | exact binomial, or none |
-//! | `identity D5` | each draw's own density is the density function's, to 1e-9 | none differs |
+//! | `identity D5` | each draw's own density is the density function's, to 1e-9 and rounding | none differs |
 //! | `identity D7` | density, discrete masses and stated null sum to 1 | certified quadrature |
 //! | `outside` | no draw where the density is 0, or outside the chart | there is none |
 //!

@@ -212,7 +212,8 @@ impl Counting<'_> {
         let leaf = self.partition.leaf(piece, at)?;
         let density = self.sampler.density(piece, at);
         let difference = (own - density).abs();
-        let agrees = difference <= OWN_DENSITY * density.abs(); // a NaN does not
+        let within = |limit: f64| difference <= limit * density.abs(); // a NaN is not
+        let agrees = within(OWN_DENSITY) || within(OWN_DENSITY + self.sampler.rounding(piece, at));
         counts.differs += u64::from(!agrees);
         let relative = if difference == 0.0 { 0.0 } else { difference / density.abs() };
         counts.largest = if relative <= 1e300 { counts.largest.max(relative) } else { 1e300 };
