@@ -22,6 +22,10 @@ use crate::scene::Scene;
 /// Depth from which on there are no escapes, mean free paths.
 pub(super) const REACH: f64 = 4.0;
 
+/// The largest gain of leaving. For common indices 1 + 2 A D kappa is below 10; but a cell that barely touches the body may have
+/// next to no phi, and a reflected path would take the gain as a weight.
+const MOST_GAIN: f64 = 16.0;
+
 /// The boundary near a point, as a plane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ExitPlane {
@@ -70,11 +74,11 @@ impl ExitRule {
         })
     }
 
-    /// `found / phi` of [`Self::exit`].
+    /// `found / phi` of [`Self::exit`], at most [`MOST_GAIN`].
     #[inline]
     pub(super) fn gain(&self, exit: &ExitPlane) -> f64 {
         let chance = f64::from(exit.chance);
-        1.0 + chance / (1.0 - chance) / self.per_gain
+        (1.0 + chance / (1.0 - chance) / self.per_gain).min(MOST_GAIN)
     }
 
     /// From a point inside.

@@ -169,6 +169,9 @@ fn gains_of_leaving() {
     // The exit keeps its chance in single precision.
     assert!((gain / expected - 1.0).abs() < 1e-5 && gain > 1.5, "{gain} {expected}");
     assert_eq!(half_space(cap(DVec3::Z, 1e-3, 100.0)).0, 1.0);
+    let rule = ExitRule::of(&under_sky, 0);
+    let dim = |phi| rule.gain(&rule.exit(DVec3::ZERO, DVec3::Z, 1.0, phi).expect("a gain"));
+    assert!(dim(1e-9) == dim(1e-30) && dim(0.2) < dim(1e-9) && dim(1e-30).is_finite());
 
     let all_round = |shape: Shape| scene(shape, SMOOTH, medium, vec![sky()]);
     let slab = solution(&all_round(Shape::Slab { thickness: 4.0 }), 4);
