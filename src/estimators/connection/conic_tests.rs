@@ -68,7 +68,15 @@ fn no_root_differs_from_exhaustive_subdivision() {
 #[test]
 fn light_that_enters_is_found() {
     for body in bodies() {
-        find_entering_light(body, 1600);
+        find_entering_light(body, 1600, |u| u);
+    }
+}
+
+/// From depths of all orders down to 1e-12 of its way inside.
+#[test]
+fn light_that_enters_is_found_just_below_the_boundary() {
+    for body in bodies() {
+        find_entering_light(body, 400, |u| (-u * 12.0 * std::f64::consts::LN_10).exp());
     }
 }
 
@@ -77,7 +85,7 @@ fn light_that_enters_is_found() {
 fn light_that_enters_is_found_a_million_times() {
     std::thread::scope(|scope| {
         for body in bodies() {
-            scope.spawn(|| find_entering_light(body, 1_000_000));
+            scope.spawn(|| find_entering_light(body, 1_000_000, |u| u));
         }
     });
 }
@@ -89,7 +97,8 @@ fn bodies() -> Vec<(&'static str, Shape)> {
     bodies
 }
 
-fn find_entering_light((name, shape): (&str, Shape), entries: usize) {
+/// `part` is the part of its way inside at which light is looked for, of a uniform number.
+fn find_entering_light((name, shape): (&str, Shape), entries: usize, part: impl Fn(f64) -> f64) {
     let mut stream = stream(&format!("light_that_enters_is_found, {name}"));
     let conic = Conic::new(&shape);
     let mut worst = 0.0f64;
@@ -99,7 +108,7 @@ fn find_entering_light((name, shape): (&str, Shape), entries: usize) {
             let w_l = direction(&mut stream);
             let Some((hit, dir, length)) = entering(&shape, w_l, eta, stream.draw2()) else { continue };
             tried += 1;
-            let distance = length * stream.draw();
+            let distance = length * part(stream.draw());
             let query = Query::new(hit.point - dir * distance, w_l, eta);
             let roots = all(&conic, &shape, &query, &mut SolverWork::default());
             let miss = roots.iter().map(|r| r.point.distance(hit.point)).fold(f64::INFINITY, f64::min);

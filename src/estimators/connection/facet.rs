@@ -41,6 +41,9 @@ const PARTS: u32 = 30;
 /// Barycentric coordinates at which a Newton iteration has gone astray.
 const FAR: f64 = 10.0;
 
+/// Height below a facet, in parts of its shorter edge, up to which its conic may not tell the root from x.
+const NEARLY_ON: f64 = 1e-4;
+
 /// Newton steps from the middle of a part.
 const ITERATIONS: u32 = 50;
 
@@ -61,7 +64,12 @@ pub(in crate::estimators) struct SolverWork {
 
 /// The point of a plane through `point` with this outward normal that refracts the light to x: closed.
 pub(super) fn plane_root(query: &Query, point: DVec3, normal: DVec3) -> Option<DVec3> {
-    let facet = query.facet_normal(normal);
+    shaded_plane_root(query, point, normal, normal)
+}
+
+/// That of a plane with one shading normal throughout.
+fn shaded_plane_root(query: &Query, point: DVec3, normal: DVec3, shading: DVec3) -> Option<DVec3> {
+    let facet = query.facet_normal(shading);
     let height = (point - query.x).dot(normal);
     let cl = query.w_l.dot(facet);
     let eta_ct2 = (query.eta * query.eta - 1.0) + cl * cl;
@@ -91,6 +99,7 @@ pub(super) fn roots(query: &Query, facet: &Facet, work: &mut SolverWork, found: 
     let mut places = FacetRoots { query, facet, work, found, seen: Vec::new() };
     let whole = Linear { p: facet.corner - query.x, e: facet.edges, n, m };
     places.search(&whole, [0.0; 2], [[1.0, 0.0], [0.0, 1.0]], CUTS);
+    places.search_above();
 }
 
 /// Positions, from x, and normals of a triangle or of a part of it.
@@ -274,6 +283,21 @@ impl<F: FnMut(Root)> FacetRoots<'_, F> {
             }
         }
         self.offer(place);
+    }
+
+    /// Just below the facet one root is close to x, and the conic does not resolve it. There the facet is
+    /// a plane with the shading normal above x, whose root starts Newton's steps.
+    fn search_above(&mut self) {
+        let Query { x, .. } = *self.query;
+        let Facet { corner, edges, normal, .. } = *self.facet;
+        let height = (corner - x).dot(normal);
+        if !(height > 0.0 && height < NEARLY_ON * edges[0].length().min(edges[1].length())) {
+            return;
+        }
+        let shading = self.facet.patch(self.facet.place(x)).shading;
+        if let Some(point) = shaded_plane_root(self.query, corner, normal, shading) {
+            self.offer(self.facet.place(point));
+        }
     }
 
     /// Offers a place where a root is to rounding.

@@ -171,9 +171,17 @@ impl Query {
         per_area * at.distance * at.distance / at.dir.dot(patch.normal)
     }
 
-    /// Whether a point is a root, `tolerance` being the residual that counts as 0.
+    /// Bound of the residual's rounding. That of the coordinates of x and of the point turns the direction
+    /// between them, the more the closer they are.
+    fn rounding(&self, patch: &SurfacePatch, at: &Constraint) -> f64 {
+        let largest = patch.point.abs().max(self.x.abs()).max_element();
+        8.0 * f64::EPSILON * self.eta * (1.0 + self.slopes.length()) * largest / at.distance
+    }
+
+    /// Whether a point is a root, `tolerance` being the residual that counts as 0 beyond its rounding.
     pub(super) fn judge(&self, patch: &SurfacePatch, tolerance: f64) -> Judgement {
         let at = self.constraint(patch);
+        let tolerance = tolerance + self.rounding(patch, &at);
         let facet = self.facet_normal(patch.shading);
         let cl = self.w_l.dot(facet);
         let is_transmitted = |n: DVec3| at.dir.dot(n) > 0.0 && self.w_l.dot(n) > 0.0;
