@@ -21,31 +21,43 @@ pub(crate) fn passes(job: &Passes, budget: &Budget, stop: &dyn Fn() -> bool) -> 
     match job.terms.budget.as_ref().unwrap_or(budget) {
         // A share of 1 leaves any number of passes as it is.
         Budget::Passes(passes) => Some(((*passes as f64 * job.terms.share).round() as u64).max(2)),
-        Budget::CpuSeconds(seconds) => for_seconds(job, seconds * job.terms.share, stop),
+        Budget::CpuSeconds(seconds) => {
+            let seconds = seconds * job.terms.share;
+            for_seconds(job, seconds, seconds / 20.0, stop)
+        }
         Budget::RelativeError(target) => for_error(job, target, stop),
     }
 }
 
+/// CPU seconds of the shortest pilot whose time is known well enough for an estimate.
+const SHORT: f64 = 0.02;
+
 /// Passes that a budget pays for and the CPU seconds they will take, from a short pilot; `None` where
 /// the pilot saw nothing to time.
 pub(crate) fn estimate_seconds(job: &Passes, budget: &Budget) -> Option<(u64, f64)> {
-    let passes = passes(job, budget, &|| false)?;
+    let never = || false;
+    if let (None, Budget::CpuSeconds(seconds)) = (job.count, job.terms.budget.as_ref().unwrap_or(budget))
+    {
+        let seconds = seconds * job.terms.share;
+        return Some((for_seconds(job, seconds, SHORT.min(seconds / 20.0), &never)?, seconds));
+    }
+    let passes = passes(job, budget, &never)?;
     let mut tried = 1;
     loop {
-        let cpu = job.run(Stage::Pilot, 0, tried, ALL, &|| false)?.cpu_seconds();
-        if cpu > 0.02 || tried >= passes {
+        let cpu = job.run(Stage::Pilot, 0, tried, ALL, &never)?.cpu_seconds();
+        if cpu > SHORT || tried >= passes {
             return Some((passes, cpu / tried as f64 * passes as f64));
         }
         tried *= 2;
     }
 }
 
-/// Doubles the pilot until it has used a twentieth of the budget, then divides.
-fn for_seconds(job: &Passes, seconds: f64, stop: &dyn Fn() -> bool) -> Option<u64> {
+/// Doubles the pilot until it has used these CPU seconds, then divides.
+fn for_seconds(job: &Passes, seconds: f64, pilot: f64, stop: &dyn Fn() -> bool) -> Option<u64> {
     let mut passes = 1;
     loop {
         let cpu = job.run(Stage::Pilot, 0, passes, ALL, stop)?.cpu_seconds();
-        if cpu > seconds / 20.0 || passes >= 1 << 20 {
+        if cpu > pilot || passes >= 1 << 20 {
             return Some(((seconds * passes as f64 / cpu) as u64).max(2));
         }
         passes *= 2;
