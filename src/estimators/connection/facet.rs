@@ -41,6 +41,15 @@ const PARTS: u32 = 30;
 /// Barycentric coordinates at which a Newton iteration has gone astray.
 const FAR: f64 = 10.0;
 
+/// Part of a normal's length by which normals may differ from an affine image of the points: rounding.
+const AFFINE: f64 = 1e-12;
+
+/// Sine up to which two directions are too close to span a plane.
+const NEAR_AXIS: f64 = 1e-6;
+
+/// Barycentric coordinate beyond an edge up to which candidates are looked for.
+const MARGIN: f64 = 1e-6;
+
 /// Height below a facet, in parts of its shorter edge, up to which its conic may not tell the root from x.
 const NEARLY_ON: f64 = 1e-4;
 
@@ -227,7 +236,9 @@ impl<F: FnMut(Root)> FacetRoots<'_, F> {
         let noise = ROUNDING * (size2(&q) + eta * eta * most * most);
         let mut candidates = Vec::new();
         if polynomial::roots(&f, noise, &conditions, &mut |t| candidates.push(t)).is_err() {
-            self.subdivide(at, sides, PARTS);
+            if !self.solve_line(part, at, sides) {
+                self.subdivide(at, sides, PARTS);
+            }
             return;
         }
         for t in candidates {
@@ -243,6 +254,74 @@ impl<F: FnMut(Root)> FacetRoots<'_, F> {
                 self.offer(place);
             }
         }
+    }
+
+    /// Roots on a part whose normals are an affine image of its points, N = N_0 + a P, as on the mesh of a
+    /// sphere; false where they are not, or where x is close to the axis of symmetry. There
+    ///   (1 - a k) P = k N_0 + s w_L:
+    /// the conic is the line of the triangle in the plane of N_0 and w_L, and k = 1 / a a multiple root of
+    /// the polynomial in k, which is no point. On the line P = m N_0 + q w_L with m and q linear, k = m /
+    /// (1 + a m) and s = q / (1 + a m), so that |P| = eta s becomes
+    ///   |P|^2 (1 + a m)^2 - eta^2 q^2 = 0,
+    /// of degree 4 along the line.
+    fn solve_line(&mut self, part: &Linear, at: [f64; 2], sides: [[f64; 2]; 2]) -> bool {
+        let Query { w_l, eta, .. } = *self.query;
+        let Linear { p, e, n, m } = *part;
+        let a = (m[0].dot(e[0]) + m[1].dot(e[1])) / (e[0].length_squared() + e[1].length_squared());
+        let is_affine = (0..2).all(|i| (m[i] - e[i] * a).length() <= AFFINE * n.length());
+        let origin = n - p * a;
+        let across = origin.cross(w_l);
+        // The line, across . P = 0, in barycentric coordinates.
+        let [height, by_u, by_v] = [p, e[0], e[1]].map(|v| v.dot(across));
+        let steepness = by_u.hypot(by_v);
+        let size = e[0].length().max(e[1].length());
+        let is_off_axis = across.length() > NEAR_AXIS * n.length();
+        if !is_affine || !is_off_axis || steepness <= NEAR_AXIS * across.length() * size {
+            return false;
+        }
+        let beside = (height + (by_u + by_v) / 3.0) / (steepness * steepness);
+        let middle = [1.0 / 3.0 - beside * by_u, 1.0 / 3.0 - beside * by_v];
+        let along = [-by_v / steepness, by_u / steepness];
+        let weights = [
+            [middle[0], along[0]],
+            [middle[1], along[1]],
+            [1.0 - middle[0] - middle[1], -along[0] - along[1]],
+        ];
+        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+        for [weight, slope] in weights {
+            let end = -(weight + MARGIN) / slope;
+            if slope > 0.0 {
+                from = from.max(end);
+            } else if slope < 0.0 {
+                to = to.min(end);
+            } else if weight < -MARGIN {
+                return true;
+            }
+        }
+        if from >= to {
+            return true;
+        }
+        let places = [from, to].map(|t| [0, 1].map(|i| middle[i] + along[i] * t));
+        let points = places.map(|[u, v]| p + e[0] * u + e[1] * v);
+        let square = |[x, y]: [f64; 2]| [x * x, x * y, y * y];
+        let scale = across.length_squared();
+        let stretch = square(points.map(|p| 1.0 + a * p.cross(w_l).dot(across) / scale));
+        let light = square(points.map(|p| origin.cross(p).dot(across) / scale));
+        let distance = [(0, 0), (0, 1), (1, 1)].map(|(i, j)| points[i].dot(points[j]));
+        let mut f: BernsteinForm = [0.0; polynomial::DEGREE + 1];
+        polynomial::add_product(&mut f, 1.0, &distance, &stretch);
+        polynomial::add_product(&mut f, -eta * eta, &light, &[1.0]);
+        let most = |c: [f64; 3]| c[0].max(c[2]);
+        let noise = ROUNDING * (most(distance) * most(stretch) + eta * eta * most(light));
+        let mut candidates = Vec::new();
+        if polynomial::roots(&f, noise, &[], &mut |t| candidates.push(t)).is_err() {
+            return false;
+        }
+        for t in candidates {
+            let place = [0, 1].map(|i| places[0][i] + (places[1][i] - places[0][i]) * t);
+            self.offer([0, 1].map(|i| at[i] + sides[0][i] * place[0] + sides[1][i] * place[1]));
+        }
+        true
     }
 
     /// Searches a part on which the conic degenerates (points near an axis of symmetry of the normals)
