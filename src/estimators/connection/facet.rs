@@ -273,7 +273,7 @@ impl<F: FnMut(Root)> FacetRoots<'_, F> {
         let across = origin.cross(w_l);
         // The line, across . P = 0, in barycentric coordinates.
         let [height, by_u, by_v] = [p, e[0], e[1]].map(|v| v.dot(across));
-        let steepness = by_u.hypot(by_v);
+        let steepness = (by_u * by_u + by_v * by_v).sqrt();
         let size = e[0].length().max(e[1].length());
         let is_off_axis = across.length() > NEAR_AXIS * n.length();
         if !is_affine || !is_off_axis || steepness <= NEAR_AXIS * across.length() * size {
