@@ -15,6 +15,11 @@ pub(crate) const LEAST_PASSES: u64 = 128;
 
 /// The passes that a budget pays for; `None` where `stop` was raised.
 pub(crate) fn passes(job: &Passes, budget: &Budget, stop: &dyn Fn() -> bool) -> Option<u64> {
+    passes_by_pilot(job, budget, f64::INFINITY, stop)
+}
+
+/// [`passes`], with a pilot of about `longest` CPU seconds at most where the budget is in seconds.
+fn passes_by_pilot(job: &Passes, budget: &Budget, longest: f64, stop: &dyn Fn() -> bool) -> Option<u64> {
     if job.count.is_some() {
         return job.count;
     }
@@ -23,28 +28,22 @@ pub(crate) fn passes(job: &Passes, budget: &Budget, stop: &dyn Fn() -> bool) -> 
         Budget::Passes(passes) => Some(((*passes as f64 * job.terms.share).round() as u64).max(2)),
         Budget::CpuSeconds(seconds) => {
             let seconds = seconds * job.terms.share;
-            for_seconds(job, seconds, seconds / 20.0, stop)
+            for_seconds(job, seconds, (seconds / 20.0).min(longest), stop)
         }
         Budget::RelativeError(target) => for_error(job, target, stop),
     }
 }
 
-/// CPU seconds of the shortest pilot whose time is known well enough for an estimate.
+/// CPU seconds of a pilot that is long enough for an estimate.
 const SHORT: f64 = 0.02;
 
 /// Passes that a budget pays for and the CPU seconds they will take, from a short pilot; `None` where
 /// the pilot saw nothing to time.
 pub(crate) fn estimate_seconds(job: &Passes, budget: &Budget) -> Option<(u64, f64)> {
-    let never = || false;
-    if let (None, Budget::CpuSeconds(seconds)) = (job.count, job.terms.budget.as_ref().unwrap_or(budget))
-    {
-        let seconds = seconds * job.terms.share;
-        return Some((for_seconds(job, seconds, SHORT.min(seconds / 20.0), &never)?, seconds));
-    }
-    let passes = passes(job, budget, &never)?;
+    let passes = passes_by_pilot(job, budget, SHORT, &|| false)?;
     let mut tried = 1;
     loop {
-        let cpu = job.run(Stage::Pilot, 0, tried, ALL, &never)?.cpu_seconds();
+        let cpu = job.run(Stage::Pilot, 0, tried, ALL, &|| false)?.cpu_seconds();
         if cpu > SHORT || tried >= passes {
             return Some((passes, cpu / tried as f64 * passes as f64));
         }

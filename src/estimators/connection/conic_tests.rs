@@ -113,7 +113,10 @@ fn find_entering_light((name, shape): (&str, Shape), entries: usize, part: impl 
             let roots = all(&conic, &shape, &query, &mut SolverWork::default());
             let miss = roots.iter().map(|r| r.point.distance(hit.point)).fold(f64::INFINITY, f64::min);
             let count = roots.len();
-            assert!(miss < 1e-7, "{name} {eta} {query:?} {hit:?}: nearest of {count} at {miss:e}");
+            assert!(
+                miss < distance.min(1e-7),
+                "{name} {eta} {query:?} {hit:?}: nearest of {count} at {miss:e}"
+            );
             worst = worst.max(miss);
             for root in roots {
                 assert!(root.ratio > 0.0 && !root.ratio.is_nan() && root.distance > 0.0);

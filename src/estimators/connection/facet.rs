@@ -16,6 +16,8 @@
 //! (`polynomial`), so none is lost, and intervals whose u, v, 1 - u - v cannot all be positive are
 //! dropped at once. A Newton step on the triangle removes the rounding error of the polynomial.
 //!
+//! Where the normals are an affine image of the points the conic is a line (`solve_line`).
+//!
 //! With one normal for the whole facet the root has a closed form: cl is known, hence ct, w and p.
 
 use super::bounds::Bounds;
@@ -151,6 +153,9 @@ struct FacetRoots<'a, F> {
 impl<F: FnMut(Root)> FacetRoots<'_, F> {
     /// Searches a part of the facet, whose corner and sides have the coordinates `at` and `sides`.
     fn search(&mut self, part: &Linear, at: [f64; 2], sides: [[f64; 2]; 2], cuts: u32) {
+        if self.solve_line(part, at, sides) {
+            return;
+        }
         let Query { w_l, eta, .. } = *self.query;
         let normals = Linear::corners(part.n, part.m);
         let heights = normals.map(|n| n.dot(w_l));
@@ -236,9 +241,7 @@ impl<F: FnMut(Root)> FacetRoots<'_, F> {
         let noise = ROUNDING * (size2(&q) + eta * eta * most * most);
         let mut candidates = Vec::new();
         if polynomial::roots(&f, noise, &conditions, &mut |t| candidates.push(t)).is_err() {
-            if !self.solve_line(part, at, sides) {
-                self.subdivide(at, sides, PARTS);
-            }
+            self.subdivide(at, sides, PARTS);
             return;
         }
         for t in candidates {
@@ -260,49 +263,31 @@ impl<F: FnMut(Root)> FacetRoots<'_, F> {
     /// sphere; false where they are not, or where x is close to the axis of symmetry. There
     ///   (1 - a k) P = k N_0 + s w_L:
     /// the conic is the line of the triangle in the plane of N_0 and w_L, and k = 1 / a a multiple root of
-    /// the polynomial in k, which is no point. On the line P = m N_0 + q w_L with m and q linear, k = m /
-    /// (1 + a m) and s = q / (1 + a m), so that |P| = eta s becomes
-    ///   |P|^2 (1 + a m)^2 - eta^2 q^2 = 0,
+    /// the polynomial in k, which is no point. On the line P = mu N_0 + q w_L with mu and q linear, k = mu /
+    /// (1 + a mu) and s = q / (1 + a mu), so that |P| = eta s becomes
+    ///   |P|^2 (1 + a mu)^2 - eta^2 q^2 = 0,
     /// of degree 4 along the line.
     fn solve_line(&mut self, part: &Linear, at: [f64; 2], sides: [[f64; 2]; 2]) -> bool {
         let Query { w_l, eta, .. } = *self.query;
         let Linear { p, e, n, m } = *part;
         let a = (m[0].dot(e[0]) + m[1].dot(e[1])) / (e[0].length_squared() + e[1].length_squared());
-        let is_affine = (0..2).all(|i| (m[i] - e[i] * a).length() <= AFFINE * n.length());
+        if (0..2).any(|i| (m[i] - e[i] * a).length() > AFFINE * n.length()) {
+            return false;
+        }
         let origin = n - p * a;
         let across = origin.cross(w_l);
-        // The line, across . P = 0, in barycentric coordinates.
+        // across . P at the corner and its change along u and v; the line is where it is 0.
         let [height, by_u, by_v] = [p, e[0], e[1]].map(|v| v.dot(across));
         let steepness = (by_u * by_u + by_v * by_v).sqrt();
         let size = e[0].length().max(e[1].length());
-        let is_off_axis = across.length() > NEAR_AXIS * n.length();
-        if !is_affine || !is_off_axis || steepness <= NEAR_AXIS * across.length() * size {
+        let is_on_axis = across.length() <= NEAR_AXIS * n.length();
+        if is_on_axis || steepness <= NEAR_AXIS * across.length() * size {
             return false;
         }
         let beside = (height + (by_u + by_v) / 3.0) / (steepness * steepness);
         let middle = [1.0 / 3.0 - beside * by_u, 1.0 / 3.0 - beside * by_v];
-        let along = [-by_v / steepness, by_u / steepness];
-        let weights = [
-            [middle[0], along[0]],
-            [middle[1], along[1]],
-            [1.0 - middle[0] - middle[1], -along[0] - along[1]],
-        ];
-        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
-        for [weight, slope] in weights {
-            let end = -(weight + MARGIN) / slope;
-            if slope > 0.0 {
-                from = from.max(end);
-            } else if slope < 0.0 {
-                to = to.min(end);
-            } else if weight < -MARGIN {
-                return true;
-            }
-        }
-        if from >= to {
-            return true;
-        }
-        let places = [from, to].map(|t| [0, 1].map(|i| middle[i] + along[i] * t));
-        let points = places.map(|[u, v]| p + e[0] * u + e[1] * v);
+        let Some(ends) = clipped(middle, [-by_v / steepness, by_u / steepness]) else { return true };
+        let points = ends.map(|[u, v]| p + e[0] * u + e[1] * v);
         let square = |[x, y]: [f64; 2]| [x * x, x * y, y * y];
         let scale = across.length_squared();
         let stretch = square(points.map(|p| 1.0 + a * p.cross(w_l).dot(across) / scale));
@@ -318,8 +303,8 @@ impl<F: FnMut(Root)> FacetRoots<'_, F> {
             return false;
         }
         for t in candidates {
-            let place = [0, 1].map(|i| places[0][i] + (places[1][i] - places[0][i]) * t);
-            self.offer([0, 1].map(|i| at[i] + sides[0][i] * place[0] + sides[1][i] * place[1]));
+            let [u, v] = [0, 1].map(|i| ends[0][i] + (ends[1][i] - ends[0][i]) * t);
+            self.offer([0, 1].map(|i| at[i] + sides[0][i] * u + sides[1][i] * v));
         }
         true
     }
@@ -398,6 +383,27 @@ impl<F: FnMut(Root)> FacetRoots<'_, F> {
             Judgement::None => {}
         }
     }
+}
+
+/// Ends, in barycentric coordinates, of the part of a line in a triangle, [`MARGIN`] beyond its edges.
+fn clipped(middle: [f64; 2], along: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+    let weights = [
+        [middle[0], along[0]],
+        [middle[1], along[1]],
+        [1.0 - middle[0] - middle[1], -along[0] - along[1]],
+    ];
+    let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+    for [weight, slope] in weights {
+        let end = -(weight + MARGIN) / slope;
+        if slope > 0.0 {
+            from = from.max(end);
+        } else if slope < 0.0 {
+            to = to.min(end);
+        } else if weight < -MARGIN {
+            return None;
+        }
+    }
+    (from < to).then(|| [from, to].map(|t| [0, 1].map(|i| middle[i] + along[i] * t)))
 }
 
 /// Newton's steps from a place close to a root, as long as they are small and make the residual smaller.
