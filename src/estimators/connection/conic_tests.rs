@@ -81,7 +81,7 @@ fn light_that_enters_is_found_just_below_the_boundary() {
 }
 
 #[test]
-#[ignore = "11 minutes"]
+#[ignore = "5 minutes"]
 fn light_that_enters_is_found_a_million_times() {
     std::thread::scope(|scope| {
         for body in bodies() {
