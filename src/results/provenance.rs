@@ -1,8 +1,6 @@
 //! Build and machine of a run.
 
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::process::Command;
 use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -32,9 +30,9 @@ pub struct Provenance {
     pub fingerprint: String,
     /// blake3 of the program itself, hex: the states of another build are not resumed.
     pub build: String,
-    /// Commit of the source tree the program was built from, as it was when it ran.
+    /// Commit that the program was built from, where git or `SCATTERPROOF_COMMIT` told the build.
     pub commit: Option<String>,
-    /// True where that tree had uncommitted changes.
+    /// True where its sources had uncommitted changes when it was built.
     pub dirty: Option<bool>,
     /// Versions of the crates that matter, from the lock file compiled in.
     pub crates: BTreeMap<String, String>,
@@ -57,13 +55,12 @@ pub struct Provenance {
 impl Provenance {
     /// Of this process, now.
     pub fn collect(threads: usize) -> Provenance {
-        let (commit, dirty) = checkout(Path::new(env!("CARGO_MANIFEST_DIR")));
         Provenance {
             version: env!("CARGO_PKG_VERSION").into(),
             fingerprint: fingerprint(),
             build: build().into(),
-            commit,
-            dirty,
+            commit: option_env!("SCATTERPROOF_COMMIT").map(String::from),
+            dirty: option_env!("SCATTERPROOF_DIRTY").map(|dirty| dirty == "true"),
             crates: NOTED_CRATES
                 .iter()
                 .map(|name| (name.to_string(), locked_version(name).into()))
@@ -89,11 +86,10 @@ pub fn build() -> &'static str {
     })
 }
 
-/// Today's date, UTC, and the commit of the checkout that this program was built from, as
-/// `2026-11-21 cf14d94`.
+/// Today's date, UTC, and the commit that this program was built from, as `2026-11-21 cf14d94`.
 pub fn today_and_commit() -> String {
-    let (commit, _) = checkout(Path::new(env!("CARGO_MANIFEST_DIR")));
-    let commit = commit.map_or("unknown".to_string(), |c| c.chars().take(12).collect());
+    let commit = option_env!("SCATTERPROOF_COMMIT").unwrap_or("unknown");
+    let commit: String = commit.chars().take(12).collect();
     format!("{} {commit}", &now()[..10])
 }
 
@@ -121,19 +117,6 @@ fn locked_version(name: &str) -> &'static str {
 fn features() -> Vec<&'static str> {
     let all = [("fma", cfg!(target_feature = "fma")), ("avx2", cfg!(target_feature = "avx2"))];
     all.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect()
-}
-
-/// Commit and dirtiness of the checkout at `folder`; nothing where it is none or git is not there.
-fn checkout(folder: &Path) -> (Option<String>, Option<bool>) {
-    let git = |arguments: &[&str]| {
-        let output = Command::new("git").arg("-C").arg(folder).args(arguments).output().ok()?;
-        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_string())
-    };
-    let commit = git(&["rev-parse", "HEAD"]);
-    // The output of runs does not change the program.
-    let changes = ["status", "--porcelain", "--untracked-files=no", "--", ".", ":(exclude)results"];
-    let status = commit.as_ref().and_then(|_| git(&changes));
-    (commit, status.map(|s| !s.is_empty()))
 }
 
 fn cpu_model() -> Option<String> {
@@ -201,6 +184,5 @@ mod tests {
         let text = serde_json::to_string(&here).expect("JSON");
         assert_eq!(serde_json::from_str::<Provenance>(&text).expect("a provenance"), here);
         assert!(!here.crates.values().any(|v| v == "absent"), "{:?}", here.crates);
-        assert_eq!(checkout(Path::new("/")), (None, None));
     }
 }
