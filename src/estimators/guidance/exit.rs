@@ -6,14 +6,15 @@
 //! causes most of the variance that remains with a guide. So near the boundary some guided steps are escapes ([`Escape`]). With
 //!   x = s / phi - 1   at the boundary,   P = (1 - cos_c) / 2   (the cone's share of all directions),
 //! the importance of an escape exceeds the part of it that phi contains by P x e^{-tau / mu}, where tau is the depth in mean
-//! free paths and mu is near 0.85. Half of this gives the share y / (1 + y) of escapes, y = P x / 2, since the guide also
-//! samples directions in the cone. Under forward scattering, where most escapes turn too far, y has the factor 1 - g. The half
+//! free paths and mu is near 0.85. 0.6 of this gives the share y / (1 + y) of escapes, y = 0.6 P x, since the guide also
+//! samples directions in the cone. Under forward scattering, where most escapes turn too far, y has the factor 1 - g. The 0.6
 //! is an empirical choice: results are unbiased for any probability of escapes, and with larger ones weights grow from step to
 //! step. e^{-tau / mu} is approximated by the square of a square, which has a finite range.
 //!
-//! A walk that meets the boundary from inside chooses between refraction and reflection with the same numbers: refracted light
-//! finds s, reflected light about phi, so that the lobe of refraction counts s / phi = 1 + x times its weight.
+//! A walk that meets the boundary from inside chooses between refraction and reflection with the same numbers: the lobe of
+//! refraction counts as much more as refracted light finds ([`BoundaryMoments::gain_of_leaving`]).
 
+use super::diffusion::{BoundaryMoments, Diffusion};
 use crate::math::{DVec3, Vec3, renormalized};
 use crate::optics::boundary::Boundary;
 use crate::optics::guided::Escape;
@@ -22,7 +23,7 @@ use crate::scene::Scene;
 /// Depth from which on there are no escapes, mean free paths.
 pub(super) const REACH: f64 = 4.0;
 
-/// The largest gain of leaving. For common indices 1 + 2 A D kappa is below 10; but a cell that barely touches the body may have
+/// The largest gain of leaving. For common indices s / phi, 1 + 2 A D kappa in a half-space, is below 10; but a cell that barely touches the body may have
 /// next to no phi, and a reflected path would take the gain as a weight.
 const MOST_GAIN: f64 = 16.0;
 
@@ -50,18 +51,19 @@ pub(super) struct ExitRule {
     sigma_t: f64,
     /// y / x.
     per_gain: f64,
+    moments: BoundaryMoments,
 }
 
 impl ExitRule {
-    pub(super) fn of(scene: &Scene, band: usize) -> ExitRule {
+    pub(super) fn of(scene: &Scene, band: usize, diffusion: &Diffusion) -> ExitRule {
         let eta = match scene.boundary[band] {
             Boundary::Matched => 1.0,
             boundary => boundary.eta(),
         };
         let least_cosine = (1.0 - 1.0 / (eta * eta)).max(0.0).sqrt();
         let medium = &scene.medium[band];
-        let per_gain = 0.25 * (1.0 - least_cosine) * (1.0 - medium.phase.g.abs());
-        ExitRule { least_cosine, sigma_t: medium.sigma_t, per_gain }
+        let per_gain = 0.3 * (1.0 - least_cosine) * (1.0 - medium.phase.g.abs());
+        ExitRule { least_cosine, sigma_t: medium.sigma_t, per_gain, moments: diffusion.boundary }
     }
 
     /// At a plane through `at`, where phi is `phi` and light that leaves finds `found`; `None` where that is no gain.
@@ -74,11 +76,12 @@ impl ExitRule {
         })
     }
 
-    /// `found / phi` of [`Self::exit`], at most [`MOST_GAIN`].
+    /// What light that leaves at an exit finds over what reflected light finds, at most [`MOST_GAIN`].
     #[inline]
     pub(super) fn gain(&self, exit: &ExitPlane) -> f64 {
         let chance = f64::from(exit.chance);
-        (1.0 + chance / (1.0 - chance) / self.per_gain).min(MOST_GAIN)
+        let found = 1.0 + chance / (1.0 - chance) / self.per_gain;
+        self.moments.gain_of_leaving(found).min(MOST_GAIN)
     }
 
     /// From a point inside.

@@ -1,49 +1,27 @@
 //! Importance inside a body: the amount of light that a photon that scatters at x will find, up to a factor.
 //!
 //! In the diffusion approximation, with the exact asymptotic growth kappa of transport in its place:
-//!   lap(phi) = kappa^2 phi   inside,      phi + 2 A D dphi/dn = s(y)   on the boundary,
-//! where s(y) is the light that enters at y (`incidence`), A the mismatch of internal reflection, and D = 1 / (3 sigma_t'). A
+//!   lap(phi) = kappa^2 phi   inside,      phi + 2 A D dphi/dn = k s(y)   on the boundary,
+//! where s(y) is the light that enters at y (`incidence`), and A, D and k are those of [`super::diffusion`]. A
 //! half-space and a slab have closed forms. Elsewhere phi is solved by finite volumes on cubic cells whose centres lie in the
 //! body. A face between two cells carries (phi' - phi) h; one that the boundary cuts, in the direction e, carries
-//!   w h^2 (s - phi) / (2 A D + d),   w = |n.e|,   d = w t,
+//!   w h^2 (k s - phi) / (2 A D + d),   w = |n.e|,   d = w t,
 //! t being the distance from the centre to the boundary along e, n the normal there: of a plane the faces of the
 //! staircase, weighted by w, have the area of the plane. h^2 kappa^2 is written 2 (cosh(kappa h) - 1), with which a plane
 //! wave along an axis grows by e^{kappa h} from node to node, however coarse the grid is.
 //!
-//! Walks use the gradient of ln phi over sigma_t in their present cell; cells just outside the body have the mean of their
-//! neighbours. Where there is no cell (in parts thinner than one) or phi has underflowed, there is no gradient, and the walk is
-//! plain. The solution need not be exact, because it only guides.
+//! Walks use the gradient of ln phi over sigma_t in their present cell, reduced where phi is no exponential
+//! ([`growth_of_flights`]); cells just outside the body have the mean of their neighbours. Where there is no cell (in parts
+//! thinner than one) or phi has underflowed, there is no gradient, and the walk is plain. The solution need not be exact, because it only guides.
 
+use super::diffusion::{Diffusion, growth_of_flights};
 use super::exit::{ExitPlane, ExitRule, REACH, unit};
 use super::incidence::{LetIn, TransmittedLight};
 use crate::geometry::{self, Ray, Shape, Side};
 use crate::math::{DVec3, Vec3, cos, exp, ln, ln_1p};
-use crate::optics::boundary::Boundary;
-use crate::optics::bssrdf::FresnelMoments;
-use crate::optics::guided::{Escape, Pull, StepGuide, diffuse_growth};
+use crate::optics::guided::{Escape, Pull, StepGuide};
 use crate::optics::medium::Medium;
 use crate::scene::Scene;
-
-/// What diffusion says of a medium behind its boundary.
-#[derive(Clone, Copy, Debug)]
-struct Diffusion {
-    /// Growth, 1/mm.
-    kappa: f64,
-    /// 2 A D, mm.
-    reach: f64,
-}
-
-impl Diffusion {
-    fn of(scene: &Scene, band: usize) -> Diffusion {
-        let Medium { sigma_t, albedo, phase, .. } = scene.medium[band];
-        let mismatch = match scene.boundary[band] {
-            Boundary::Matched => 1.0,
-            boundary => FresnelMoments::exact(boundary.eta()).mismatch(),
-        };
-        let diffusion = 1.0 / (3.0 * sigma_t * (1.0 - albedo * phase.g));
-        Diffusion { kappa: diffuse_growth(albedo, phase.g) * sigma_t, reach: 2.0 * mismatch * diffusion }
-    }
-}
 
 /// Importance in a body, one band.
 #[derive(Clone, Debug)]
@@ -121,12 +99,12 @@ impl Importance {
                     return vec![None; scene.bands()];
                 };
                 let half_space = |band: usize| {
-                    let growth = diffuse_growth(scene.medium[band].albedo, scene.medium[band].phase.g);
-                    let (kappa, pull) =
-                        (growth * scene.medium[band].sigma_t, Pull::new(DVec3::Z * growth));
+                    let diffusion = Diffusion::of(scene, band);
+                    let Diffusion { kappa, reach, boundary } = diffusion;
+                    let pull = Pull::new(DVec3::Z * (kappa / scene.medium[band].sigma_t));
                     let LetIn { all, wide } = let_in[band];
-                    let phi = all / (1.0 + Diffusion::of(scene, band).reach * kappa);
-                    let rule = ExitRule::of(scene, band);
+                    let phi = boundary.kept * all / (1.0 + reach * kappa);
+                    let rule = ExitRule::of(scene, band, &diffusion);
                     let exit = rule.exit(DVec3::ZERO, DVec3::Z, wide, phi);
                     Importance::HalfSpace { kappa, pull, rule, exit }
                 };
@@ -162,7 +140,8 @@ impl Importance {
                     let sigma_t = scene.medium[band].sigma_t;
                     let diffusion = Diffusion::of(scene, band);
                     let solved = cells.solve(&borders, band, diffusion)?;
-                    let mut grid = cells.grid(&solved, 1.0 / sigma_t, ExitRule::of(scene, band));
+                    let rule = ExitRule::of(scene, band, &diffusion);
+                    let mut grid = cells.grid(&solved, 1.0 / sigma_t, diffusion, rule);
                     cells.place_exits(&mut grid, &solved, &shores, band, diffusion);
                     Some(Importance::Grid(grid))
                 };
@@ -173,18 +152,19 @@ impl Importance {
 
     /// What is let in: above, below.
     fn slab(scene: &Scene, band: usize, thickness: f64, let_in: [LetIn; 2]) -> Option<Importance> {
-        let [top, bottom] = let_in.map(|let_in| let_in.all);
+        let diffusion = Diffusion::of(scene, band);
+        let Diffusion { kappa, reach, boundary } = diffusion;
+        let [top, bottom] = let_in.map(|let_in| boundary.kept * let_in.all);
         if top + bottom <= 0.0 {
             return None;
         }
-        let Diffusion { kappa, reach } = Diffusion::of(scene, band);
         // Without absorption phi is linear, which a slow growth is, too.
         let kappa = kappa.max(1e-3 / thickness);
         let (p, m, e) = (1.0 + reach * kappa, 1.0 - reach * kappa, exp(-kappa * thickness));
         let det = p * p - e * e * m * m;
         let (a, b) = ((top * p - bottom * e * m) / det, (bottom * p - top * e * m) / det);
         let mean_free_path = 1.0 / scene.medium[band].sigma_t;
-        let rule = ExitRule::of(scene, band);
+        let rule = ExitRule::of(scene, band, &diffusion);
         let exits = [
             rule.exit(DVec3::ZERO, DVec3::Z, let_in[0].wide, a + b * e),
             rule.exit(-DVec3::Z * thickness, -DVec3::Z, let_in[1].wide, a * e + b),
@@ -207,7 +187,9 @@ impl Importance {
                 let up = a * exp(kappa * x.z);
                 let down = b * exp(-kappa * (x.z + thickness));
                 let phi = up + down;
-                let growth = kappa * mean_free_path * (up - down) / phi;
+                let asymptotic = kappa * mean_free_path;
+                let gradient = asymptotic * (up - down) / phi;
+                let growth = growth_of_flights(asymptotic, gradient.abs()).copysign(gradient);
                 if phi <= 0.0 || !growth.is_finite() {
                     *guide = StepGuide::NONE;
                     return 0.0;
@@ -442,8 +424,8 @@ impl Cells {
         for (number, shore) in shores.iter().enumerate() {
             let Some(Shore { at, normal, distance, let_in }) = shore else { continue };
             let LetIn { all, wide } = let_in[band];
-            let phi =
-                (all * distance + solved.phi[number] * diffusion.reach) / (distance + diffusion.reach);
+            let Diffusion { reach, boundary, .. } = diffusion;
+            let phi = (boundary.kept * all * distance + solved.phi[number] * reach) / (distance + reach);
             known[self.inside[number]] = grid.rule.exit(*at, *normal, wide, phi);
         }
         for index in 0..self.numbers.len() {
@@ -484,7 +466,7 @@ impl Cells {
                 if let Some(Border { lean, distance, let_in }) = border {
                     let conductance = lean * h / (diffusion.reach + lean * distance);
                     diagonal[number] += conductance;
-                    source[number] += conductance * let_in[band].all;
+                    source[number] += conductance * diffusion.boundary.kept * let_in[band].all;
                 }
             }
         }
@@ -498,7 +480,7 @@ impl Cells {
             [0, 1, 2, 3, 4, 5].map(|face: usize| {
                 borders[face].as_ref().map(|Border { lean, distance, let_in }| {
                     let share = lean * distance / (diffusion.reach + lean * distance);
-                    (phi + share * (let_in[band].all - phi), *distance)
+                    (phi + share * (diffusion.boundary.kept * let_in[band].all - phi), *distance)
                 })
             })
         };
@@ -507,7 +489,13 @@ impl Cells {
     }
 
     /// Growth at the nodes inside, and at those next to them.
-    fn grid(&self, solved: &Solved, mean_free_path: f64, rule: ExitRule) -> ImportanceGrid {
+    fn grid(
+        &self,
+        solved: &Solved,
+        mean_free_path: f64,
+        diffusion: Diffusion,
+        rule: ExitRule,
+    ) -> ImportanceGrid {
         let largest = solved.phi.iter().copied().fold(0.0, f64::max);
         let least = largest * (f64::from(f32::MIN_POSITIVE) / LARGEST);
         let mut known: Vec<Option<(DVec3, f64)>> = vec![None; self.numbers.len()];
@@ -529,7 +517,9 @@ impl Cells {
                 let [(down, d), (up, u)] = [towards(2 * axis), towards(2 * axis + 1)];
                 if d + u > 0.0 { (up - down) / (d + u) * mean_free_path } else { 0.0 }
             });
-            known[index] = Some((DVec3::from_array(gradient), phi));
+            let gradient = DVec3::from_array(gradient);
+            let growth = growth_of_flights(diffusion.kappa * mean_free_path, gradient.length());
+            known[index] = Some((gradient.normalize_or_zero() * growth, phi));
         }
         let node = |index: usize| {
             let of_neighbours = || {

@@ -12,6 +12,7 @@
 //! walks of a warm-up -> LearnedPulls ----^
 //! ```
 
+mod diffusion;
 mod exit;
 mod importance;
 mod incidence;
