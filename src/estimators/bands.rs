@@ -51,11 +51,11 @@ pub(super) trait WalkBands: Clone {
     /// A change of direction at a medium vertex.
     fn turn(&mut self, media: &[Medium], at: DVec3, from: DVec3, to: DVec3);
 
-    /// Whether the boundary is worth more than one sample: both what it reflects and what it refracts are followed where the
-    /// path first meets it, and one direction is chosen out of several facets.
+    /// The number of facets out of which a direction at the boundary is chosen, where it is worth more than one sample; both
+    /// what it reflects and what it refracts are then followed where the path first meets it.
     #[inline]
-    fn refines_boundary(&self) -> bool {
-        false
+    fn facets(&self) -> Option<usize> {
+        None
     }
 
     /// What light finds that leaves the body at a boundary point, over what it finds that is reflected back inside; 1 where a

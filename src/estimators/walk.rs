@@ -278,8 +278,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
 
     /// Runs from a first hit until the path ends.
     fn run(mut self, hit: Hit) -> u64 {
-        if self.bands.refines_boundary() && !self.matched() {
-            self.follow_both(&hit);
+        if let Some(facets) = self.bands.facets().filter(|_| !self.matched()) {
+            self.follow_both(&hit, facets);
         } else if let Some(side) = self.cross(&hit, Side::Outside) {
             self.follow(hit, side);
         }
@@ -302,9 +302,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Follows the reflected ray of a first hit, then the refracted one, each with its share of the weight. Reflection
     /// usually takes one ray, a walk inside takes many. Choosing one of the two at random would cause more variance than
     /// guided walks do.
-    fn follow_both(&mut self, hit: &Hit) {
+    fn follow_both(&mut self, hit: &Hit, facets: usize) {
         let Some((frame, wo)) = self.meet(hit, Side::Outside) else { return };
-        let [reflection, refraction] = self.boundary.sample_both(wo, self.stream.draw3());
+        let [reflection, refraction] = self.boundary.sample_both(wo, self.stream.draw3(), facets);
         if let Some(sample) = reflection {
             let (ray, from, exit) = (self.ray, self.from, self.exit);
             let (throughput, survival) = (self.throughput, self.survival);
@@ -485,9 +485,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         }
         let (frame, wo) = self.meet(hit, side)?;
         let u = self.stream.draw3();
-        let sample = if self.bands.refines_boundary() {
+        let sample = if let Some(facets) = self.bands.facets() {
             let gain = if side == Side::Inside { self.bands.gain_of_leaving(hit.point) } else { 1.0 };
-            self.boundary.sample_of_several(wo, u, gain)?
+            self.boundary.sample_of_several(wo, u, gain, facets)?
         } else {
             self.boundary.sample(wo, u)?
         };

@@ -188,8 +188,8 @@ impl WalkBands for Lesson<'_> {
         self.walk.turn(media, at, from, to);
     }
 
-    fn refines_boundary(&self) -> bool {
-        self.walk.refines_boundary()
+    fn facets(&self) -> Option<usize> {
+        self.walk.facets()
     }
 
     fn gain_of_leaving(&mut self, at: DVec3) -> f64 {

@@ -21,6 +21,7 @@ use crate::math::DVec3;
 
 #[path = "boundary_facets.rs"]
 mod facets;
+pub use facets::FEW_FACETS;
 
 /// The surface, one band.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,17 +8,21 @@
 use super::{Boundary, BoundarySample, Event, through};
 use crate::math::{DVec3, GOLDEN};
 use crate::optics::fresnel::fresnel;
+use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::sampling::discrete::choose;
 
-/// Facets out of which one is chosen.
-const FACETS: usize = 3;
+/// The most facets out of which one is chosen.
+const MOST_FACETS: usize = 8;
 
-/// The points of a lattice, one per facet.
-const LATTICE: [[f64; 2]; FACETS] = {
-    let mut points = [[0.0; 2]; FACETS];
+/// Facets for walks that know little of what light finds.
+pub const FEW_FACETS: usize = 3;
+
+/// The second coordinates of a lattice, one per facet; the first are multiples of one part of their number.
+const LATTICE: [f64; MOST_FACETS] = {
+    let mut points = [0.0; MOST_FACETS];
     let mut i = 0;
-    while i < FACETS {
-        points[i] = [i as f64 / FACETS as f64, (i as f64 * GOLDEN) % 1.0];
+    while i < MOST_FACETS {
+        points[i] = (i as f64 * GOLDEN) % 1.0;
         i += 1;
     }
     points
@@ -28,25 +32,31 @@ const LATTICE: [[f64; 2]; FACETS] = {
 #[derive(Clone, Copy)]
 struct FacetLobe {
     event: Event,
-    weights: [f64; FACETS],
-    directions: [DVec3; FACETS],
+    /// Facets.
+    count: usize,
+    weights: [f64; MOST_FACETS],
+    directions: [DVec3; MOST_FACETS],
 }
 
 impl FacetLobe {
-    fn none(event: Event) -> FacetLobe {
-        FacetLobe { event, weights: [0.0; FACETS], directions: [DVec3::Z; FACETS] }
+    fn none(event: Event, count: usize) -> FacetLobe {
+        FacetLobe { event, count, weights: [0.0; MOST_FACETS], directions: [DVec3::Z; MOST_FACETS] }
+    }
+
+    fn sum(&self) -> f64 {
+        self.weights[..self.count].iter().sum()
     }
 
     /// Mean over the facets.
     fn weight(&self) -> f64 {
-        self.weights.iter().sum::<f64>() * (1.0 / FACETS as f64)
+        self.sum() / self.count as f64
     }
 
     /// One direction, in proportion to its weight; `None` where none weighs anything.
     fn choose(&self, u: f64) -> Option<DVec3> {
-        let mut rest = u * self.weights.iter().sum::<f64>();
+        let mut rest = u * self.sum();
         let mut chosen = None;
-        for (weight, direction) in self.weights.iter().zip(&self.directions) {
+        for (weight, direction) in self.weights[..self.count].iter().zip(&self.directions) {
             if *weight > 0.0 {
                 chosen = Some(*direction); // the last one where rounding leaves a rest
                 if rest < *weight {
@@ -60,14 +70,35 @@ impl FacetLobe {
 }
 
 impl Boundary {
-    /// [`Boundary::sample`] out of several facets, which a rough surface has, and both lobes of each: one direction in
+    /// Facets per meeting that pay for walks whose other variance is small, by measured efficiency under a sky: rougher
+    /// surfaces send more of them to the wrong side. Visible normals of Beckmann's distribution are found by iteration.
+    pub fn facets_that_pay(&self) -> usize {
+        match self {
+            Boundary::Rough { facets: Microfacets { kind: MicrofacetKind::Ggx, alpha }, .. } => {
+                match alpha {
+                    0.15.. => MOST_FACETS,
+                    0.08.. => 5,
+                    _ => FEW_FACETS,
+                }
+            }
+            _ => FEW_FACETS,
+        }
+    }
+
+    /// [`Boundary::sample`] out of `count` facets (at most 8), which a rough surface has, and both lobes of each: one direction in
     /// proportion to its weight, times `gain` where it is refracted, and weighted accordingly. With a gain of 1 the weight is
     /// the mean weight of a facet; with what refracted light finds over what reflected light finds, the product of weight and
     /// light found is the same for both. Its density is that of [`Self::sample`]: weights of the balance heuristic may use
     /// it, since they need but sum to 1.
-    pub fn sample_of_several(&self, wo: DVec3, u: [f64; 3], gain: f64) -> Option<BoundarySample> {
+    pub fn sample_of_several(
+        &self,
+        wo: DVec3,
+        u: [f64; 3],
+        gain: f64,
+        count: usize,
+    ) -> Option<BoundarySample> {
         if !self.is_delta() {
-            let lobes = self.lobes(wo, [u[1], u[2]]);
+            let lobes = self.lobes(wo, [u[1], u[2]], count);
             let (lobe, weight, u) = choose_lobe(lobes.each_ref().map(FacetLobe::weight), gain, u[0])?;
             return Some(self.sample_of(wo, lobes[lobe].choose(u)?, lobes[lobe].event, weight));
         }
@@ -79,10 +110,10 @@ impl Boundary {
 
     /// Both lobes in place of a choice between them, each out of several facets where the surface has them: reflection and
     /// refraction, weighing together what [`Self::sample_of_several`] weighs; without what weighs nothing or fails.
-    pub fn sample_both(&self, wo: DVec3, u: [f64; 3]) -> [Option<BoundarySample>; 2] {
+    pub fn sample_both(&self, wo: DVec3, u: [f64; 3], count: usize) -> [Option<BoundarySample>; 2] {
         if !self.is_delta() {
             return self
-                .lobes(wo, [u[1], u[2]])
+                .lobes(wo, [u[1], u[2]], count)
                 .map(|lobe| Some(self.sample_of(wo, lobe.choose(u[0])?, lobe.event, lobe.weight())));
         }
         match self.facet(wo, [u[1], u[2]]) {
@@ -95,12 +126,13 @@ impl Boundary {
 
     /// Where several facets reflect and refract `wo`. They are the points of a lattice that `u` shifts, each of them
     /// uniform, and together spread evenly, so that their mean varies less than that of independent ones.
-    fn lobes(&self, wo: DVec3, u: [f64; 2]) -> [FacetLobe; 2] {
+    fn lobes(&self, wo: DVec3, u: [f64; 2], count: usize) -> [FacetLobe; 2] {
         // `f64::fract` is a library call on the baseline target.
         let wrapped = |x: f64| if x < 1.0 { x } else { x - 1.0 };
-        let mut lobes = [Event::Reflect, Event::Refract].map(FacetLobe::none);
-        for (facet, point) in LATTICE.iter().enumerate() {
-            let shifted = [wrapped(u[0] + point[0]), wrapped(u[1] + point[1])];
+        let mut lobes = [Event::Reflect, Event::Refract].map(|event| FacetLobe::none(event, count));
+        let part = 1.0 / count as f64;
+        for (facet, point) in LATTICE[..count].iter().enumerate() {
+            let shifted = [wrapped(u[0] + facet as f64 * part), wrapped(u[1] + point)];
             let Some((h, relative)) = self.facet(wo, shifted) else { continue };
             for (lobe, Way { wi, event, share }) in lobes.iter_mut().zip(ways(wo, h, relative)) {
                 if share > 0.0 {
@@ -150,7 +182,6 @@ mod tests {
     use super::super::Density;
     use super::super::tests::{direction, rough_surfaces};
     use super::*;
-    use crate::optics::microfacet::{MicrofacetKind, Microfacets};
     use crate::sampling::stream::{Purpose, StreamKey};
 
     /// Several facets, both lobes of each, and a choice that prefers refraction are what one facet gives on average: weight, and
@@ -167,9 +198,9 @@ mod tests {
                 const COUNT: usize = 4000;
                 for _ in 0..COUNT {
                     let u = stream.draw3();
-                    let several = surface.sample_of_several(wo, stream.draw3(), 1.0);
-                    let [a, b] = surface.sample_both(wo, stream.draw3());
-                    let leaving = surface.sample_of_several(wo, stream.draw3(), 2.5);
+                    let several = surface.sample_of_several(wo, stream.draw3(), 1.0, 3);
+                    let [a, b] = surface.sample_both(wo, stream.draw3(), 5);
+                    let leaving = surface.sample_of_several(wo, stream.draw3(), 2.5, 8);
                     let drawn =
                         [[surface.sample(wo, u), None], [several, None], [a, b], [leaving, None]];
                     for (sums, drawn) in sums.iter_mut().zip(drawn) {
@@ -218,8 +249,8 @@ mod tests {
                 let wo = direction(cos, 0.21);
                 let inside_of_far = if cos < 0.0 { 1.0 / surface.eta() } else { surface.eta() };
                 for gain in [1.0, 1.7, 0.4] {
-                    let drawn =
-                        [0.0, 1.0 - 1e-12].map(|u| surface.sample_of_several(wo, [u, v[0], v[1]], gain));
+                    let drawn = [0.0, 1.0 - 1e-12]
+                        .map(|u| surface.sample_of_several(wo, [u, v[0], v[1]], gain, 3));
                     let [Some(reflected), Some(refracted)] = drawn else { continue };
                     if reflected.event == refracted.event {
                         continue;
@@ -245,7 +276,7 @@ mod tests {
         for _ in 0..COUNT {
             let wo = direction(-stream.draw().sqrt(), stream.draw());
             let one = surface.sample(wo, stream.draw3());
-            let several = surface.sample_of_several(wo, stream.draw3(), 1.0);
+            let several = surface.sample_of_several(wo, stream.draw3(), 1.0, 3);
             failed += u32::from(one.is_none());
             for (sums, sample) in sums.iter_mut().zip([one, several]) {
                 // Without the squared index, which a crossing has.

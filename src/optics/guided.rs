@@ -27,6 +27,10 @@
 //! of directions that are refracted out, and it reaches the boundary; no distance is drawn. Relative to a plain step its
 //! density is e^{sigma_t t} c / (W HG).
 //!
+//! Against the growth, where p < 0, importance does not fall forever: behind the middle of a body it grows again, and a plain
+//! flight across has a density that e^{p sigma_t t} puts near 0. So beyond FALL mean free paths such a flight goes on with the
+//! plain rate: t in e^{p sigma_t t} stops there, and 1 - p becomes 1.
+//!
 //! The guide alone is not safe: where it is wrong, weights are unbounded. If a share q of steps is guided, turn and flight
 //! together, and both are weighted by the balance heuristic, the weight of a step is at most 1 / (1 - q) times that of a plain
 //! one. A step that ends in the medium, and one that reaches the boundary, have the ratios
@@ -55,6 +59,9 @@ const MOST_BEND: f64 = 0.95;
 
 /// The most coefficients that f has.
 const TERMS: usize = 8;
+
+/// Mean free paths after which a flight against the growth has the plain rate.
+const FALL: f64 = 3.0;
 
 /// The largest exponent of a ratio.
 const MOST_EXPONENT: f64 = 700.0;
@@ -373,7 +380,12 @@ impl Heading {
     pub fn sample_distance(&self, sigma_t: f64, drawn: StepDraw, u: f64) -> f64 {
         match drawn {
             StepDraw::Plain => sample_exponential(sigma_t, u),
-            StepDraw::Guided => sample_exponential(sigma_t * (1.0 - self.pull), u),
+            StepDraw::Guided => {
+                let t = sample_exponential(sigma_t * (1.0 - self.pull), u);
+                let beyond = t - FALL / sigma_t;
+                // With the plain rate the rest of the optical distance takes longer, by 1 - p.
+                if self.pull < 0.0 && beyond > 0.0 { t - self.pull * beyond } else { t }
+            }
             StepDraw::Escape => f64::INFINITY,
         }
     }
@@ -381,21 +393,34 @@ impl Heading {
     /// Density of direction and flight over the plain one, for a flight that ends in the medium at distance `t`.
     #[inline]
     pub fn flight_ratio(&self, sigma_t: f64, t: f64) -> f64 {
-        self.plain + self.guided * ((1.0 - self.pull) * growth(self.pull, sigma_t, t))
+        let rate = if self.falls_to(sigma_t * t) { 1.0 } else { 1.0 - self.pull };
+        self.plain + self.guided * (rate * self.growth(sigma_t * t))
     }
 
     /// The same for a flight longer than `t`, with its probability.
     #[inline]
     pub fn passage_ratio(&self, sigma_t: f64, t: f64) -> f64 {
-        let escape = if self.escape > 0.0 { self.escape * growth(1.0, sigma_t, t) } else { 0.0 };
-        self.plain + self.guided * growth(self.pull, sigma_t, t) + escape
+        let escape = if self.escape > 0.0 { self.escape * growth(1.0, sigma_t * t) } else { 0.0 };
+        self.plain + self.guided * self.growth(sigma_t * t) + escape
+    }
+
+    /// Whether a guided flight has the plain rate after so many mean free paths.
+    #[inline]
+    fn falls_to(&self, depth: f64) -> bool {
+        self.pull < 0.0 && depth > FALL
+    }
+
+    /// Probability that a guided flight is longer than so many mean free paths, over that of a plain one.
+    #[inline]
+    fn growth(&self, depth: f64) -> f64 {
+        growth(self.pull, if self.falls_to(depth) { FALL } else { depth })
     }
 }
 
-/// e^{p sigma_t t}; finite, also where the plain flight's probability is 0 in double precision.
+/// e^{p depth}; finite, also where the plain flight's probability is 0 in double precision.
 #[inline]
-fn growth(pull: f64, sigma_t: f64, t: f64) -> f64 {
-    exp((pull * sigma_t * t).min(MOST_EXPONENT))
+fn growth(pull: f64, depth: f64) -> f64 {
+    exp((pull * depth).min(MOST_EXPONENT))
 }
 
 impl Level {

@@ -17,7 +17,7 @@
 //!   (s / phi) (1 + (k s / phi - 1) / A).
 
 use crate::math::{DVec3, GOLDEN};
-use crate::optics::boundary::{Boundary, Event};
+use crate::optics::boundary::{Boundary, Event, FEW_FACETS};
 use crate::optics::bssrdf::FresnelMoments;
 use crate::optics::guided::diffuse_growth;
 use crate::optics::medium::Medium;
@@ -70,7 +70,7 @@ impl BoundaryMoments {
             let mu = middle(i, cosines);
             let inside = DVec3::new((1.0 - mu * mu).sqrt(), 0.0, -mu);
             let facet = [0.5, middle(j, facets), (f64::from(j) * GOLDEN).fract()];
-            for sample in boundary.sample_both(inside, facet).into_iter().flatten() {
+            for sample in boundary.sample_both(inside, facet, FEW_FACETS).into_iter().flatten() {
                 let part = sample.weight * mu * each;
                 match sample.event {
                     Event::Refract => t_1 += part / squared_index,

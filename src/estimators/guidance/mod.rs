@@ -25,6 +25,7 @@ use serde::Deserialize;
 
 use crate::geometry::Side;
 use crate::math::DVec3;
+use crate::optics::boundary::FEW_FACETS;
 use crate::optics::guided::{GuidedTurns, Pull, StepGuide, diffuse_growth};
 use crate::optics::medium::Medium;
 use crate::scene::Scene;
@@ -149,6 +150,8 @@ pub(super) struct Guidance {
     /// Of guided steps.
     pub share: f64,
     pub turns: GuidedTurns,
+    /// Out of which a direction at the boundary is chosen.
+    facets: usize,
     aim: Aim,
 }
 
@@ -169,16 +172,21 @@ impl Guidance {
                 (share, solutions.into_iter().map(|solved| solved.map(Aim::Solution)).collect())
             }
         };
-        let of_band = |(aim, medium): (Option<Aim>, &Medium)| {
-            Some(Guidance { share, turns: GuidedTurns::new(medium.phase, medium.albedo), aim: aim? })
+        let of_band = |(band, aim): (usize, Option<Aim>)| {
+            let facets = match aim {
+                Some(Aim::Solution(_)) => scene.boundary[band].facets_that_pay(),
+                _ => FEW_FACETS,
+            };
+            let Medium { phase, albedo, .. } = scene.medium[band];
+            Some(Guidance { share, turns: GuidedTurns::new(phase, albedo), facets, aim: aim? })
         };
-        aims.into_iter().zip(&scene.medium).map(of_band).collect()
+        aims.into_iter().enumerate().map(of_band).collect()
     }
 
     /// By what walks have learned.
     pub(super) fn learned(share: f64, medium: &Medium, learned: LearnedPulls) -> Guidance {
         let turns = GuidedTurns::new(medium.phase, medium.albedo);
-        Guidance { share, turns, aim: Aim::Learned(learned) }
+        Guidance { share, turns, facets: FEW_FACETS, aim: Aim::Learned(learned) }
     }
 
     /// The guide of a step from a point, and phi (0 where it is unknown), for a walk that last entered at a boundary point with

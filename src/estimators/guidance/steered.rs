@@ -111,8 +111,8 @@ impl WalkBands for GuidedBand<'_> {
     }
 
     #[inline]
-    fn refines_boundary(&self) -> bool {
-        true
+    fn facets(&self) -> Option<usize> {
+        Some(self.guidance.facets)
     }
 
     #[inline]

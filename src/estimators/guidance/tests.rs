@@ -318,7 +318,7 @@ fn wrong_guides_do_not_bias() {
             ];
             for (aim_name, aim, share) in aims {
                 let turns = GuidedTurns::new(scene.medium[0].phase, scene.medium[0].albedo);
-                let guidance = Guidance { share, turns, aim };
+                let guidance = Guidance { share, turns, facets: 8, aim };
                 let field = Field::new(Arc::clone(&scene), Roulette::default()).guided_by(&guidance);
                 let (guided, _) = measure(&Misled(field), &layout, 1500, &format!("{name} {aim_name}"));
                 for (observable, (a, b)) in plain.iter().zip(&guided).enumerate() {
@@ -347,7 +347,7 @@ fn furnace() {
         let layout = Layout::new(&scene);
         let aim = half_space(&scene, 0.2);
         let turns = GuidedTurns::new(scene.medium[0].phase, 1.0);
-        let guidance = Guidance { share, turns, aim };
+        let guidance = Guidance { share, turns, facets: 8, aim };
         let field = Field::new(Arc::clone(&scene), Roulette::default()).guided_by(&guidance);
         let (means, _) = measure(&Misled(field), &layout, 1500, "furnace of guided walks");
         let (mean, error) = means[0];
