@@ -61,7 +61,7 @@ const MOST_BEND: f64 = 0.95;
 const TERMS: usize = 8;
 
 /// Mean free paths after which a flight against the growth has the plain rate.
-const FALL: f64 = 3.0;
+const FALL: f64 = 4.0;
 
 /// The largest exponent of a ratio.
 const MOST_EXPONENT: f64 = 700.0;
@@ -393,7 +393,7 @@ impl Heading {
     /// Density of direction and flight over the plain one, for a flight that ends in the medium at distance `t`.
     #[inline]
     pub fn flight_ratio(&self, sigma_t: f64, t: f64) -> f64 {
-        let rate = if self.falls_to(sigma_t * t) { 1.0 } else { 1.0 - self.pull };
+        let rate = if self.pull < 0.0 && sigma_t * t > FALL { 1.0 } else { 1.0 - self.pull };
         self.plain + self.guided * (rate * self.growth(sigma_t * t))
     }
 
@@ -404,16 +404,10 @@ impl Heading {
         self.plain + self.guided * self.growth(sigma_t * t) + escape
     }
 
-    /// Whether a guided flight has the plain rate after so many mean free paths.
-    #[inline]
-    fn falls_to(&self, depth: f64) -> bool {
-        self.pull < 0.0 && depth > FALL
-    }
-
     /// Probability that a guided flight is longer than so many mean free paths, over that of a plain one.
     #[inline]
     fn growth(&self, depth: f64) -> f64 {
-        growth(self.pull, if self.falls_to(depth) { FALL } else { depth })
+        growth(self.pull, if self.pull < 0.0 { depth.min(FALL) } else { depth })
     }
 }
 
