@@ -23,8 +23,8 @@ use crate::scene::Scene;
 /// Depth from which on there are no escapes, mean free paths.
 pub(super) const REACH: f64 = 4.0;
 
-/// The largest gain of leaving. For common indices s / phi, 1 + 2 A D kappa in a half-space, is below 10; but a cell that barely touches the body may have
-/// next to no phi, and a reflected path would take the gain as a weight.
+/// The largest gain of leaving. In a half-space it is below 13 for indices up to 2; but a cell that barely touches the body may
+/// have next to no phi, and a reflected path would take the gain as a weight.
 const MOST_GAIN: f64 = 16.0;
 
 /// The boundary near a point, as a plane.
