@@ -251,14 +251,16 @@ fn pages_quote_tables_as_they_are() {
 }
 
 /// Pictures in docs/figures/NAME/ are those that were made when the experiment of that name was
-/// published.
+/// published, with its full budget where that was published.
 #[test]
 fn pictures_of_pages_are_published() {
     let copies = files(&package().join("docs/figures"));
     assert!(copies.len() >= 3, "{:?}", copies.keys());
     let is_published = |name: &str, bytes: &[u8]| {
         let (experiment, file) = name.split_once('/').expect("docs/figures/NAME/FILE");
-        let path = package().join("results/published/short").join(experiment).join(MANIFEST);
+        let of = |setting| package().join("results/published").join(setting).join(experiment);
+        let setting = if of("full").exists() { "full" } else { "short" };
+        let path = of(setting).join(MANIFEST);
         let views =
             manifest(&fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))).views;
         ["images", "plots"]

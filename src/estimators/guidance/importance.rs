@@ -135,7 +135,7 @@ impl Importance {
                 let borders = cells.borders(&scene.shape, &incidence);
                 let thinnest = scene.medium.iter().map(|medium| medium.sigma_t).filter(|s| *s > 0.0);
                 let reach = REACH / thinnest.fold(f64::INFINITY, f64::min);
-                let shores = cells.shores(&scene.shape, &incidence, reach);
+                let shores = cells.shores(&scene.shape, &borders, &incidence, reach);
                 let grid = |band: usize| {
                     let sigma_t = scene.medium[band].sigma_t;
                     let diffusion = Diffusion::of(scene, band);
@@ -281,6 +281,7 @@ const FACES: [(usize, f64); 6] = [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0), (2, 
 
 /// Where the boundary cuts a face of a cell.
 struct Border {
+    at: DVec3,
     /// |cosine| between the normal and the axis.
     lean: f64,
     /// From the middle, along the axis.
@@ -382,29 +383,58 @@ impl Cells {
             let hit = shape.intersect(&ray, Side::Inside, None, f64::INFINITY)?;
             let lean = hit.normal.dot(dir).abs();
             let distance = hit.t.min(self.lattice.spacing);
-            Some(Border { lean, distance, let_in: incidence.irradiance(&hit) })
+            Some(Border { at: hit.point, lean, distance, let_in: incidence.irradiance(&hit) })
         };
         self.inside.iter().map(|&index| FACES.map(|face| border(index, face))).collect()
     }
 
+    /// Where the boundary cuts the last cell inside in the direction of a face: what lies ahead, unless the body has a gap
+    /// between two middles.
+    fn border_ahead<'a>(
+        &self,
+        borders: &'a [[Option<Border>; 6]],
+        mut index: usize,
+        face: usize,
+    ) -> Option<&'a Border> {
+        loop {
+            match self.across(index, FACES[face]) {
+                NONE => return borders[self.numbers[index] as usize][face].as_ref(),
+                next => index = self.inside[next as usize],
+            }
+        }
+    }
+
     /// Per cell inside that is nearer to the boundary than `reach`, of what lies ahead along the axes the plane that is nearest.
-    fn shores(&self, shape: &Shape, incidence: &TransmittedLight<'_>, reach: f64) -> Vec<Option<Shore>> {
+    /// The light that goes in there is known from the border of the last cell before it, as a rule.
+    fn shores(
+        &self,
+        shape: &Shape,
+        borders: &[[Option<Border>; 6]],
+        incidence: &TransmittedLight<'_>,
+        reach: f64,
+    ) -> Vec<Option<Shore>> {
+        let same = 1e-6 * self.lattice.spacing;
         let shore = |&index: &usize| {
             let middle = self.lattice.middle(index);
             let within = reach + self.lattice.spacing;
             if shape.clearance(middle) > within {
                 return None;
             }
-            let ahead = |(axis, sign): (usize, f64)| {
+            let ahead = |face: usize| {
+                let (axis, sign) = FACES[face];
                 let mut dir = DVec3::ZERO;
                 dir[axis] = sign;
                 let ray = Ray { origin: middle, dir };
                 let hit = shape.intersect(&ray, Side::Inside, None, f64::INFINITY)?;
-                Some((hit.normal.dot(hit.point - middle), hit))
+                Some((hit.normal.dot(hit.point - middle), face, hit))
             };
-            let nearest = FACES.into_iter().filter_map(ahead).min_by(|a, b| a.0.total_cmp(&b.0));
-            let (distance, hit) = nearest.filter(|(distance, _)| *distance < within)?;
-            let let_in = incidence.irradiance(&hit);
+            let nearest = (0..6).filter_map(ahead).min_by(|a, b| a.0.total_cmp(&b.0));
+            let (distance, face, hit) = nearest.filter(|(distance, ..)| *distance < within)?;
+            let border = self.border_ahead(borders, index, face);
+            let let_in = match border.filter(|border| border.at.distance(hit.point) < same) {
+                Some(border) => border.let_in.clone(),
+                None => incidence.irradiance(&hit),
+            };
             Some(Shore { at: hit.point, normal: hit.normal, distance, let_in })
         };
         self.inside.iter().map(shore).collect()
@@ -463,7 +493,7 @@ impl Cells {
                 if near[number][face] != NONE {
                     diagonal[number] += 1.0;
                 }
-                if let Some(Border { lean, distance, let_in }) = border {
+                if let Some(Border { lean, distance, let_in, .. }) = border {
                     let conductance = lean * h / (diffusion.reach + lean * distance);
                     diagonal[number] += conductance;
                     source[number] += conductance * diffusion.boundary.kept * let_in[band].all;
@@ -478,7 +508,7 @@ impl Cells {
         let phi = relax(&near, &source, &diagonal, supplied / lost, self.lattice.counts);
         let cut = |(phi, borders): (&f64, &[Option<Border>; 6])| {
             [0, 1, 2, 3, 4, 5].map(|face: usize| {
-                borders[face].as_ref().map(|Border { lean, distance, let_in }| {
+                borders[face].as_ref().map(|Border { lean, distance, let_in, .. }| {
                     let share = lean * distance / (diffusion.reach + lean * distance);
                     (phi + share * (diffusion.boundary.kept * let_in[band].all - phi), *distance)
                 })
@@ -594,5 +624,20 @@ pub(super) fn extent(shape: &Shape) -> Option<[DVec3; 2]> {
             Some([low, high])
         }
         _ => shape.bounds().map(|ball| [ball.center - ball.radius, ball.center + ball.radius]),
+    }
+}
+
+#[cfg(test)]
+impl Importance {
+    /// What goes in near each cell of a finite body, first band: as borders know it, and computed anew.
+    pub(super) fn let_in_near_cells(scene: &Scene, nodes: u32, reach: f64) -> [Vec<Option<LetIn>>; 2] {
+        let incidence = TransmittedLight::new(scene);
+        let cells = Cells::of(&scene.shape, nodes).expect("cells");
+        let borders = cells.borders(&scene.shape, &incidence);
+        let none: Vec<_> = borders.iter().map(|_| [const { None }; 6]).collect();
+        [borders, none].map(|borders| {
+            let shores = cells.shores(&scene.shape, &borders, &incidence, reach);
+            shores.iter().map(|shore| Some(shore.as_ref()?.let_in[0])).collect()
+        })
     }
 }

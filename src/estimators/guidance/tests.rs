@@ -114,8 +114,8 @@ fn a_flat_box_is_a_slab() {
     for toward in [DVec3::Z, -DVec3::Z, DVec3::new(0.5, 0.0, 0.8)] {
         let lights = || vec![cap(toward, 1e-3, 100.0)];
         let slab = solution(&scene(Shape::Slab { thickness: 1.0 }, SMOOTH, medium, lights()), 4);
-        let flat = Shape::Box { half: DVec3::new(4.0, 4.0, 0.5) };
-        let grid = solution(&scene(flat, SMOOTH, medium, lights()), 128);
+        let flat = Shape::Box { half: DVec3::new(2.0, 2.0, 0.5) };
+        let grid = solution(&scene(flat, SMOOTH, medium, lights()), 64);
         for depth in [0.1, 0.5, 0.9] {
             let of_slab = gradient(&slab, DVec3::new(0.0, 0.0, -depth));
             let of_grid = gradient(&grid, DVec3::new(0.0, 0.0, 0.5 - depth));
@@ -177,7 +177,7 @@ fn gains_of_leaving() {
 
     let all_round = |shape: Shape| scene(shape, SMOOTH, medium, vec![sky()]);
     let slab = solution(&all_round(Shape::Slab { thickness: 4.0 }), 4);
-    let flat = solution(&all_round(Shape::Box { half: DVec3::new(8.0, 8.0, 2.0) }), 128);
+    let flat = solution(&all_round(Shape::Box { half: DVec3::new(4.0, 4.0, 2.0) }), 64);
     for (of_slab, of_box) in [(0.0, 2.0), (-4.0, -2.0)] {
         let gains = [
             slab.gain_of_leaving(DVec3::Z * of_slab),
@@ -185,6 +185,25 @@ fn gains_of_leaving() {
         ];
         // `sky` is all directions: the underside is lit as the upper side is. A quadrature of the sky, and cells.
         assert!(gains.iter().all(|own| (own / gain - 1.0).abs() < 0.1), "{gains:?} {gain}");
+    }
+}
+
+/// Light that goes in near a cell is that of the border ahead, also where a body has gaps narrower than a cell.
+#[test]
+fn borders_know_what_goes_in() {
+    let torus = procedural::torus(0.7, 0.3, [24, 12], true).expect("closed");
+    let drilled = procedural::drilled_box(DVec3::new(2.0, 1.5, 1.0), [2, 1], 0.1).expect("closed");
+    for shape in
+        [Shape::Mesh(torus), Shape::Mesh(drilled), Shape::Box { half: DVec3::new(0.5, 0.4, 0.3) }]
+    {
+        let scene =
+            scene(shape, SMOOTH, medium(5.0, 0.9, 0.0), vec![cap(DVec3::new(0.3, 0.2, 1.0), 0.2, 1.0)]);
+        let [known, anew] = Importance::let_in_near_cells(&scene, 12, 0.5);
+        assert!(known.iter().flatten().count() > 50);
+        for (a, b) in known.iter().zip(&anew) {
+            let [a, b] = [a, b].map(|let_in| let_in.map_or(f64::NAN, |let_in| let_in.all));
+            assert!((a - b).abs() <= 1e-9 * b || (a.is_nan() && b.is_nan()), "{a} {b}");
+        }
     }
 }
 
@@ -308,7 +327,7 @@ fn wrong_guides_do_not_bias() {
             let layout = Layout::new(&scene);
             let path = PathTracer::new(Arc::clone(&scene), Roulette::default()).expect("a scene for it");
             let name = format!("wrong_guides_do_not_bias {g} {boundary:?}");
-            let (plain, _) = measure(&path, &layout, 1500, &name);
+            let (plain, _) = measure(&path, &layout, 1000, &name);
             let constant = |growth: f64| half_space(&scene, growth);
             let aims = [
                 ("right", Aim::Solution(solution(&scene, 16)), 0.9),
@@ -320,7 +339,7 @@ fn wrong_guides_do_not_bias() {
                 let turns = GuidedTurns::new(scene.medium[0].phase, scene.medium[0].albedo);
                 let guidance = Guidance { share, turns, facets: 8, aim };
                 let field = Field::new(Arc::clone(&scene), Roulette::default()).guided_by(&guidance);
-                let (guided, _) = measure(&Misled(field), &layout, 1500, &format!("{name} {aim_name}"));
+                let (guided, _) = measure(&Misled(field), &layout, 1000, &format!("{name} {aim_name}"));
                 for (observable, (a, b)) in plain.iter().zip(&guided).enumerate() {
                     let error = (a.1 * a.1 + b.1 * b.1).sqrt();
                     // Rare classes have no normal means.

@@ -180,18 +180,19 @@ fn lights_seen_through_the_body_are_expected() {
                 .expect("a scene for it")
         };
         let path = PathTracer::new(scene.clone(), Roulette::default()).expect("a scene for it");
-        let arms: [(&str, &dyn Estimator); 4] = [
-            ("path", &path),
-            ("walk", &snee(false, false)),
-            ("own", &snee(true, false)),
-            ("shared", &snee(true, true)),
+        // Most of the error is that of the walks.
+        let arms: [(&str, &dyn Estimator, u64); 4] = [
+            ("path", &path, PASSES),
+            ("walk", &snee(false, false), PASSES),
+            ("own", &snee(true, false), PASSES / 3),
+            ("shared", &snee(true, true), PASSES / 3),
         ];
         let layout = Layout::new(&scene);
-        let of_arms = arms.map(|(arm, estimator)| {
+        let of_arms = arms.map(|(arm, estimator, passes)| {
             let mut scores = Scores::new(layout.clone());
             let key = StreamKey::named(&format!("seen through the {name}, {arm}"));
             let mut sums = [[0.0f64; 2]; 2];
-            for pass in 0..PASSES {
+            for pass in 0..passes {
                 scores.clear();
                 estimator.pass(&[0, 1], &key.pass(pass), &mut scores);
                 for (band, [sum, squares]) in sums.iter_mut().enumerate() {
@@ -203,8 +204,8 @@ fn lights_seen_through_the_body_are_expected() {
             let anomalies = [Anomaly::NonFinite, Anomaly::LostRay];
             assert_eq!(anomalies.map(|kind| scores.anomalies[kind as usize]), [0; 2], "{name}, {arm}");
             sums.map(|[sum, squares]| {
-                let mean = sum / PASSES as f64;
-                (mean, (squares / PASSES as f64 - mean * mean) / PASSES as f64)
+                let mean = sum / passes as f64;
+                (mean, (squares / passes as f64 - mean * mean) / passes as f64)
             })
         });
         for band in 0..2 {
@@ -216,7 +217,8 @@ fn lights_seen_through_the_body_are_expected() {
                 assert!(error < 0.05 * path.0, "{name}, band {band}: 20 % must be detected");
             }
             // The ring hides its far parts, and what goes through several of them is the walk's.
-            assert!(own.1 < if name == "ring" { 0.9 } else { 0.5 } * walk.1, "{name}, band {band}");
+            let most = if name == "ring" { 0.9 } else { 0.5 };
+            assert!(own.1 / 3.0 < most * walk.1, "{name}, band {band}");
         }
     }
 }
