@@ -6,6 +6,7 @@ use super::choice::{light_shares, shares_of_uneven};
 use super::guidance::{Guidance, WalkDraw};
 use super::roulette::Roulette;
 use crate::geometry::BoundingSphere;
+use crate::optics::boundary::Boundary;
 use crate::sampling::stream::PassKey;
 use crate::scene::Scene;
 
@@ -38,6 +39,18 @@ impl Field {
     /// The same without light sampling of lights that are even.
     pub(super) fn finding_even_lights(self) -> Field {
         Field { choice: shares_of_uneven(&self.scene), ..self }
+    }
+
+    /// The same in bands whose walks are guided, and at matched boundaries, where light samples at every vertex are most of the
+    /// noise whatever the walk. Plain walks through a rough boundary may need the samples.
+    pub(super) fn finding_even_lights_where_guided(self) -> Field {
+        let uneven = shares_of_uneven(&self.scene);
+        let finds = |band: usize| {
+            self.guidance(band).is_some() || matches!(self.scene.boundary[band], Boundary::Matched)
+        };
+        let choose = |(band, uneven)| if finds(band) { uneven } else { self.choice[band].clone() };
+        let choice = uneven.into_iter().enumerate().map(choose).collect();
+        Field { choice, ..self }
     }
 
     /// What guides the walks of a band; `None` where they are plain.

@@ -82,8 +82,13 @@ impl PathTracer {
     pub fn with_options(scene: Arc<Scene>, options: &PathOptions) -> Result<PathTracer> {
         PathTracer::KIND.check(&scene)?;
         let walks = TaughtField::new(scene, options.roulette, options.walk);
-        let samples_even = options.sample_even_lights.unwrap_or(!options.walk.is_guided());
-        Ok(PathTracer { walks: if samples_even { walks } else { walks.finding_even_lights() } })
+        let walks = match options.sample_even_lights {
+            Some(true) => walks,
+            Some(false) => walks.finding_even_lights(),
+            None if options.walk.is_guided() => walks.finding_even_lights_where_guided(),
+            None => walks,
+        };
+        Ok(PathTracer { walks })
     }
 }
 

@@ -47,6 +47,11 @@ impl TaughtField {
         TaughtField { untaught: self.untaught.finding_even_lights(), ..self }
     }
 
+    /// The same where walks are guided: [`Field::finding_even_lights_where_guided`].
+    pub(super) fn finding_even_lights_where_guided(self) -> TaughtField {
+        TaughtField { untaught: self.untaught.finding_even_lights_where_guided(), ..self }
+    }
+
     /// The same with plain walks in some bands.
     pub(super) fn plain_in(self, is_plain: impl Fn(usize, &Guidance) -> bool) -> TaughtField {
         TaughtField { untaught: self.untaught.plain_in(is_plain), ..self }

@@ -19,6 +19,7 @@ use super::exit::{ExitPlane, ExitRule, REACH, unit};
 use super::incidence::{LetIn, TransmittedLight};
 use crate::geometry::{self, Ray, Shape, Side};
 use crate::math::{DVec3, Vec3, cos, exp, ln, ln_1p};
+use crate::optics::boundary::Boundary;
 use crate::optics::guided::{Escape, Pull, StepGuide};
 use crate::optics::medium::Medium;
 use crate::scene::Scene;
@@ -78,6 +79,12 @@ struct Node {
 const NO_EXIT: u32 = (1 << 24) - 1;
 
 const UNKNOWN: Node = Node { axis: Vec3::Z, phi: 0.0, level_and_exit: NO_EXIT << 8 };
+
+/// Walks through a smooth boundary stay plain in a finite body where the contrast of importance, times 1 - a g, is less than
+/// this: they find nearly the same light whatever they do, and a plain step costs less. Measured under a sky in spheres of 5
+/// to 8 mean free paths after similarity, albedo 0.99 to 0.9999, g 0 to 0.95: guided walks lost at 0.013 and below, and gained
+/// at 0.02 and above.
+const LEAST_CONTRAST: f64 = 0.016;
 
 /// phi where it is largest, as nodes keep it.
 const LARGEST: f64 = 1e30;
@@ -140,6 +147,12 @@ impl Importance {
                     let sigma_t = scene.medium[band].sigma_t;
                     let diffusion = Diffusion::of(scene, band);
                     let solved = cells.solve(&borders, band, diffusion)?;
+                    let Medium { albedo, phase, .. } = scene.medium[band];
+                    if matches!(scene.boundary[band], Boundary::Smooth { .. })
+                        && solved.contrast(&borders, band) * (1.0 - albedo * phase.g) < LEAST_CONTRAST
+                    {
+                        return None;
+                    }
                     let rule = ExitRule::of(scene, band, &diffusion);
                     let mut grid = cells.grid(&solved, 1.0 / sigma_t, diffusion, rule);
                     cells.place_exits(&mut grid, &solved, &shores, band, diffusion);
@@ -261,6 +274,15 @@ impl ImportanceGrid {
             None => guide.escape.chance = 0.0,
         }
         f64::from(node.phi)
+    }
+}
+
+impl Solved {
+    /// How much less a walk finds at worst than one that leaves at best: 1 - phi / s, the least phi and the largest s.
+    fn contrast(&self, borders: &[[Option<Border>; 6]], band: usize) -> f64 {
+        let least = self.phi.iter().copied().fold(f64::INFINITY, f64::min);
+        let brightest = borders.iter().flatten().flatten().map(|border| border.let_in[band].all);
+        1.0 - least / brightest.fold(0.0, f64::max)
     }
 }
 

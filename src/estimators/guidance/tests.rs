@@ -126,7 +126,7 @@ fn a_flat_box_is_a_slab() {
 }
 
 /// Ways out of a sphere in a sky: along the normal, the more often the more is absorbed and the nearer the boundary is; none
-/// in its middle, in parallel light, and where nothing is absorbed.
+/// in its middle and in parallel light.
 #[test]
 fn ways_out() {
     let chance = |albedo: f64, boundary: Boundary, light: Light, r: f64| {
@@ -137,8 +137,8 @@ fn ways_out() {
         assert!(escape.chance == 0.0 || escape.normal.dot(dir) > 0.98, "{:?}", escape.normal);
         escape.chance
     };
-    let at_boundary = [0.8, 0.95, 0.99, 1.0].map(|albedo| chance(albedo, SMOOTH, sky(), 0.999));
-    assert!(at_boundary.is_sorted_by(|a, b| a > b) && at_boundary[3] < 0.01, "{at_boundary:?}");
+    let at_boundary = [0.8, 0.95, 0.99, 0.999].map(|albedo| chance(albedo, SMOOTH, sky(), 0.999));
+    assert!(at_boundary.is_sorted_by(|a, b| a > b) && at_boundary[3] < 0.02, "{at_boundary:?}");
     assert!(at_boundary[0] > 0.05 && at_boundary[0] < 0.3, "{at_boundary:?}");
     assert!(chance(0.8, SMOOTH, sky(), 0.85) < 0.5 * at_boundary[0]);
     assert_eq!(chance(0.8, SMOOTH, sky(), 0.3), 0.0);
@@ -261,6 +261,17 @@ fn where_nothing_guides() {
     let shallow = |depth| scene(SPHERE, SMOOTH, medium(depth, 0.9, 0.0), vec![sky()]);
     assert!(first(Importance::of_bands(&shallow(4.0), 16, 5.0)).is_none());
     assert!(first(Importance::of_bands(&shallow(6.0), 16, 5.0)).is_some());
+    // Where little is absorbed and a sky is everywhere, walks find the same whatever they do; not if light comes from one side.
+    let bright = |albedo, boundary, light: Light| {
+        first(Importance::of_bands(
+            &scene(SPHERE, boundary, medium(8.0, albedo, 0.0), vec![light]),
+            16,
+            5.0,
+        ))
+    };
+    assert!(bright(0.9999, SMOOTH, sky()).is_none() && bright(0.999, SMOOTH, sky()).is_some());
+    assert!(bright(0.9999, ROUGH, sky()).is_some());
+    assert!(bright(0.9999, SMOOTH, cap(DVec3::Z, 0.5, 1.0)).is_some());
     let ring = Shape::Mesh(procedural::torus(1.0, 0.01, [24, 6], false).expect("closed"));
     let thin = scene(ring, SMOOTH, medium(5.0, 0.9, 0.0), vec![sky()]);
     let importance = first(Importance::of_bands(&thin, 4, 0.0));

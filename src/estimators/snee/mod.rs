@@ -186,7 +186,7 @@ impl Snee {
             });
         }
         if options.walk.is_guided() && options.strategies.bsdf {
-            walks = walks.finding_even_lights();
+            walks = walks.finding_even_lights_where_guided();
         }
         Ok(Snee { walks, options, setups, learned: OnceLock::new() })
     }
