@@ -232,7 +232,7 @@ fn visible_facet(facets: &Microfacets, wo: DVec3, u: [f64; 2]) -> DVec3 {
 
 /// Snell: the tangential part of `wo` shrinks by `eta` (far side over near side), the normal part is
 /// -cos_t.
-#[inline]
+#[inline(always)]
 fn through(wo: DVec3, h: DVec3, eta: f64, cos_t: f64) -> DVec3 {
     (wo.dot(h) / eta - cos_t) * h - wo / eta
 }

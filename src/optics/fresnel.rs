@@ -15,7 +15,7 @@ pub struct Fresnel {
 /// gives cos_t = cos_i to the last bit. Fresnel (Born & Wolf, 1.5.2):
 /// r_s = (cos_i - eta cos_t) / (cos_i + eta cos_t), r_p = (eta cos_i - cos_t) / (eta cos_i + cos_t),
 /// R = (r_s^2 + r_p^2) / 2.
-#[inline]
+#[inline(always)]
 pub fn fresnel(cos_i: f64, eta: f64) -> Fresnel {
     let eta2_cos_t2 = (eta * eta - 1.0) + cos_i * cos_i;
     if eta2_cos_t2 <= 0.0 || cos_i <= 0.0 {

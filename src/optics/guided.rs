@@ -316,14 +316,14 @@ impl GuidedTurns {
                 let most = 2.0 * (linear * axis.z.abs() + even);
                 let local = loop {
                     let local = self.phase.sample_local([draw(), draw()]);
-                    let opposite = DVec3::new(-local.x, -local.y, local.z);
+                    let across = axis.x * local.x + axis.y * local.y;
+                    let along = axis.z * local.z;
                     let level = draw() * most;
-                    let of_first = factor.at(axis.dot(local));
-                    if level < of_first {
-                        break local;
-                    }
-                    if level - of_first < factor.at(axis.dot(opposite)) {
-                        break opposite;
+                    let (of_first, of_opposite) = (factor.at(along + across), factor.at(along - across));
+                    if level - of_first < of_opposite {
+                        // Either of the two is equally likely: a branch would be mispredicted half the time.
+                        let side = if level < of_first { 1.0 } else { -1.0 };
+                        break DVec3::new(side * local.x, side * local.y, local.z);
                     }
                 };
                 renormalized(frame.to_world(local))

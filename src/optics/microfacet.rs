@@ -54,20 +54,30 @@ impl Microfacets {
     /// 1 / (1 + Lambda). Even in v.z.
     #[inline]
     pub fn g1(&self, v: DVec3) -> f64 {
-        let tan2 = (v.x * v.x + v.y * v.y) / (v.z * v.z);
-        if tan2 == 0.0 {
-            return 1.0;
-        }
-        let slope2 = self.alpha * self.alpha * tan2;
-        let lambda = match self.kind {
-            MicrofacetKind::Ggx => 0.5 * ((1.0 + slope2).sqrt() - 1.0),
+        match self.kind {
+            MicrofacetKind::Ggx => self.ggx_g1(v),
             MicrofacetKind::Beckmann => {
+                let slope2 = self.slope2(v);
+                if slope2 == 0.0 {
+                    return 1.0;
+                }
                 // Lambda(a) = (exp(-a^2) / (a sqrt pi) - erfc(a)) / 2, a = 1 / (alpha tan theta).
                 let a = 1.0 / slope2.sqrt();
-                0.5 * (exp(-a * a) / (a * SQRT_PI) - erfc(a))
+                1.0 / (1.0 + 0.5 * (exp(-a * a) / (a * SQRT_PI) - erfc(a)))
             }
-        };
-        1.0 / (1.0 + lambda)
+        }
+    }
+
+    /// [`Self::g1`] of a GGX surface, without a branch.
+    #[inline(always)]
+    pub(super) fn ggx_g1(&self, v: DVec3) -> f64 {
+        1.0 / (1.0 + 0.5 * ((1.0 + self.slope2(v)).sqrt() - 1.0))
+    }
+
+    /// (alpha tan theta)^2.
+    #[inline(always)]
+    fn slope2(&self, v: DVec3) -> f64 {
+        self.alpha * self.alpha * ((v.x * v.x + v.y * v.y) / (v.z * v.z))
     }
 
     /// Density of [`Self::sample_normal`] per solid angle: D(h) h.z.
@@ -101,23 +111,29 @@ impl Microfacets {
     /// sampled there and stretched back (Heitz & d'Eon 2014, section 4).
     #[inline]
     pub fn sample_visible(&self, v: DVec3, u: [f64; 2]) -> DVec3 {
-        let stretched = DVec3::new(self.alpha * v.x, self.alpha * v.y, v.z).normalize();
-        let h = match self.kind {
-            MicrofacetKind::Ggx => ggx_visible(stretched, u),
-            MicrofacetKind::Beckmann => beckmann_visible(stretched, u),
-        };
-        DVec3::new(self.alpha * h.x, self.alpha * h.y, h.z).normalize()
+        let stretched = self.stretched(v);
+        match self.kind {
+            MicrofacetKind::Ggx => self.ggx_visible(stretched, u),
+            MicrofacetKind::Beckmann => self.stretched(beckmann_visible(stretched, u)),
+        }
     }
-}
 
-/// Roughness 1 GGX is the upper unit hemisphere: the directions that `v` reflects to, off its visible
-/// part, fill the cap z > -v.z evenly (Dupuy & Benyoub 2023). So draw c from that cap; h ~ c + v.
-#[inline]
-fn ggx_visible(v: DVec3, u: [f64; 2]) -> DVec3 {
-    let below = (1.0 + v.z) * u[0];
-    let (sin_phi, cos_phi) = sin_cos_turns(u[1]);
-    let r = (below * (2.0 - below)).sqrt();
-    DVec3::new(r * cos_phi, r * sin_phi, 1.0 - below) + v
+    /// From roughness alpha to roughness 1 for directions, and back for normals, not normalised before.
+    #[inline(always)]
+    pub(super) fn stretched(&self, v: DVec3) -> DVec3 {
+        DVec3::new(self.alpha * v.x, self.alpha * v.y, v.z).normalize()
+    }
+
+    /// [`Self::sample_visible`] of a GGX surface seen from a stretched direction, without a branch. Roughness 1 GGX is the
+    /// upper unit hemisphere: the directions that `v` reflects to, off its visible part, fill the cap z > -v.z evenly (Dupuy &
+    /// Benyoub 2023). So draw c from that cap; h ~ c + v.
+    #[inline(always)]
+    pub(super) fn ggx_visible(&self, v: DVec3, u: [f64; 2]) -> DVec3 {
+        let below = (1.0 + v.z) * u[0];
+        let (sin_phi, cos_phi) = sin_cos_turns(u[1]);
+        let r = (below * (2.0 - below)).sqrt();
+        self.stretched(DVec3::new(r * cos_phi, r * sin_phi, 1.0 - below) + v)
+    }
 }
 
 /// Roughness 1 Beckmann has slopes (x, y) of density exp(-x^2 - y^2) / pi. Seen from
