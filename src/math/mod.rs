@@ -15,7 +15,6 @@ macro_rules! portable {
 }
 
 portable! {
-    exp = exp: "e^x.";
     exp_m1 = expm1: "e^x - 1, accurate near 0.";
     ln = log: "Natural logarithm.";
     ln_1p = log1p: "ln(1 + x), accurate near 0.";
@@ -43,14 +42,17 @@ pub fn fma(x: f64, y: f64, z: f64) -> f64 {
     libm::fma(x, y, z)
 }
 
+mod exponential;
 mod frame;
 mod inverse;
 mod quadrature;
 mod turns;
 mod vectors;
 
+pub use exponential::exp;
+pub(crate) use exponential::{NEAR, exp_near};
 pub use frame::{Frame, renormalized};
 pub use inverse::{bracketed_root, erf_inv, increasing_root, lambert_excess};
 pub use quadrature::{Integral, gauss_kronrod, integrate};
 pub use turns::sin_cos_turns;
-pub(crate) use vectors::{Vectorized, vectorized};
+pub(crate) use vectors::{Lanewise, Vectorized, of_each, vectorized};

@@ -10,3 +10,32 @@ pub(crate) use pulp::NullaryFnOnce as Vectorized;
 pub(crate) fn vectorized<W: Vectorized>(work: W) -> W::Output {
     pulp::Arch::new().dispatch(work)
 }
+
+/// A function of one number, for [`of_each`]. `at` is `inline(always)` and without branches.
+pub(crate) trait Lanewise {
+    /// Its value.
+    fn at(&self, x: f64) -> f64;
+}
+
+/// `values` = f(x) of each x.
+#[inline]
+pub(crate) fn of_each<F: Lanewise>(f: &F, x: &[f64], values: &mut [f64]) {
+    vectorized(OfEach { f, x, values });
+}
+
+struct OfEach<'a, F> {
+    f: &'a F,
+    x: &'a [f64],
+    values: &'a mut [f64],
+}
+
+impl<F: Lanewise> Vectorized for OfEach<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (value, x) in self.values.iter_mut().zip(self.x) {
+            *value = self.f.at(*x);
+        }
+    }
+}

@@ -32,7 +32,7 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::geometry::{BodySampler, FaceChoice};
-use crate::optics::bssrdf::{Entry, Model};
+use crate::optics::bssrdf::Model;
 use crate::sampling::stream::{PassKey, Stream};
 use crate::sampling::thinning::{Accepted, ThinningForm, ThinningRule, ThinningWork, scan};
 use crate::scene::Scene;
@@ -281,25 +281,65 @@ impl CloudSum<'_> {
         let lights = bssrdf.scene.lights.len();
         let mut sums = vec![0.0; bands.len() * lights];
         let mut work = ThinningWork::default();
-        let add = |accepted: Accepted| {
-            let place = accepted.index;
-            let entry: Entry = cloud.entry(place, emergence.eta);
-            let sums = sums.iter_mut().skip(cloud.light(place)).step_by(lights);
-            for (sum, &band) in sums.zip(bands) {
-                let kernel = models[band].kernel(&entry, &emergence.exit);
-                *sum += kernel * cloud.flux(place, band) * accepted.weight;
+        let mut batch = Batch::none();
+        let mut add = |batch: &mut Batch| {
+            let Batch { count, places, distances, weights } = &*batch;
+            let (count, mut kernels) = (*count, [0.0; BATCH]);
+            for (k, &band) in bands.iter().enumerate() {
+                let (model, kernels) = (&models[band], &mut kernels[..count]);
+                if model.needs_directions() {
+                    for (kernel, &place) in kernels.iter_mut().zip(places) {
+                        *kernel = model.kernel(&cloud.entry(place, emergence.eta), &emergence.exit);
+                    }
+                } else {
+                    model.kernels(&distances[..count], kernels);
+                }
+                for ((kernel, &place), weight) in kernels.iter().zip(places).zip(weights) {
+                    sums[k * lights + cloud.light(place)] += kernel * cloud.flux(place, band) * weight;
+                }
+            }
+            batch.count = 0;
+        };
+        let accept = |accepted: Accepted| {
+            batch.push(accepted);
+            if batch.count == BATCH {
+                add(&mut batch);
             }
         };
         match search {
-            Search::Hierarchy => cloud.tree.thin(at, rule, stream, &mut work, add),
-            Search::Scan => scan(cloud.tree.axes(), 0..cloud.len(), at, rule, stream, &mut work, add),
+            Search::Hierarchy => cloud.tree.thin(at, rule, stream, &mut work, accept),
+            Search::Scan => scan(cloud.tree.axes(), 0..cloud.len(), at, rule, stream, &mut work, accept),
         }
+        add(&mut batch);
         count(scores, search, &work, bands.len());
         for (k, sum) in sums.into_iter().enumerate() {
             let (band, light) = (bands[k / lights], k % lights);
             let value = emergence.throughput_of(band) * sum;
             scores.add(emergence.slot, band, TransportClass::Multiple, light, value);
         }
+    }
+}
+
+/// Accepted points whose kernels are evaluated together.
+struct Batch {
+    count: usize,
+    places: [usize; BATCH],
+    distances: [f64; BATCH],
+    weights: [f64; BATCH],
+}
+
+const BATCH: usize = 128;
+
+impl Batch {
+    fn none() -> Batch {
+        Batch { count: 0, places: [0; BATCH], distances: [0.0; BATCH], weights: [0.0; BATCH] }
+    }
+
+    #[inline]
+    fn push(&mut self, Accepted { index, distance, weight }: Accepted) {
+        let at = self.count;
+        (self.places[at], self.distances[at], self.weights[at]) = (index, distance, weight);
+        self.count += 1;
     }
 }
 

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 use super::moments::FresnelMoments;
 use super::reduced::Reduced;
-use crate::math::exp;
+use crate::math::{Lanewise, NEAR, exp, exp_near, of_each};
 use crate::sampling::radial::Dipole;
 
 /// The classical dipole's profile.
@@ -39,6 +39,22 @@ impl Classical {
     /// Exitance R(r) per unit flux, 1/mm^2.
     #[inline]
     pub fn exitance(&self, r: f64) -> f64 {
+        self.exitance_by(exp, r)
+    }
+
+    /// The same of many distances.
+    pub(super) fn exitances(&self, r: &[f64], values: &mut [f64]) {
+        let farthest = r.iter().copied().fold(0.0, f64::max);
+        let Dipole { sigma_tr, z_real, z_virtual } = self.shape;
+        if sigma_tr * (farthest + z_real.max(z_virtual)) < NEAR {
+            of_each(self, r, values);
+        } else {
+            values.iter_mut().zip(r).for_each(|(value, r)| *value = self.exitance(*r));
+        }
+    }
+
+    #[inline(always)]
+    fn exitance_by(&self, exp: impl Fn(f64) -> f64, r: f64) -> f64 {
         let s = self.shape.sigma_tr;
         let source = |z: f64| {
             let square = r * r + z * z;
@@ -56,5 +72,13 @@ impl Classical {
     /// The dipole of the real and the virtual source.
     pub fn shape(&self) -> Dipole {
         self.shape
+    }
+}
+
+/// Where no exponent reaches [`NEAR`].
+impl Lanewise for Classical {
+    #[inline(always)]
+    fn at(&self, r: f64) -> f64 {
+        self.exitance_by(exp_near, r)
     }
 }

@@ -362,6 +362,15 @@ impl Bssrdf {
         }
     }
 
+    /// The kernels of many distances between the ends, if they depend on nothing else: the bits of [`Self::kernel`].
+    pub fn kernels(&self, distances: &[f64], values: &mut [f64]) {
+        let Kernel::Radial { profile, scale } = &self.kernel else {
+            unreachable!("a kernel that needs directions")
+        };
+        profile.exitances(distances, values);
+        values.iter_mut().for_each(|value| *value *= scale);
+    }
+
     /// Whether the kernel depends on the directions at the entry, beside distance.
     pub fn needs_directions(&self) -> bool {
         match &self.kernel {
@@ -403,6 +412,14 @@ impl RadialProfile {
             RadialProfile::Better(better) => better.exitance(r),
             RadialProfile::Normalized(normalized) => normalized.exitance(r),
             RadialProfile::Gaussians(gaussians) => gaussians.exitance(r),
+        }
+    }
+
+    fn exitances(&self, r: &[f64], values: &mut [f64]) {
+        match self {
+            RadialProfile::Classical(classical) => classical.exitances(r, values),
+            RadialProfile::Normalized(normalized) => normalized.exitances(r, values),
+            _ => values.iter_mut().zip(r).for_each(|(value, r)| *value = self.exitance(*r)),
         }
     }
 

@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::math::exp;
+use crate::math::{Lanewise, NEAR, exp, exp_near, of_each};
 
 /// Published fit that scales the profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -74,6 +74,20 @@ impl Normalized {
     /// Exitance R(r) per unit flux, 1/mm^2.
     #[inline]
     pub fn exitance(&self, r: f64) -> f64 {
+        self.exitance_by(exp, r)
+    }
+
+    /// The same of many distances.
+    pub(super) fn exitances(&self, r: &[f64], values: &mut [f64]) {
+        if r.iter().copied().fold(0.0, f64::max) < 3.0 * self.d * NEAR {
+            of_each(self, r, values);
+        } else {
+            values.iter_mut().zip(r).for_each(|(value, r)| *value = self.exitance(*r));
+        }
+    }
+
+    #[inline(always)]
+    fn exitance_by(&self, exp: impl Fn(f64) -> f64, r: f64) -> f64 {
         let slow = exp(-r / (3.0 * self.d));
         self.strength * (slow * slow * slow + slow) / r
     }
@@ -86,5 +100,13 @@ impl Normalized {
     /// l / s, mm: the shorter of its two exponential lengths.
     pub fn d(&self) -> f64 {
         self.d
+    }
+}
+
+/// Where no exponent reaches [`NEAR`].
+impl Lanewise for Normalized {
+    #[inline(always)]
+    fn at(&self, r: f64) -> f64 {
+        self.exitance_by(exp_near, r)
     }
 }

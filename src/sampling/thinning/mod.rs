@@ -22,7 +22,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::stream::Stream;
-use crate::math::exp;
+use crate::math::{Lanewise, NEAR, exp, exp_near, of_each};
 
 /// The probability of acceptance by distance (mm), with bounds for cheap decisions.
 #[derive(Clone, Debug, PartialEq)]
@@ -120,6 +120,45 @@ impl ThinningForm {
                 values[k] + share.clamp(0.0, 1.0) * (values[k + 1] - values[k])
             }
         }
+    }
+
+    /// [`Self::probability`] of many distances, the same bits.
+    fn probabilities(&self, distances: &[f64], values: &mut [f64]) {
+        let farthest = distances.iter().copied().fold(0.0, f64::max);
+        match self {
+            ThinningForm::Exponential { sigma } if sigma * farthest < NEAR => {
+                of_each(&Exponential { sigma: *sigma }, distances, values);
+            }
+            ThinningForm::Floor { sigma, least } if sigma * farthest < NEAR => {
+                of_each(&Exponential { sigma: *sigma }, distances, values);
+                values.iter_mut().for_each(|value| *value = value.max(*least));
+            }
+            ThinningForm::MeanOfExponentials { sigmas }
+                if sigmas.iter().all(|sigma| sigma * farthest < NEAR) =>
+            {
+                let mut terms = [0.0; BATCH];
+                let terms = &mut terms[..distances.len()];
+                values.fill(0.0);
+                for sigma in sigmas {
+                    of_each(&Exponential { sigma: *sigma }, distances, terms);
+                    values.iter_mut().zip(&*terms).for_each(|(value, term)| *value += term);
+                }
+                values.iter_mut().for_each(|value| *value /= sigmas.len() as f64);
+            }
+            _ => values.iter_mut().zip(distances).for_each(|(value, d)| *value = self.probability(*d)),
+        }
+    }
+}
+
+/// e^(-sigma d) where the exponent stays below [`NEAR`].
+struct Exponential {
+    sigma: f64,
+}
+
+impl Lanewise for Exponential {
+    #[inline(always)]
+    fn at(&self, d: f64) -> f64 {
+        exp_near(-self.sigma * d)
     }
 }
 
@@ -221,15 +260,67 @@ pub struct ThinningWork {
     pub accepted: u64,
 }
 
-/// Decides about the point at squared distance `squared`.
-#[inline]
-fn decide(rule: &ThinningRule, u: f64, squared: f64) -> Option<(f64, f64)> {
-    if !rule.may_accept(u, squared) {
-        return None;
+/// Candidates that are decided about together, at most.
+const BATCH: usize = 128;
+
+/// Points that wait for a decision, each with its number and squared distance: their exponentials are evaluated together.
+struct Candidates {
+    count: usize,
+    indices: [usize; BATCH],
+    numbers: [f64; BATCH],
+    /// Squared at first.
+    distances: [f64; BATCH],
+    probabilities: [f64; BATCH],
+}
+
+impl Candidates {
+    fn none() -> Candidates {
+        Candidates {
+            count: 0,
+            indices: [0; BATCH],
+            numbers: [0.0; BATCH],
+            distances: [0.0; BATCH],
+            probabilities: [0.0; BATCH],
+        }
     }
-    let distance = squared.sqrt();
-    let p = rule.probability(distance);
-    (u < p).then(|| (distance, 1.0 / p))
+
+    /// Adds a point at a squared distance, unless its number decides without an exponential that it is not accepted.
+    #[inline]
+    fn add(&mut self, rule: &ThinningRule, index: usize, number: f64, squared: f64) {
+        if rule.may_accept(number, squared) {
+            let at = self.count;
+            (self.indices[at], self.numbers[at], self.distances[at]) = (index, number, squared);
+            self.count += 1;
+        }
+    }
+
+    /// Whether there is room for no more.
+    #[inline]
+    fn is_full(&self) -> bool {
+        self.count == BATCH
+    }
+
+    /// Accepts points in their order, and forgets all.
+    fn decide(
+        &mut self,
+        rule: &ThinningRule,
+        work: &mut ThinningWork,
+        accept: &mut impl FnMut(Accepted),
+    ) {
+        let count = self.count;
+        let (distances, probabilities) =
+            (&mut self.distances[..count], &mut self.probabilities[..count]);
+        distances.iter_mut().for_each(|squared| *squared = squared.sqrt());
+        rule.form.probabilities(distances, probabilities);
+        for at in 0..count {
+            let p = probabilities[at];
+            if self.numbers[at] < p {
+                accept(Accepted { index: self.indices[at], distance: distances[at], weight: 1.0 / p });
+                work.accepted += 1;
+            }
+        }
+        self.count = 0;
+    }
 }
 
 impl Stream {

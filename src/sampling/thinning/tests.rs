@@ -37,6 +37,34 @@ fn sphere(count: usize, r: f64) -> Vec<DVec3> {
         .collect()
 }
 
+/// Distance and weight of one point, if its number accepts it.
+fn decide(rule: &ThinningRule, u: f64, squared: f64) -> Option<(f64, f64)> {
+    let mut candidates = Candidates::none();
+    candidates.add(rule, 0, u, squared);
+    let mut outcome = None;
+    let mut accept = |accepted: Accepted| outcome = Some((accepted.distance, accepted.weight));
+    candidates.decide(rule, &mut ThinningWork::default(), &mut accept);
+    outcome
+}
+
+/// Probabilities that are evaluated together have the bits of those evaluated one by one, also where they underflow.
+#[test]
+fn probabilities_together_as_one_by_one() {
+    for (name, rule) in rules() {
+        for reach in [1.0, 30.0, 1000.0, 4000.0] {
+            for count in [1, 3, 64, BATCH] {
+                let distances: Vec<f64> =
+                    (0..count).map(|k| reach * (k + 1) as f64 / count as f64).collect();
+                let mut together = vec![0.0; count];
+                rule.form.probabilities(&distances, &mut together);
+                for (p, &d) in together.iter().zip(&distances) {
+                    assert_eq!(p.to_bits(), rule.probability(d).to_bits(), "{name} at {d}");
+                }
+            }
+        }
+    }
+}
+
 /// The decision is u < p, wherever u is: the cheap answer never rejects what p accepts.
 #[test]
 fn decisions_by_enumeration() {

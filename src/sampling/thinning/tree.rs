@@ -20,7 +20,7 @@
 
 use std::ops::Range;
 
-use super::{Accepted, ThinningRule, ThinningWork, decide};
+use super::{Accepted, Candidates, ThinningRule, ThinningWork};
 use crate::math::{DVec3, ln_1p};
 use crate::sampling::stream::Stream;
 
@@ -119,6 +119,7 @@ impl PointTree {
     ) {
         let mut stack = [0u32; 128]; // a Morton code halves at most 63 times, equal codes 32 times more
         let mut height = usize::from(!self.nodes.is_empty());
+        let candidates = &mut Candidates::none();
         while height > 0 {
             height -= 1;
             let index = stack[height];
@@ -133,7 +134,8 @@ impl PointTree {
                 height += 2;
                 continue;
             }
-            let mut query = Query { tree: self, at, rule, stream: &mut *stream, work: &mut *work };
+            let (stream, work) = (&mut *stream, &mut *work);
+            let mut query = Query { tree: self, at, rule, stream, work, candidates };
             let range = node.first as usize..node.end as usize;
             if most > LIKELY {
                 query.by_words(range, most, &mut accept);
@@ -141,6 +143,7 @@ impl PointTree {
                 query.by_gaps(range, most, &mut accept);
             }
         }
+        candidates.decide(rule, work, &mut accept);
     }
 }
 
@@ -150,6 +153,7 @@ struct Query<'a> {
     rule: &'a ThinningRule,
     stream: &'a mut Stream,
     work: &'a mut ThinningWork,
+    candidates: &'a mut Candidates,
 }
 
 impl Query<'_> {
@@ -203,14 +207,14 @@ impl Query<'_> {
         word
     }
 
-    /// Accepts a candidate that was drawn at rate `rate`.
+    /// Adds a candidate that was drawn at rate `rate`, and decides about all where there is room for no more.
     #[inline]
     fn ask(&mut self, index: usize, rate: f64, accept: &mut impl FnMut(Accepted)) {
         self.work.candidates += 1;
         let squared = (self.tree.point(index) - self.at).length_squared();
-        if let Some((distance, weight)) = decide(self.rule, rate * self.stream.draw_fine(), squared) {
-            accept(Accepted { index, distance, weight });
-            self.work.accepted += 1;
+        self.candidates.add(self.rule, index, rate * self.stream.draw_fine(), squared);
+        if self.candidates.is_full() {
+            self.candidates.decide(self.rule, self.work, accept);
         }
     }
 }

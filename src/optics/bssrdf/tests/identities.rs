@@ -145,6 +145,28 @@ fn reciprocity() {
     }
 }
 
+/// Kernels of many distances have the bits of those of one, also where the exponentials underflow.
+#[test]
+fn kernels_together_as_one_by_one() {
+    for medium in media() {
+        for model in all().iter().filter(|model| **model != DIRECTIONAL) {
+            let bssrdf = of(model, &medium, 1.3);
+            for reach in [1.0, 100.0, 2000.0].map(|reach| reach / bssrdf.sigma_tr) {
+                // Along an axis, where the distance is that number.
+                let distances: Vec<f64> = (1..=67).map(|k| reach * f64::from(k) / 67.0).collect();
+                let mut together = vec![0.0; distances.len()];
+                bssrdf.kernels(&distances, &mut together);
+                let entry = Entry { point: DVec3::ZERO, normal: DVec3::Z, dir: -DVec3::Z };
+                for (kernel, &r) in together.iter().zip(&distances) {
+                    let exit = Exit { point: DVec3::new(r, 0.0, 0.0), normal: DVec3::Z };
+                    let one = bssrdf.kernel(&entry, &exit);
+                    assert_eq!(kernel.to_bits(), one.to_bits(), "{model:?} at {r}");
+                }
+            }
+        }
+    }
+}
+
 /// The hemispherical exitance under T21: R for the normalised, less by 2 C1(1/eta) for the plain
 /// classical dipole.
 #[test]
