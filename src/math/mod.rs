@@ -16,7 +16,6 @@ macro_rules! portable {
 
 portable! {
     exp_m1 = expm1: "e^x - 1, accurate near 0.";
-    ln = log: "Natural logarithm.";
     ln_1p = log1p: "ln(1 + x), accurate near 0.";
     log2 = log2: "Logarithm to base 2.";
     log10 = log10: "Logarithm to base 10.";
@@ -45,6 +44,7 @@ pub fn fma(x: f64, y: f64, z: f64) -> f64 {
 mod exponential;
 mod frame;
 mod inverse;
+mod logarithm;
 mod quadrature;
 mod turns;
 mod vectors;
@@ -53,6 +53,7 @@ pub use exponential::exp;
 pub(crate) use exponential::{NEAR, exp_near};
 pub use frame::{Frame, renormalized};
 pub use inverse::{bracketed_root, erf_inv, increasing_root, lambert_excess};
+pub use logarithm::ln;
 pub use quadrature::{Integral, gauss_kronrod, integrate};
 pub use turns::sin_cos_turns;
 pub(crate) use vectors::{Lanewise, Vectorized, of_each, vectorized};
