@@ -8,8 +8,11 @@
 //! results are the same to the bit, with its error below 1 ulp; only k and 2^k are found without conversions between integers
 //! and floats.
 
-const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
-const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+use super::turns::ROUND;
+
+/// ln 2 in two parts; a multiple of the first by k is exact.
+pub(super) const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
+pub(super) const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 const INV_LN2: f64 = std::f64::consts::LOG2_E;
 const P: [f64; 5] = [
     1.666_666_666_666_660_2e-1,
@@ -18,9 +21,6 @@ const P: [f64; 5] = [
     -1.653_390_220_546_525_2e-6,
     4.138_136_797_057_238_5e-8,
 ];
-
-/// 1.5 * 2^52: a sum with it is rounded to a whole number, which its last bits hold.
-const ROUND: f64 = 6_755_399_441_055_744.0;
 
 /// See [`exp_near`].
 pub(crate) const NEAR: f64 = 708.0;
@@ -68,54 +68,35 @@ pub(crate) fn exp_near(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn assert_same(x: f64) {
-        let (own, expected) = (exp(x), libm::exp(x));
-        assert!(own.to_bits() == expected.to_bits() || x.is_nan(), "{x:e}: {own:e}, {expected:e}");
-        assert_eq!(own.is_nan(), x.is_nan());
-    }
+    use crate::math::bits::{around, assert_same, scattered};
 
     /// At both sides of every change of method, of every change of k, and at numbers of every size.
     #[test]
     fn bits_are_those_of_libm() {
-        let around = |x: f64| {
-            [x, -x].iter().for_each(|&x| {
-                let (mut up, mut down) = (x, x);
-                for _ in 0..200 {
-                    assert_same(up);
-                    assert_same(down);
-                    (up, down) = (up.next_up(), down.next_down());
-                }
-            });
-        };
+        let same = |x: f64| assert_same(exp, libm::exp, x);
+        let both = |x: f64| [x, -x].iter().for_each(|&x| around(x, same));
         for high in [FAR, HALF_LN2, TINY, 0x3ff0_a2b2, 0x3fd6_2e43, 0x3e30_0001] {
-            around(f64::from_bits(u64::from(high) << 32));
+            both(f64::from_bits(u64::from(high) << 32));
         }
         for x in
             [0.0, f64::MIN_POSITIVE, 708.396_418_532_264_1, 709.782_712_893_384, 745.133_219_101_941_1]
         {
-            around(x);
+            both(x);
         }
         for k in 0..1024 {
-            around((f64::from(k) + 0.5) * std::f64::consts::LN_2);
-            around(f64::from(k) * std::f64::consts::LN_2);
+            both((f64::from(k) + 0.5) * std::f64::consts::LN_2);
+            both(f64::from(k) * std::f64::consts::LN_2);
         }
-        for x in [f64::INFINITY, f64::NEG_INFINITY, f64::NAN, f64::MAX, f64::MIN, -0.0] {
-            assert_same(x);
-        }
-        // The finaliser of SplitMix64 spreads the counter over all bits.
-        for k in 0..1_000_000u64 {
-            let x = k.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            let bits = x ^ (x >> 31);
-            assert_same(f64::from_bits(bits));
-            let u = (bits >> 11) as f64 / (1u64 << 53) as f64;
-            assert_same(1500.0 * (u - 0.5));
-            assert_same(4.0 * (u - 0.5));
+        [f64::INFINITY, f64::NEG_INFINITY, f64::NAN, f64::MAX, f64::MIN, -0.0]
+            .into_iter()
+            .for_each(same);
+        for (k, (bits, u)) in (0..).zip(scattered()) {
+            same(f64::from_bits(bits));
+            same(1500.0 * (u - 0.5));
+            same(4.0 * (u - 0.5));
             // Of either sign and every size from 2^-40 to 2^10.
             let exponent = 1023 - 40 + k % 50;
-            assert_same(f64::from_bits((bits & 0x800f_ffff_ffff_ffff) | (exponent << 52)));
+            same(f64::from_bits((bits & 0x800f_ffff_ffff_ffff) | (exponent << 52)));
         }
     }
 }

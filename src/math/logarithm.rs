@@ -7,8 +7,8 @@
 //! Every operation is that of the original in its order, so that the results are the same to the bit, with its error below
 //! 1 ulp.
 
-const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
-const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+use super::exponential::{LN2_HIGH, LN2_LOW};
+
 const L: [f64; 7] = [
     6.666_666_666_666_735e-1,
     3.999_999_999_940_942e-1,
@@ -56,42 +56,23 @@ fn no_normal_number(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn assert_same(x: f64) {
-        let (own, expected) = (ln(x), libm::log(x));
-        assert!(
-            own.to_bits() == expected.to_bits() || own.is_nan() && expected.is_nan(),
-            "{x:e}: {own:e}"
-        );
-    }
+    use crate::math::bits::{around, assert_same, scattered};
 
     /// Around every power of 2 and of sqrt(2), where k changes, at the ends of the range, and at numbers of every size.
     #[test]
     fn bits_are_those_of_libms_logarithm() {
-        let around = |x: f64| {
-            let (mut up, mut down) = (x, x);
-            for _ in 0..200 {
-                assert_same(up);
-                assert_same(down);
-                (up, down) = (up.next_up(), down.next_down());
-            }
-        };
+        let same = |x: f64| assert_same(ln, libm::log, x);
         for k in 1..2047u64 {
-            around(f64::from_bits(k << 52));
-            around(f64::from_bits(k << 52) * std::f64::consts::SQRT_2);
+            around(f64::from_bits(k << 52), same);
+            around(f64::from_bits(k << 52) * std::f64::consts::SQRT_2, same);
         }
-        for x in [0.0, -0.0, 1.0, -1.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, f64::MAX] {
-            assert_same(x);
-        }
-        // The finaliser of SplitMix64 spreads the counter over all bits.
-        for k in 0..1_000_000u64 {
-            let x = k.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            let bits = x ^ (x >> 31);
-            assert_same(f64::from_bits(bits));
-            assert_same((bits >> 11) as f64 / (1u64 << 53) as f64);
-            assert_same(1.0 + ((bits >> 11) as f64 / (1u64 << 53) as f64 - 0.5) * 1e-3);
+        [0.0, -0.0, 1.0, -1.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, f64::MAX]
+            .into_iter()
+            .for_each(same);
+        for (bits, u) in scattered() {
+            same(f64::from_bits(bits));
+            same(u);
+            same(1.0 + (u - 0.5) * 1e-3);
         }
     }
 }

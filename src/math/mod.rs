@@ -41,6 +41,8 @@ pub fn fma(x: f64, y: f64, z: f64) -> f64 {
     libm::fma(x, y, z)
 }
 
+#[cfg(test)]
+mod bits;
 mod exponential;
 mod frame;
 mod inverse;

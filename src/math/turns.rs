@@ -4,7 +4,7 @@
 //! Taylor sums below are truncated after r^17 and r^16: the first terms left out, r^19/19! and r^18/18!,
 //! are below 2.1e-18. No table, no branch except the quadrant; absolute error below 2.3e-16 (tested).
 
-/// `(sin 2 pi u, cos 2 pi u)` for |u| < 2^50.
+/// `(sin 2 pi u, cos 2 pi u)` for |u| < 2^49: beyond, the sum of 4u and ROUND is no longer rounded to a whole number.
 #[inline(always)]
 pub fn sin_cos_turns(u: f64) -> (f64, f64) {
     let quarter = 4.0 * u;
@@ -34,7 +34,7 @@ fn horner(x: f64, coefficients: &[f64; 9]) -> f64 {
 
 /// 1.5 * 2^52: adding and subtracting it rounds to the nearest integer, without the library call that
 /// `f64::round` is on the baseline target.
-const ROUND: f64 = 6_755_399_441_055_744.0;
+pub(super) const ROUND: f64 = 6_755_399_441_055_744.0;
 
 /// (-1)^i / (2i + 1)!
 const SIN: [f64; 9] = inverse_factorials(1);

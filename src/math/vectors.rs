@@ -11,16 +11,27 @@ pub(crate) fn vectorized<W: Vectorized>(work: W) -> W::Output {
     pulp::Arch::new().dispatch(work)
 }
 
-/// A function of one number, for [`of_each`]. `at` is `inline(always)` and without branches.
+/// A function of one number that is not negative, for [`of_each`].
 pub(crate) trait Lanewise {
-    /// Its value.
+    /// Its value anywhere.
     fn at(&self, x: f64) -> f64;
+
+    /// The same bits below [`Self::reach`]: `inline(always)` and without branches.
+    fn near(&self, x: f64) -> f64;
+
+    /// Where [`Self::near`] ends.
+    fn reach(&self) -> f64;
 }
 
 /// `values` = f(x) of each x.
 #[inline]
 pub(crate) fn of_each<F: Lanewise>(f: &F, x: &[f64], values: &mut [f64]) {
-    vectorized(OfEach { f, x, values });
+    let reach = f.reach();
+    if x.iter().all(|x| *x < reach) {
+        vectorized(OfEach { f, x, values });
+    } else {
+        values.iter_mut().zip(x).for_each(|(value, x)| *value = f.at(*x));
+    }
 }
 
 struct OfEach<'a, F> {
@@ -35,7 +46,7 @@ impl<F: Lanewise> Vectorized for OfEach<'_, F> {
     #[inline(always)]
     fn call(self) {
         for (value, x) in self.values.iter_mut().zip(self.x) {
-            *value = self.f.at(*x);
+            *value = self.f.near(*x);
         }
     }
 }

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 use super::moments::FresnelMoments;
 use super::reduced::Reduced;
-use crate::math::{Lanewise, NEAR, exp, exp_near, of_each};
+use crate::math::{Lanewise, NEAR, exp, exp_near};
 use crate::sampling::radial::Dipole;
 
 /// The classical dipole's profile.
@@ -42,17 +42,6 @@ impl Classical {
         self.exitance_by(exp, r)
     }
 
-    /// The same of many distances.
-    pub(super) fn exitances(&self, r: &[f64], values: &mut [f64]) {
-        let farthest = r.iter().copied().fold(0.0, f64::max);
-        let Dipole { sigma_tr, z_real, z_virtual } = self.shape;
-        if sigma_tr * (farthest + z_real.max(z_virtual)) < NEAR {
-            of_each(self, r, values);
-        } else {
-            values.iter_mut().zip(r).for_each(|(value, r)| *value = self.exitance(*r));
-        }
-    }
-
     #[inline(always)]
     fn exitance_by(&self, exp: impl Fn(f64) -> f64, r: f64) -> f64 {
         let s = self.shape.sigma_tr;
@@ -75,10 +64,19 @@ impl Classical {
     }
 }
 
-/// Where no exponent reaches [`NEAR`].
 impl Lanewise for Classical {
-    #[inline(always)]
     fn at(&self, r: f64) -> f64 {
+        self.exitance(r)
+    }
+
+    #[inline(always)]
+    fn near(&self, r: f64) -> f64 {
         self.exitance_by(exp_near, r)
+    }
+
+    /// d is at most r + z.
+    fn reach(&self) -> f64 {
+        let Dipole { sigma_tr, z_real, z_virtual } = self.shape;
+        NEAR / sigma_tr - z_real.max(z_virtual)
     }
 }

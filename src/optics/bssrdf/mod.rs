@@ -55,6 +55,7 @@ pub use reduced::Reduced;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::math::of_each;
 use crate::optics::medium::Medium;
 use crate::sampling::radial::Radial;
 
@@ -417,8 +418,8 @@ impl RadialProfile {
 
     fn exitances(&self, r: &[f64], values: &mut [f64]) {
         match self {
-            RadialProfile::Classical(classical) => classical.exitances(r, values),
-            RadialProfile::Normalized(normalized) => normalized.exitances(r, values),
+            RadialProfile::Classical(classical) => of_each(classical, r, values),
+            RadialProfile::Normalized(normalized) => of_each(normalized, r, values),
             _ => values.iter_mut().zip(r).for_each(|(value, r)| *value = self.exitance(*r)),
         }
     }

@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::math::{Lanewise, NEAR, exp, exp_near, of_each};
+use crate::math::{Lanewise, NEAR, exp, exp_near};
 
 /// Published fit that scales the profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -77,15 +77,6 @@ impl Normalized {
         self.exitance_by(exp, r)
     }
 
-    /// The same of many distances.
-    pub(super) fn exitances(&self, r: &[f64], values: &mut [f64]) {
-        if r.iter().copied().fold(0.0, f64::max) < 3.0 * self.d * NEAR {
-            of_each(self, r, values);
-        } else {
-            values.iter_mut().zip(r).for_each(|(value, r)| *value = self.exitance(*r));
-        }
-    }
-
     #[inline(always)]
     fn exitance_by(&self, exp: impl Fn(f64) -> f64, r: f64) -> f64 {
         let slow = exp(-r / (3.0 * self.d));
@@ -103,10 +94,17 @@ impl Normalized {
     }
 }
 
-/// Where no exponent reaches [`NEAR`].
 impl Lanewise for Normalized {
-    #[inline(always)]
     fn at(&self, r: f64) -> f64 {
+        self.exitance(r)
+    }
+
+    #[inline(always)]
+    fn near(&self, r: f64) -> f64 {
         self.exitance_by(exp_near, r)
+    }
+
+    fn reach(&self) -> f64 {
+        3.0 * self.d * NEAR
     }
 }

@@ -124,18 +124,15 @@ impl ThinningForm {
 
     /// [`Self::probability`] of many distances, the same bits.
     fn probabilities(&self, distances: &[f64], values: &mut [f64]) {
-        let farthest = distances.iter().copied().fold(0.0, f64::max);
         match self {
-            ThinningForm::Exponential { sigma } if sigma * farthest < NEAR => {
+            ThinningForm::Exponential { sigma } => {
                 of_each(&Exponential { sigma: *sigma }, distances, values);
             }
-            ThinningForm::Floor { sigma, least } if sigma * farthest < NEAR => {
+            ThinningForm::Floor { sigma, least } => {
                 of_each(&Exponential { sigma: *sigma }, distances, values);
                 values.iter_mut().for_each(|value| *value = value.max(*least));
             }
-            ThinningForm::MeanOfExponentials { sigmas }
-                if sigmas.iter().all(|sigma| sigma * farthest < NEAR) =>
-            {
+            ThinningForm::MeanOfExponentials { sigmas } => {
                 let mut terms = [0.0; BATCH];
                 let terms = &mut terms[..distances.len()];
                 values.fill(0.0);
@@ -145,20 +142,30 @@ impl ThinningForm {
                 }
                 values.iter_mut().for_each(|value| *value /= sigmas.len() as f64);
             }
-            _ => values.iter_mut().zip(distances).for_each(|(value, d)| *value = self.probability(*d)),
+            ThinningForm::All | ThinningForm::Table { .. } => {
+                values.iter_mut().zip(distances).for_each(|(value, d)| *value = self.probability(*d));
+            }
         }
     }
 }
 
-/// e^(-sigma d) where the exponent stays below [`NEAR`].
+/// e^(-sigma d).
 struct Exponential {
     sigma: f64,
 }
 
 impl Lanewise for Exponential {
-    #[inline(always)]
     fn at(&self, d: f64) -> f64 {
+        exp(-self.sigma * d)
+    }
+
+    #[inline(always)]
+    fn near(&self, d: f64) -> f64 {
         exp_near(-self.sigma * d)
+    }
+
+    fn reach(&self) -> f64 {
+        NEAR / self.sigma
     }
 }
 
