@@ -24,18 +24,22 @@ use crate::sampling::stream::Stream;
 
 /// How a walk is drawn, and the state that it keeps for it.
 pub(super) trait WalkBands: Clone {
+    /// Flights, turns and roulette are those of the medium, wherever the walk is: by [`Self::draw_flight`],
+    /// [`Self::draw_turn`] and [`Self::importance`] as they are here.
+    const IS_PLAIN: bool;
+
     /// The walk goes on inside from a boundary point with this outward normal, along `dir`.
     #[inline]
     fn enter(&mut self, _at: DVec3, _normal: DVec3, _dir: DVec3) {}
 
     /// Draws a direction for light that has arrived at a medium vertex along a ray, which ends there.
-    #[inline]
+    #[inline(always)]
     fn draw_turn(&mut self, medium: &Medium, arrival: &Ray, stream: &mut Stream) -> DVec3 {
         medium.phase.sample(arrival.dir, stream.draw2())
     }
 
     /// Draws the length of the next flight, if no boundary ends it.
-    #[inline]
+    #[inline(always)]
     fn draw_flight(&mut self, medium: &Medium, u: f64) -> f64 {
         sample_exponential(medium.sigma_t, u)
     }
@@ -124,6 +128,8 @@ pub(super) struct ScorePlace {
 pub(super) struct OneBand;
 
 impl WalkBands for OneBand {
+    const IS_PLAIN: bool = true;
+
     #[inline]
     fn flight(&mut self, _: &[Medium], _: f64, _: bool) {}
 
@@ -163,6 +169,8 @@ impl SharedBands {
 }
 
 impl WalkBands for SharedBands {
+    const IS_PLAIN: bool = true;
+
     fn flight(&mut self, media: &[Medium], t: f64, scatters: bool) {
         let hero = media[self.hero].sigma_t;
         for (band, medium) in media.iter().enumerate() {

@@ -325,7 +325,8 @@ fn assert_the_same_one_by_one<B: WalkBands>(field: &Field, bands: B) -> u64 {
     at_once.cost[Cost::MediumEvents as usize]
 }
 
-/// Flights that surely end in the medium are traced together, of plain, guided and shared walks.
+/// Flights that surely end in the medium are traced together, of plain, guided and shared walks; those of plain and shared
+/// walks are drawn ahead.
 #[test]
 fn flights_at_once_are_flights_one_by_one() {
     let sky = || vec![environment(1.0, DVec3::Z, 0.5, "half")];
@@ -346,8 +347,8 @@ fn flights_at_once_are_flights_one_by_one() {
         for (boundary, g) in
             [(Boundary::Smooth { eta: 1.3 }, 0.0), (rough, 0.7), (Boundary::Matched, 0.2)]
         {
-            // Without extinction a flight has no end.
-            let media = [medium(8.0, 0.95, g), medium(0.0, 0.95, g)];
+            // Dense, thin, and without extinction, where a flight has no end.
+            let media = [8.0, 0.5, 0.0].map(|sigma_t| medium(sigma_t, 0.95, g));
             for (roulette, medium) in ROULETTES.into_iter().flat_map(|r| media.map(|m| (r, m))) {
                 let scene = Arc::new(scene(shape.clone(), boundary, medium, sky(), off_axis()));
                 let field = Field::new(scene.clone(), roulette);

@@ -20,7 +20,6 @@ use super::bands::{ScorePlace, WalkBands};
 use super::choice::choose_light;
 use super::crossing::{other, radiance_scale};
 use super::field::Path;
-use super::flights::{Flights, Flying};
 use super::roulette::Roulette;
 use super::vertices::{Unscattered, WalkExit};
 use super::{Anomaly, Cost, History, Scores, TransportClass};
@@ -111,9 +110,6 @@ impl Rivals for Unrivalled {
         0.0
     }
 }
-
-/// Part of a body's size by which rounding may put a medium vertex outside its bounding sphere.
-const ROUNDING: f64 = 1e-9;
 
 /// How the path's current direction was drawn, as light sampling sees it.
 #[derive(Clone, Copy)]
@@ -333,16 +329,12 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             R::depart(self);
         }
         // A medium vertex takes roulette and a turn alone.
-        let is_silent = R::IS_SILENT && !self.matched() && !self.emits && self.measure.is_off();
+        if R::IS_SILENT && !self.matched() && !self.emits && self.measure.is_off() {
+            return self.fly_silently();
+        }
         loop {
-            let (t, end) = if is_silent {
-                let t = self.fly_clear()?;
-                (t, self.scene.shape.end_of_unclear(&self.ray, self.from, t))
-            } else {
-                let t = self.flight();
-                (t, self.end_of_flight(t))
-            };
-            match end {
+            let t = self.flight();
+            match self.end_of_flight(t) {
                 Some(hit) => {
                     let drawn_before = self.bands.density();
                     self.bands.flight(&self.scene.medium, hit.t, false);
@@ -364,24 +356,6 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                 None => self.scatter(t)?,
             }
         }
-    }
-
-    /// The length of the first flight that may reach the boundary, after those that certainly do not; `None` where the
-    /// path ends.
-    fn fly_clear(&mut self) -> Option<f64> {
-        let flying = Flying {
-            ray: &mut self.ray,
-            stream: &mut self.stream,
-            weights: [&mut self.throughput, &mut self.survival],
-            bands: &mut self.bands,
-        };
-        let Flights { vertices, next } =
-            flying.fly(self.scene, &self.medium, self.roulette, self.scores);
-        if vertices > 0 {
-            (self.from, self.unscattered) = (None, Unscattered::No);
-            self.history.scatter_often(vertices);
-        }
-        next
     }
 
     /// The length of the next flight in the medium, if no boundary ends it.
@@ -426,10 +400,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         self.ray.origin = self.ray.at(t);
         self.from = None;
         self.unscattered = Unscattered::No;
-        if let Some(bounds) = self.bounds
-            && (self.ray.origin - bounds.center).length_squared()
-                > bounds.radius * bounds.radius * (1.0 + ROUNDING)
-        {
+        if flights::is_lost(self.bounds, self.ray.origin) {
             self.scores.note(Anomaly::LostRay);
             return None;
         }
@@ -663,6 +634,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     }
 }
 
+#[path = "walk_flights.rs"]
+mod flights;
 #[path = "walk_lights.rs"]
 mod lights;
 

@@ -168,6 +168,8 @@ struct Lesson<'a> {
 }
 
 impl WalkBands for Lesson<'_> {
+    const IS_PLAIN: bool = false;
+
     fn enter(&mut self, at: DVec3, normal: DVec3, dir: DVec3) {
         self.walk.enter(at, normal, dir);
     }

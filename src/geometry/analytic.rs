@@ -1,15 +1,28 @@
 //! Half-space, slab, box and sphere in exact f64: no epsilon, every hit put back onto its surface.
+//!
+//! What most rays ask is inlined by force: a hit that a call returns is copied through memory, which took longer than its
+//! computation.
 
 use super::{FaceId, Hit, Ray, Side};
 use crate::math::DVec3;
 
+/// Where a query looks for a crossing, beside its ray: as [`super::Shape::intersect`] has it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Range {
+    pub side: Side,
+    pub from: Option<FaceId>,
+    pub t_max: f64,
+}
+
 /// A crossing of an unshaded surface.
+#[inline(always)]
 fn hit(t: f64, point: DVec3, normal: DVec3, face: u32) -> Option<Hit> {
     Some(Hit { t, point, normal, shading_normal: normal, face: FaceId(face) })
 }
 
 /// A ray inside a convex shape must leave it. Where rounding has put its origin on or a last digit
 /// beyond the surface, the crossing lies at `t <= 0`: it leaves at once.
+#[inline(always)]
 fn at_once_if_behind(t: f64) -> f64 {
     t.max(f64::MIN_POSITIVE)
 }
@@ -20,29 +33,23 @@ fn to_plane(plane: f64, o: f64, d: f64) -> f64 {
 }
 
 /// Crossing of the half-space z < 0.
-pub(super) fn half_space(ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
-    horizontal_plane(0.0, 1.0, 0, ray, side, from)
+pub(super) fn half_space(ray: &Ray, range: Range) -> Option<Hit> {
+    horizontal_plane(0.0, 1.0, 0, ray, range)
 }
 
 /// Crossing of the slab -thickness < z < 0: each side of it is left through one plane only, chosen
 /// by the sign of `dir.z`.
-pub(super) fn slab(thickness: f64, ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
+pub(super) fn slab(thickness: f64, ray: &Ray, range: Range) -> Option<Hit> {
     let upwards = ray.dir.z > 0.0;
-    match (side, upwards) {
-        (Side::Inside, true) | (Side::Outside, false) => horizontal_plane(0.0, 1.0, 0, ray, side, from),
-        _ => horizontal_plane(-thickness, -1.0, 1, ray, side, from),
+    match (range.side, upwards) {
+        (Side::Inside, true) | (Side::Outside, false) => horizontal_plane(0.0, 1.0, 0, ray, range),
+        _ => horizontal_plane(-thickness, -1.0, 1, ray, range),
     }
 }
 
 /// The plane z = `z` with the outward normal (0, 0, `up`).
-fn horizontal_plane(
-    z: f64,
-    up: f64,
-    face: u32,
-    ray: &Ray,
-    side: Side,
-    from: Option<FaceId>,
-) -> Option<Hit> {
+fn horizontal_plane(z: f64, up: f64, face: u32, ray: &Ray, range: Range) -> Option<Hit> {
+    let Range { side, from, t_max } = range;
     let outward = ray.dir.z * up;
     let t = match side {
         _ if from == Some(FaceId(face)) => return None,
@@ -51,14 +58,15 @@ fn horizontal_plane(
         _ => return None,
     };
     let point = ray.at(t).with_z(z);
-    if t > 0.0 { hit(t, point, DVec3::new(0.0, 0.0, up), face) } else { None }
+    if t > 0.0 && t <= t_max { hit(t, point, DVec3::new(0.0, 0.0, up), face) } else { None }
 }
 
 /// Crossing of the box |x| < half.x, |y| < half.y, |z| < half.z.
 ///
 /// Per axis the ray is within the two planes for t in [near, far]; it is in the box for t in
 /// [max near, min far]. Inside, the crossing is the smallest `far`; outside, the largest `near`.
-pub(super) fn cuboid(half: DVec3, ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
+pub(super) fn cuboid(half: DVec3, ray: &Ray, range: Range) -> Option<Hit> {
+    let Range { side, from, t_max } = range;
     let (mut enter, mut leave) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
     for axis in 0..3 {
         let (h, o, d) = (half[axis], ray.origin[axis], ray.dir[axis]);
@@ -83,7 +91,7 @@ pub(super) fn cuboid(half: DVec3, ray: &Ray, side: Side, from: Option<FaceId>) -
         Side::Outside if enter.0 > 0.0 && enter.0 <= leave.0 => enter,
         Side::Outside => return None,
     };
-    if t == f64::INFINITY || from == Some(FaceId(face)) {
+    if t == f64::INFINITY || t > t_max || from == Some(FaceId(face)) {
         return None;
     }
     let (axis, sign) = ((face / 2) as usize, if face % 2 == 1 { 1.0 } else { -1.0 });
@@ -105,7 +113,9 @@ pub(super) fn cuboid(half: DVec3, ray: &Ray, side: Side, from: Option<FaceId>) -
 /// - of the two roots the one whose terms add is computed, the other one is c divided by it.
 ///
 /// From a point on the surface c = 0, and the roots are 0 (where the ray starts) and -2 b.
-pub(super) fn sphere(radius: f64, ray: &Ray, side: Side, from: Option<FaceId>) -> Option<Hit> {
+#[inline(always)]
+pub(super) fn sphere(radius: f64, ray: &Ray, range: Range) -> Option<Hit> {
+    let Range { side, from, t_max } = range;
     let b = ray.origin.dot(ray.dir);
     let t = match (side, from) {
         (Side::Inside, Some(_)) => at_once_if_behind(-2.0 * b),
@@ -125,7 +135,7 @@ pub(super) fn sphere(radius: f64, ray: &Ray, side: Side, from: Option<FaceId>) -
             }
         }
     };
-    if t <= 0.0 {
+    if t <= 0.0 || t > t_max {
         return None;
     }
     let normal = ray.at(t).normalize();
@@ -137,6 +147,11 @@ mod tests {
     use super::super::testing::{Uniform, direction, inward};
     use super::super::{Ray, Shape, Side};
     use super::*;
+
+    /// However far.
+    fn all(side: Side, from: Option<FaceId>) -> Range {
+        Range { side, from, t_max: f64::INFINITY }
+    }
 
     const RAYS: usize = 200_000;
 
@@ -226,21 +241,21 @@ mod tests {
         // 1e-12 below the pole and tangential: the chord's half-length is sqrt(2 r h - h^2).
         let (radius, depth) = (1.0, 1.0 - (1.0 - 1e-12f64));
         let ray = Ray { origin: DVec3::new(0.0, 0.0, radius - depth), dir: DVec3::X };
-        let hit = sphere(radius, &ray, Side::Inside, None).expect("inside");
+        let hit = sphere(radius, &ray, all(Side::Inside, None)).expect("inside");
         let expected = (depth * (2.0 * radius - depth)).sqrt();
         assert!((hit.t / expected - 1.0).abs() < 1e-15, "{} {expected}", hit.t);
         // Straight out from the same depth: t is the depth itself.
         let out = Ray { origin: ray.origin, dir: DVec3::Z };
-        assert_eq!(sphere(radius, &out, Side::Inside, None).expect("inside").t, depth);
+        assert_eq!(sphere(radius, &out, all(Side::Inside, None)).expect("inside").t, depth);
         // Just beside it.
         let beside = Ray { origin: DVec3::new(-5.0, 0.0, radius * (1.0 + 1e-15)), dir: DVec3::X };
-        assert!(sphere(radius, &beside, Side::Outside, None).is_none());
+        assert!(sphere(radius, &beside, all(Side::Outside, None)).is_none());
     }
 
     #[test]
     fn other_root_from_the_surface_is_exact() {
         let ray = Ray { origin: DVec3::new(0.0, 0.0, 2.0), dir: DVec3::new(0.6, 0.0, -0.8) };
-        let hit = sphere(2.0, &ray, Side::Inside, Some(FaceId(0))).expect("inside");
+        let hit = sphere(2.0, &ray, all(Side::Inside, Some(FaceId(0)))).expect("inside");
         assert_eq!(hit.t, 3.2);
     }
 
@@ -250,16 +265,16 @@ mod tests {
         for face in 0..6u32 {
             let mut dir = DVec3::ZERO;
             dir[face as usize / 2] = if face % 2 == 1 { 1.0 } else { -1.0 };
-            let inside = cuboid(half, &Ray { origin: DVec3::ZERO, dir }, Side::Inside, None);
+            let inside = cuboid(half, &Ray { origin: DVec3::ZERO, dir }, all(Side::Inside, None));
             let hit = inside.expect("leaves");
             assert_eq!((hit.face, hit.normal, hit.point), (FaceId(face), dir, dir * half));
             let back = Ray { origin: dir * 10.0, dir: -dir };
-            let entry = cuboid(half, &back, Side::Outside, None).expect("enters");
+            let entry = cuboid(half, &back, all(Side::Outside, None)).expect("enters");
             assert_eq!((entry.face, entry.point), (FaceId(face), dir * half));
         }
         // Along a face's plane, and beside it.
         let slide = Ray { origin: DVec3::new(-5.0, 2.0, 0.0), dir: DVec3::X };
-        assert!(cuboid(half, &slide, Side::Outside, None).is_none());
+        assert!(cuboid(half, &slide, all(Side::Outside, None)).is_none());
     }
 
     #[test]
@@ -283,7 +298,7 @@ mod tests {
         let half = DVec3::ONE;
         let dir = DVec3::new(-0.6, 0.8, 0.0);
         let ray = Ray { origin: DVec3::new(1.0, 1.0, 0.0), dir };
-        let hit = cuboid(half, &ray, Side::Inside, Some(FaceId(1))).expect("leaves");
+        let hit = cuboid(half, &ray, all(Side::Inside, Some(FaceId(1)))).expect("leaves");
         assert_eq!((hit.face, hit.t), (FaceId(3), f64::MIN_POSITIVE));
     }
 

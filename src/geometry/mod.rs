@@ -152,14 +152,14 @@ impl Shape {
     /// where rounding has put the origin a last digit beyond a half-space, slab, box or sphere, a
     /// ray inside leaves at once (`t` is the smallest positive number).
     pub fn intersect(&self, ray: &Ray, side: Side, from: Option<FaceId>, t_max: f64) -> Option<Hit> {
-        let hit = match *self {
-            Shape::HalfSpace => analytic::half_space(ray, side, from),
-            Shape::Slab { thickness } => analytic::slab(thickness, ray, side, from),
-            Shape::Box { half } => analytic::cuboid(half, ray, side, from),
-            Shape::Sphere { radius } => analytic::sphere(radius, ray, side, from),
-            Shape::Mesh(ref mesh) => return mesh.intersect(ray, side, from, t_max),
-        };
-        hit.filter(|hit| hit.t <= t_max)
+        let range = analytic::Range { side, from, t_max };
+        match *self {
+            Shape::HalfSpace => analytic::half_space(ray, range),
+            Shape::Slab { thickness } => analytic::slab(thickness, ray, range),
+            Shape::Box { half } => analytic::cuboid(half, ray, range),
+            Shape::Sphere { radius } => analytic::sphere(radius, ray, range),
+            Shape::Mesh(ref mesh) => mesh.intersect(ray, side, from, t_max),
+        }
     }
 
     /// What [`Self::intersect`] finds for a flight of length `t` inside the body.

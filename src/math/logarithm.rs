@@ -21,6 +21,8 @@ const L: [f64; 7] = [
 
 /// The bits of the least normal number.
 const LEAST: u64 = 1 << 52;
+/// 2^52: the numbers from here to twice this are whole.
+const TWO_52: f64 = 4_503_599_627_370_496.0;
 /// The bits of infinity.
 const END: u64 = 0x7ff << 52;
 /// The upper half of sqrt(2) / 2.
@@ -31,12 +33,15 @@ const UP_TO_ONE: u64 = (0x3ff0_0000 << 32) - HALF_ROOT;
 /// Natural logarithm.
 #[inline]
 pub fn ln(x: f64) -> f64 {
-    let bits = x.to_bits();
-    if bits.wrapping_sub(LEAST) >= END - LEAST {
-        return no_normal_number(x);
-    }
-    let raised = bits + UP_TO_ONE;
-    let k = ((raised >> 52) as i64 - 1023) as f64;
+    if x.to_bits().wrapping_sub(LEAST) < END - LEAST { ln_of_normal(x) } else { no_normal_number(x) }
+}
+
+/// The same of a positive normal number, without branches: for loops over lanes.
+#[inline(always)]
+pub(crate) fn ln_of_normal(x: f64) -> f64 {
+    let raised = x.to_bits() + UP_TO_ONE;
+    // As the last digits of a number near 2^52: vectors of AVX2 have no conversion of 64-bit integers.
+    let k = f64::from_bits((raised >> 52) | TWO_52.to_bits()) - (TWO_52 + 1023.0);
     let f = f64::from_bits((raised & (LEAST - 1)) + HALF_ROOT) - 1.0;
     let half_square = 0.5 * f * f;
     let s = f / (2.0 + f);

@@ -56,6 +56,7 @@ pub(crate) use exponential::{NEAR, exp_near};
 pub use frame::{Frame, renormalized};
 pub use inverse::{bracketed_root, erf_inv, increasing_root, lambert_excess};
 pub use logarithm::ln;
+pub(crate) use logarithm::ln_of_normal;
 pub use quadrature::{Integral, gauss_kronrod, integrate};
 pub use turns::sin_cos_turns;
 pub(crate) use vectors::{Lanewise, Vectorized, of_each, vectorized};

@@ -40,7 +40,7 @@ impl HenyeyGreenstein {
     ///   1 - mu = (q^2 - (1-g)^2) / (2g) = (1-g) (1-u) (q + 1-g) / d
     ///   1 + mu = ((1+g)^2 - q^2) / (2g) = (1+g)  u    (q + 1+g) / d
     /// with d = (1-g) + 2gu for g > 0 and (1+g) + 2|g| (1-u) for g < 0.
-    #[inline]
+    #[inline(always)]
     pub fn sample_poles(&self, u: f64) -> (f64, f64) {
         let g = self.g;
         if g == 0.0 {
@@ -55,7 +55,13 @@ impl HenyeyGreenstein {
     /// density [`Self::pdf`].
     #[inline]
     pub fn sample(&self, dir: DVec3, u: [f64; 2]) -> DVec3 {
-        let local = self.sample_local(u);
+        self.turned(dir, self.sample_local(u))
+    }
+
+    /// The direction after scattering, for light that travelled along `dir`, whose frame has `local`, drawn by
+    /// [`Self::sample_local`].
+    #[inline]
+    pub(crate) fn turned(&self, dir: DVec3, local: DVec3) -> DVec3 {
         if self.g == 0.0 {
             return local;
         }
@@ -64,7 +70,7 @@ impl HenyeyGreenstein {
     }
 
     /// The same in a frame about the direction of travel, which is its z axis.
-    #[inline]
+    #[inline(always)]
     pub fn sample_local(&self, u: [f64; 2]) -> DVec3 {
         let (below, above) = self.sample_poles(u[0]);
         let (sin_phi, cos_phi) = sin_cos_turns(u[1]);

@@ -1,7 +1,7 @@
 //! Flight distances in a homogeneous medium.
 
 use super::discrete::choose;
-use crate::math::{DVec3, atan2, exp, exp_m1, ln, ln_1p, sin};
+use crate::math::{DVec3, atan2, exp, exp_m1, ln, ln_1p, ln_of_normal, sin};
 
 /// The distance of a flight through a medium of extinction `sigma_t` (1/mm): the inverse of
 /// F(t) = 1 - exp(-sigma_t t), t = -ln(1 - u) / sigma_t. Infinite where `sigma_t` is 0. `1 - u` is
@@ -9,6 +9,12 @@ use crate::math::{DVec3, atan2, exp, exp_m1, ln, ln_1p, sin};
 #[inline]
 pub fn sample_exponential(sigma_t: f64, u: f64) -> f64 {
     if sigma_t == 0.0 { f64::INFINITY } else { -ln(1.0 - u) / sigma_t }
+}
+
+/// The same for a positive extinction, without branches: for loops over lanes.
+#[inline(always)]
+pub(crate) fn sample_exponential_in_lanes(sigma_t: f64, u: f64) -> f64 {
+    -ln_of_normal(1.0 - u) / sigma_t
 }
 
 /// Density of [`sample_exponential`] per mm.

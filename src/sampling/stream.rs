@@ -149,7 +149,7 @@ pub struct Stream {
 
 impl Stream {
     /// The next uniform number in [0, 1): the upper 53 bits, so every multiple of 2^-53.
-    #[inline]
+    #[inline(always)]
     pub fn draw(&mut self) -> f64 {
         self.draws += 1;
         #[cfg(test)]
@@ -176,6 +176,12 @@ impl Stream {
     #[inline]
     pub fn draw3(&mut self) -> [f64; 3] {
         [self.draw(), self.draw(), self.draw()]
+    }
+
+    /// Leaves out the next numbers.
+    #[inline]
+    pub(crate) fn skip(&mut self, numbers: u64) {
+        (0..numbers).for_each(|_| _ = self.draw_bits());
     }
 
     /// How many numbers were drawn so far.

@@ -67,6 +67,8 @@ impl<'a> GuidedBand<'a> {
 }
 
 impl WalkBands for GuidedBand<'_> {
+    const IS_PLAIN: bool = false;
+
     fn enter(&mut self, at: DVec3, normal: DVec3, dir: DVec3) {
         self.normal = normal;
         self.last.0 = DVec3::NAN;
