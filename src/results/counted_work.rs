@@ -11,16 +11,16 @@
 /// One set of weights cannot serve all kinds: the counters know how often something was done, not what of
 /// it was done (the Newton steps of a connection, light samples below the horizon, points of a cloud that
 /// were put in order). BSSRDF models are farthest off under a matched boundary, where a shadow ray of path
-/// tracing is one visibility test at every event and costs a quarter of its weight.
+/// tracing is one visibility test at every event and costs a fifth of its weight.
 pub const FACTORS: [(&str, f64); 8] = [
     ("path", 1.2),
     ("snee", 2.6),
-    ("bidirectional", 3.4),
+    ("bidirectional", 4.2),
     ("light_trace", 1.7),
-    ("point_cloud", 6.8),
-    ("bssrdf_probe", 7.8),
-    ("bssrdf_rays", 3.4),
-    ("bssrdf_density", 7.7),
+    ("point_cloud", 3.4),
+    ("bssrdf_probe", 8.1),
+    ("bssrdf_rays", 3.6),
+    ("bssrdf_density", 9.9),
 ];
 
 /// The factor by which a ratio of counted work between two kinds may be off: between runs of one kind
