@@ -21,11 +21,13 @@ impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
         }
     }
 
+    /// With steps that are drawn ahead: a function of its own, whose stack holds them.
     #[inline(never)]
     fn fly_ahead(&mut self, rule: StepRule<'_>) -> Option<Hit> {
         self.fly_by(StepsAhead::new(rule, self.stream.clone()))
     }
 
+    /// Takes the stream and the weights for the time of the flights.
     #[inline(always)]
     fn fly_by(&mut self, mut steps: impl Steps<B>) -> Option<Hit> {
         let mut weights = [self.throughput, self.survival];

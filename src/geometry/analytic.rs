@@ -1,7 +1,7 @@
 //! Half-space, slab, box and sphere in exact f64: no epsilon, every hit put back onto its surface.
 //!
-//! What most rays ask is inlined by force: a hit that a call returns is copied through memory, which took longer than its
-//! computation.
+//! The sphere is inlined by force, and each shape compares with the end of the ray itself: a hit that is returned and then
+//! filtered is copied through memory, where the copy waits for what has just been stored.
 
 use super::{FaceId, Hit, Ray, Side};
 use crate::math::DVec3;
