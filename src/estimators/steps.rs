@@ -75,7 +75,7 @@ impl<B: WalkBands> Steps<B> for StepByStep<'_> {
 /// The most steps that are drawn at once.
 const MOST: usize = 8;
 
-/// As many are drawn at first: half of all walks that enter a body leave it again after a few flights.
+/// As many are drawn at first: a walk often leaves after a few flights, and what was drawn beyond is lost.
 const FIRST: usize = 4;
 
 /// Mean free paths in half a body's size from which it pays to draw steps ahead.
