@@ -22,11 +22,9 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::bands::OneBand;
-use super::field::Path;
-use super::guidance::{GuidedBand, WalkDraw};
+use super::guidance::WalkDraw;
 use super::illumination::unscattered_notes;
-use super::walk::{CameraWalk, Unrivalled};
+use super::walk::trace_alone;
 use super::warm_up::TaughtField;
 use super::{Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::Result;
@@ -100,17 +98,7 @@ impl Estimator for PathTracer {
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
         let field = self.walks.field();
         for &band in bands {
-            for index in 0..field.scene.sensor.rays_per_pass() {
-                let path = Path { field, band, index, key };
-                match field.guidance(band) {
-                    Some(guidance) => {
-                        let medium = &field.scene.medium[band];
-                        let guided = GuidedBand::new(guidance, medium);
-                        CameraWalk::trace(path, scores, Unrivalled, guided)
-                    }
-                    None => CameraWalk::trace(path, scores, Unrivalled, OneBand),
-                };
-            }
+            trace_alone(field, band, key, scores);
         }
     }
 

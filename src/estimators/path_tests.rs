@@ -1,11 +1,12 @@
 //! Identities, closed forms and published numbers for the path tracer.
 
-use super::super::bands::{SharedBands, WalkBands};
-use super::super::field::Field;
+use super::super::bands::{OneBand, SharedBands, WalkBands};
+use super::super::field::{Field, Path};
+use super::super::guidance::GuidedBand;
 use super::super::roulette::roulette;
 use super::super::testing;
 use super::super::vertices::WalkExit;
-use super::super::walk::Rivals;
+use super::super::walk::{CameraWalk, Rivals, Unrivalled, are_silent, trace_side_by_side};
 use super::super::{Cost, Layout};
 use super::*;
 use crate::geometry::{Ray, Shape, procedural};
@@ -366,4 +367,73 @@ fn flights_at_once_are_flights_one_by_one() {
     }
     assert!(plain > 50_000 && shared == plain, "{plain} and {shared} events");
     assert!(guided > 50_000, "{guided} events");
+}
+
+/// A pass of guided paths traced side by side, and one path after the other: scores, counters and anomalies are the same, to
+/// the last bit. Returns how many medium events there were.
+fn assert_the_same_side_by_side(scene: Arc<Scene>, options: &PathOptions) -> u64 {
+    let layout = Layout::new(&scene);
+    let tracer = PathTracer::with_options(scene, options).expect("a scene that it serves");
+    let field = tracer.walks.field();
+    let key = StreamKey::named("paths_side_by_side_are_paths_one_by_one").pass(0);
+    let mut both = [Scores::new(layout.clone()), Scores::new(layout)];
+    let [side_by_side, one_by_one] = &mut both;
+    for band in 0..field.scene.bands() {
+        let guidance = field.guidance(band).expect("guided");
+        assert!(are_silent(field, band));
+        trace_side_by_side(field, band, &key, guidance, side_by_side);
+        for index in 0..field.scene.sensor.rays_per_pass() {
+            let path = Path { field, band, index, key: &key };
+            let guided = GuidedBand::new(guidance, &field.scene.medium[band]);
+            CameraWalk::trace(path, one_by_one, Unrivalled, guided);
+        }
+    }
+    let bits = |scores: &Scores| scores.observables.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(side_by_side), bits(one_by_one));
+    assert_eq!(side_by_side.cost, one_by_one.cost);
+    assert_eq!(side_by_side.anomalies, one_by_one.anomalies);
+    assert!(one_by_one.observables[0] > 0.0);
+    one_by_one.cost[Cost::MediumEvents as usize]
+}
+
+/// Under a sky that is brighter on one side and the sun, in two bands; every kind of guide.
+#[test]
+fn paths_side_by_side_are_paths_one_by_one() {
+    let lights = || {
+        let sun = Emission::Directional { toward: DVec3::X, irradiance: vec![1.0, 0.3] };
+        let sky = Emission::Cap { frame: Frame::about(DVec3::X), height: 0.9, radiance: vec![1.0, 2.0] };
+        [("sun", sun), ("sky", sky)].map(|(name, emission)| Light { name: name.into(), emission }).into()
+    };
+    let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.3 };
+    let boundaries = [Boundary::Smooth { eta: 1.3 }, Boundary::Rough { eta: 1.4, facets }];
+    let bumpy =
+        |smooth| Shape::Mesh(procedural::bumpy_sphere(1.0, 3, 0.2, 5.0, smooth).expect("a mesh"));
+    let bodies = [
+        SPHERE,
+        Shape::Box { half: DVec3::new(0.5, 0.8, 0.4) },
+        Shape::Slab { thickness: 0.7 },
+        Shape::HalfSpace,
+        bumpy(false),
+        bumpy(true),
+    ];
+    let by_solution = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0, near_lights: true };
+    let learned = WalkDraw::Learned { share: 0.5, cells: 4, paths: 512 };
+    let mut events = 0;
+    for body in &bodies {
+        for (boundary, walk, roulette) in [
+            (boundaries[0], by_solution, ROULETTES[1]),
+            (boundaries[1], by_solution, ROULETTES[0]),
+            (boundaries[1], WalkDraw::Dwivedi { share: 0.5 }, ROULETTES[1]),
+            (boundaries[0], learned, ROULETTES[1]),
+        ] {
+            for g in [-0.3, 0.0, 0.8] {
+                let one = scene(body.clone(), boundary, medium(1.0, 0.0, g), lights(), off_axis());
+                let medium = vec![medium(20.0, 0.9, g), medium(3.0, 0.999, g)];
+                let scene = Scene { boundary: vec![boundary; 2], medium, ..one };
+                let options = PathOptions { roulette, walk, sample_even_lights: None };
+                events += assert_the_same_side_by_side(Arc::new(scene), &options);
+            }
+        }
+    }
+    assert!(events > 1_000_000, "{events} events");
 }

@@ -4,6 +4,8 @@
 //! (with more than one source of light) the share of each; for the other regions the total. Pixels
 //! beside them.
 
+use std::sync::Arc;
+
 use super::TransportClass;
 use crate::scene::sensor::SensorRegion;
 use crate::scene::{Scene, Sensor};
@@ -175,7 +177,7 @@ impl Layout {
 /// The scores of one pass.
 #[derive(Clone, Debug)]
 pub struct Scores {
-    layout: Layout,
+    layout: Arc<Layout>,
     /// Scores of the pass, `[observable][band]`.
     pub observables: Vec<f64>,
     /// `[pixel][band]`; empty where the sensor has no pixels.
@@ -184,6 +186,18 @@ pub struct Scores {
     pub cost: [u64; Cost::ALL.len()],
     /// Anomalies counted, indexed by [`Anomaly`].
     pub anomalies: [u64; Anomaly::ALL.len()],
+    /// What has been held back, where contributions are.
+    held: Option<Vec<Contribution>>,
+}
+
+/// What [`Scores::add`] adds.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contribution {
+    slot: usize,
+    band: usize,
+    class: TransportClass,
+    source: usize,
+    value: f64,
 }
 
 impl Scores {
@@ -194,8 +208,40 @@ impl Scores {
             pixels: vec![0.0; layout.pixels() * layout.bands],
             cost: [0; Cost::ALL.len()],
             anomalies: [0; Anomaly::ALL.len()],
-            layout,
+            layout: Arc::new(layout),
+            held: None,
         }
+    }
+
+    /// Scores that hold contributions back, and count. Paths that are traced side by side have such scores each, so that
+    /// sums are formed in the order of paths, however these overtake each other.
+    pub(super) fn holding(&self) -> Scores {
+        Scores {
+            layout: self.layout.clone(),
+            observables: Vec::new(),
+            pixels: Vec::new(),
+            cost: [0; Cost::ALL.len()],
+            anomalies: [0; Anomaly::ALL.len()],
+            held: Some(Vec::new()),
+        }
+    }
+
+    /// Takes what has been held back; `others` is held on with, empty.
+    pub(super) fn take_held(&mut self, others: Vec<Contribution>) -> Vec<Contribution> {
+        self.held.replace(others).unwrap_or_default()
+    }
+
+    /// Adds contributions that were held back, and empties them.
+    pub(super) fn add_held(&mut self, held: &mut Vec<Contribution>) {
+        for Contribution { slot, band, class, source, value } in held.drain(..) {
+            self.add(slot, band, class, source, value);
+        }
+    }
+
+    /// Adds the counts of other scores.
+    pub(super) fn add_counts(&mut self, others: &Scores) {
+        self.cost.iter_mut().zip(others.cost).for_each(|(sum, count)| *sum += count);
+        self.anomalies.iter_mut().zip(others.anomalies).for_each(|(sum, count)| *sum += count);
     }
 
     /// Resets scores to zero for the next pass; counts continue.
@@ -208,6 +254,10 @@ impl Scores {
     /// index of a light, or the number of lights for the medium's emission.
     #[inline]
     pub fn add(&mut self, slot: usize, band: usize, class: TransportClass, source: usize, value: f64) {
+        if let Some(held) = &mut self.held {
+            held.push(Contribution { slot, band, class, source, value });
+            return;
+        }
         if !value.is_finite() {
             self.anomalies[Anomaly::NonFinite as usize] += 1;
             return;

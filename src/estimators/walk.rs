@@ -32,6 +32,10 @@ use crate::sampling::stream::{Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::sensor::PathMeasure;
 
+pub(super) use lanes::trace_alone;
+#[cfg(test)]
+pub(super) use lanes::{are_silent, trace_side_by_side};
+
 /// Techniques beside unidirectional sampling.
 pub(super) trait Rivals: Sized {
     /// Nothing happens at a medium vertex.
@@ -132,6 +136,22 @@ struct LightDraw {
     pdf: Option<f64>,
 }
 
+/// Where a path has met the boundary, and on which side it goes on.
+#[derive(Clone, Copy)]
+struct Onward {
+    from: Hit,
+    side: Side,
+}
+
+/// The refracted ray of a first hit, with the state of the path there.
+struct Later<B> {
+    at: (Hit, Frame, BoundarySample),
+    path: (Ray, Option<FaceId>, Option<WalkExit>),
+    weights: [f64; 2],
+    events: (History, PathMeasure),
+    bands: B,
+}
+
 /// State of one path that is traced from the sensor.
 pub(super) struct CameraWalk<'a, R, B> {
     pub scene: &'a Scene,
@@ -168,12 +188,12 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// Traces a path; returns how many numbers its walk drew.
     pub(super) fn trace(path: Path<'a>, scores: &'a mut Scores, rivals: R, bands: B) -> u64 {
         let mut walk = CameraWalk::start(path, scores, rivals, bands);
-        walk.look_around(path);
-        walk.scores.count(Cost::Rays);
-        match walk.scene.shape.intersect(&walk.ray, Side::Outside, None, f64::INFINITY) {
-            Some(hit) => walk.run(hit),
-            None => 0, // light that has not met the body is not scored
+        let mut later = None;
+        let mut onward = walk.meet_body(path, &mut later);
+        while let Some(from) = onward.or_else(|| walk.follow_refraction(&mut later)) {
+            onward = walk.follow(from);
         }
+        walk.stream.draws()
     }
 
     /// Traces the last two segments in the medium alone: the sensor's ray is the arrival at x_i, the
@@ -272,54 +292,59 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         (self.slot, self.ray, self.throughput) = own;
     }
 
-    /// Runs from a first hit until the path ends.
-    fn run(mut self, hit: Hit) -> u64 {
-        if let Some(facets) = self.bands.facets().filter(|_| !self.matched()) {
-            self.follow_both(&hit, facets);
-        } else if let Some(side) = self.cross(&hit, Side::Outside) {
-            self.follow(hit, side);
-        }
-        self.stream.draws()
-    }
-
-    /// Goes on from the boundary on one side of it until the path ends.
-    fn follow(&mut self, mut hit: Hit, mut side: Side) {
-        loop {
-            let next = match side {
-                Side::Inside => self.walk_inside(&hit),
-                Side::Outside => self.fly_outside(),
-            };
-            let Some(next) = next else { return };
-            let Some(next_side) = self.cross(&next, side) else { return };
-            (hit, side) = (next, next_side);
+    /// Finds where the path first meets the body; returns how it goes on there, and leaves in `later` what it goes on with once
+    /// that has ended. Light that has not met the body is not scored.
+    fn meet_body(&mut self, path: Path<'_>, later: &mut Option<Later<B>>) -> Option<Onward> {
+        self.look_around(path);
+        self.scores.count(Cost::Rays);
+        let hit = self.scene.shape.intersect(&self.ray, Side::Outside, None, f64::INFINITY)?;
+        match self.bands.facets().filter(|_| !self.matched()) {
+            Some(facets) => self.follow_reflection(hit, facets, later),
+            None => Some(Onward { side: self.cross(&hit, Side::Outside)?, from: hit }),
         }
     }
 
-    /// Follows the reflected ray of a first hit, then the refracted one, each with its share of the weight. Reflection
-    /// usually takes one ray, a walk inside takes many. Choosing one of the two at random would cause more variance than
-    /// guided walks do.
-    fn follow_both(&mut self, hit: &Hit, facets: usize) {
-        let Some((frame, wo)) = self.meet(hit, Side::Outside) else { return };
+    /// Goes on from the boundary to where the path meets it again; `None` where it ends.
+    #[inline]
+    fn follow(&mut self, Onward { from, side }: Onward) -> Option<Onward> {
+        let from = match side {
+            Side::Inside => self.walk_inside(&from)?,
+            Side::Outside => self.fly_outside()?,
+        };
+        Some(Onward { side: self.cross(&from, side)?, from })
+    }
+
+    /// At a first hit, goes on with the reflected ray, and leaves the refracted one to [`Self::follow_refraction`], each
+    /// with its share of the weight. Reflection usually takes one ray, a walk inside takes many. Choosing one of the two at
+    /// random would cause more variance than guided walks do.
+    fn follow_reflection(
+        &mut self,
+        hit: Hit,
+        facets: usize,
+        later: &mut Option<Later<B>>,
+    ) -> Option<Onward> {
+        let (frame, wo) = self.meet(&hit, Side::Outside)?;
         let [reflection, refraction] = self.boundary.sample_both(wo, self.stream.draw3(), facets);
-        if let Some(sample) = reflection {
-            let (ray, from, exit) = (self.ray, self.from, self.exit);
-            let (throughput, survival) = (self.throughput, self.survival);
-            let (history, measure, bands) = (self.history, self.measure, self.bands.clone());
-            self.follow_sample(hit, &frame, sample);
-            (self.ray, self.from, self.exit) = (ray, from, exit);
-            (self.throughput, self.survival) = (throughput, survival);
-            (self.history, self.measure, self.bands) = (history, measure, bands);
-        }
-        if let Some(sample) = refraction {
-            self.follow_sample(hit, &frame, sample);
-        }
+        *later = refraction.map(|sample| Later {
+            at: (hit, frame, sample),
+            path: (self.ray, self.from, self.exit),
+            weights: [self.throughput, self.survival],
+            events: (self.history, self.measure),
+            bands: self.bands.clone(),
+        });
+        let side = self.leave(&hit, Side::Outside, &frame, reflection?)?;
+        Some(Onward { from: hit, side })
     }
 
-    /// Goes on from a first hit in a sampled direction until the path ends.
-    fn follow_sample(&mut self, hit: &Hit, frame: &Frame, sample: BoundarySample) {
-        if let Some(side) = self.leave(hit, Side::Outside, frame, sample) {
-            self.follow(*hit, side);
-        }
+    /// Once the reflected ray of a first hit has been followed, goes on with the refracted one.
+    fn follow_refraction(&mut self, later: &mut Option<Later<B>>) -> Option<Onward> {
+        let Later { at: (hit, frame, sample), path, weights, events, bands } = later.take()?;
+        (self.ray, self.from, self.exit) = path;
+        [self.throughput, self.survival] = weights;
+        (self.history, self.measure) = events;
+        self.bands = bands;
+        let side = self.leave(&hit, Side::Outside, &frame, sample)?;
+        Some(Onward { from: hit, side })
     }
 
     /// Flies and scatters in the medium until the path meets the boundary or ends.
@@ -636,6 +661,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
 
 #[path = "walk_flights.rs"]
 mod flights;
+#[path = "walk_lanes.rs"]
+mod lanes;
 #[path = "walk_lights.rs"]
 mod lights;
 

@@ -16,6 +16,7 @@ pub struct Frame {
 impl Frame {
     /// A frame about the unit vector `n` (Duff et al. 2017, "Building an Orthonormal Basis,
     /// Revisited": no branch except the sign of n.z, accurate for every n).
+    #[inline]
     pub fn about(n: DVec3) -> Frame {
         let sign = 1f64.copysign(n.z);
         let a = -1.0 / (sign + n.z);
@@ -28,11 +29,13 @@ impl Frame {
     }
 
     /// Components of a world vector in this frame.
+    #[inline]
     pub fn to_local(&self, v: DVec3) -> DVec3 {
         DVec3::new(self.s.dot(v), self.t.dot(v), self.n.dot(v))
     }
 
     /// The world vector with components `v`.
+    #[inline]
     pub fn to_world(&self, v: DVec3) -> DVec3 {
         self.s * v.x + self.t * v.y + self.n * v.z
     }

@@ -148,6 +148,16 @@ pub struct Stream {
 }
 
 impl Stream {
+    /// A stream that nothing is drawn from before another takes its place.
+    pub(crate) fn zero() -> Stream {
+        Stream {
+            generator: Pcg64Dxsm::new(0, 0),
+            draws: 0,
+            #[cfg(test)]
+            script: Default::default(),
+        }
+    }
+
     /// The next uniform number in [0, 1): the upper 53 bits, so every multiple of 2^-53.
     #[inline(always)]
     pub fn draw(&mut self) -> f64 {

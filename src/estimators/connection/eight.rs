@@ -3,15 +3,13 @@
 
 use super::bounds::{Bounds, PreparedQuery};
 
-type Lanes = [f64; 8];
-
 /// Bounds of up to eight parts.
 #[derive(Clone, Debug)]
 pub(super) struct EightBounds {
-    center: [Lanes; 3],
-    radius: Lanes,
-    axis: [Lanes; 3],
-    cos: Lanes,
+    center: [[f64; 8]; 3],
+    radius: [f64; 8],
+    axis: [[f64; 8]; 3],
+    cos: [f64; 8],
     /// Eight.
     lanes: usize,
     /// A bit for every part.

@@ -31,11 +31,11 @@ const MOST_GAIN: f64 = 16.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ExitPlane {
     /// Unit, outwards, in single precision: [`unit`].
-    normal: Vec3,
+    pub normal: Vec3,
     /// Of the plane, along the normal.
-    offset: f32,
+    pub offset: f32,
     /// Chance of an escape at the plane.
-    chance: f32,
+    pub chance: f32,
 }
 
 /// A unit vector out of single precision, to 1e-14.
@@ -47,8 +47,8 @@ pub(super) fn unit(vector: Vec3) -> DVec3 {
 /// What exits of one band have in common.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ExitRule {
-    least_cosine: f64,
-    sigma_t: f64,
+    pub least_cosine: f64,
+    pub sigma_t: f64,
     /// y / x.
     per_gain: f64,
     moments: BoundaryMoments,

@@ -14,6 +14,10 @@
 //! ([`growth_of_flights`]); cells just outside the body have the mean of their neighbours. Where there is no cell (in parts
 //! thinner than one) or phi has underflowed, there is no gradient, and the walk is plain. The solution need not be exact, because it only guides.
 
+mod lanes;
+
+pub(super) use lanes::FoundLanes;
+
 use super::diffusion::{Diffusion, growth_of_flights};
 use super::exit::{ExitPlane, ExitRule, REACH, unit};
 use super::incidence::{LetIn, TransmittedLight};
@@ -251,12 +255,17 @@ impl Importance {
 
 impl ImportanceGrid {
     #[inline(always)]
-    fn node(&self, x: DVec3) -> &Node {
+    fn index(&self, x: DVec3) -> usize {
         let counts = self.counts;
         let place = (x - self.low) * self.per_spacing;
         // The cast takes what is negative to 0.
         let cell = |axis: usize| (place[axis] as u32 as usize).min(counts[axis] - 1);
-        &self.nodes[(cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)]
+        (cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)
+    }
+
+    #[inline(always)]
+    fn node(&self, x: DVec3) -> &Node {
+        &self.nodes[self.index(x)]
     }
 
     #[inline(always)]

@@ -26,15 +26,17 @@ use serde::Deserialize;
 use crate::geometry::Side;
 use crate::math::DVec3;
 use crate::optics::boundary::FEW_FACETS;
-use crate::optics::guided::{GuidedTurns, Pull, StepGuide, diffuse_growth};
+use crate::optics::guided::{
+    GuideLanes, GuidedTurns, LANES, Lanes, Pull, StepGuide, VectorLanes, diffuse_growth, vector,
+};
 use crate::optics::medium::Medium;
 use crate::scene::Scene;
 
-use importance::Importance;
+use importance::{FoundLanes, Importance};
 
 pub(super) use learned::{FoundLight, LearnedPulls, LearningCells, Lessons};
 pub use slice::GuideSlice;
-pub(super) use steered::GuidedBand;
+pub(super) use steered::{GuidedBand, GuidedLanes};
 
 /// How walks are sampled inside the body; all choices are unbiased.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -204,6 +206,43 @@ impl Guidance {
                 0.0
             }
         }
+    }
+
+    /// Looks up what guides a walk's step from a point, where that is stored.
+    #[inline(always)]
+    fn find(&self, x: DVec3, lane: usize, found: &mut FoundLanes) {
+        if let Aim::Solution(Importance::Grid(grid)) = &self.aim {
+            grid.find(x, lane, found);
+        }
+    }
+
+    /// The same for several walks.
+    #[inline(always)]
+    fn find_all(&self, points: &VectorLanes, found: &mut FoundLanes) {
+        if let Aim::Solution(Importance::Grid(grid)) = &self.aim {
+            grid.find_all(points, found);
+        }
+    }
+
+    /// [`Self::at`] for several walks, of which this has been found.
+    #[inline(always)]
+    fn guide_all(
+        &self,
+        points: &VectorLanes,
+        normals: &[DVec3; LANES],
+        found: &FoundLanes,
+        guides: &mut GuideLanes,
+    ) -> Lanes {
+        if let Aim::Solution(Importance::Grid(grid)) = &self.aim {
+            return grid.guide_all(points, found, guides);
+        }
+        let mut phi = [0.0; LANES];
+        for lane in 0..LANES {
+            let mut guide = StepGuide::NONE;
+            phi[lane] = self.at(vector(points, lane), normals[lane], &mut guide);
+            guides.set(lane, &guide);
+        }
+        phi
     }
 
     /// What light finds that leaves the body at a boundary point, over what it finds that is reflected back inside; 1 where

@@ -13,6 +13,10 @@
 //!
 //! All that a step calls is inlined: it is a chain of short dependent operations, of which calls would cost a tenth.
 
+mod lanes;
+
+pub(in crate::estimators) use lanes::GuidedLanes;
+
 use super::Guidance;
 use crate::estimators::bands::WalkBands;
 use crate::geometry::Ray;

@@ -37,7 +37,7 @@ use super::connection::{self, Conic};
 use super::field::Path;
 use super::guidance::GuidedBand;
 use super::illumination::unscattered_notes;
-use super::walk::{CameraWalk, Unrivalled};
+use super::walk::{CameraWalk, Unrivalled, trace_alone};
 use super::warm_up::TaughtField;
 use super::{BandUse, Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::{Error, Result};
@@ -236,6 +236,10 @@ impl Estimator for Snee {
             }
         } else {
             for &band in bands {
+                if setups[band].guides.is_empty() {
+                    trace_alone(field, band, key, scores);
+                    continue;
+                }
                 for index in 0..rays {
                     self.trace(&setups[band], None, Path { field, band, index, key }, scores);
                 }

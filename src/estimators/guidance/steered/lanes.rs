@@ -1,0 +1,121 @@
+//! Guided walks of one band side by side.
+
+use super::GuidedBand;
+use crate::estimators::guidance::{FoundLanes, Guidance};
+use crate::estimators::steps::{StepRule, Weights};
+use crate::geometry::Ray;
+use crate::math::DVec3;
+use crate::optics::guided::{DrawLanes, GuideLanes, LANES, Lanes, StepLanes, vector};
+use crate::sampling::stream::Stream;
+
+/// Walks inside the body, each of which has begun a flight.
+pub(in crate::estimators) struct GuidedLanes<'a> {
+    guidance: &'a Guidance,
+    rule: StepRule<'a>,
+    weights: [Weights; LANES],
+    steps: StepLanes,
+    guides: GuideLanes,
+    /// Where their flights end.
+    found: FoundLanes,
+    draws: DrawLanes,
+    /// As in [`GuidedBand`].
+    normals: [DVec3; LANES],
+    per_entry: Lanes,
+    streams: [Stream; LANES],
+    /// How many flights each has begun.
+    flights: [u64; LANES],
+}
+
+impl<'a> GuidedLanes<'a> {
+    /// Without walks.
+    pub(in crate::estimators) fn new(guidance: &'a Guidance, rule: StepRule<'a>) -> GuidedLanes<'a> {
+        GuidedLanes {
+            guidance,
+            rule,
+            weights: [[0.0; 2]; LANES],
+            steps: StepLanes::new(rule.medium.sigma_t, guidance.share),
+            guides: GuideLanes::none(),
+            found: FoundLanes::none(),
+            draws: DrawLanes::plain(),
+            normals: [DVec3::Z; LANES],
+            per_entry: [0.0; LANES],
+            streams: std::array::from_fn(|_| Stream::zero()),
+            flights: [0; LANES],
+        }
+    }
+
+    /// A walk that has come in goes on along its ray.
+    pub(in crate::estimators) fn put(
+        &mut self,
+        lane: usize,
+        band: &GuidedBand<'a>,
+        ray: &Ray,
+        weights: Weights,
+        stream: &Stream,
+    ) {
+        self.streams[lane] = stream.clone();
+        let u = self.streams[lane].draw();
+        self.steps.put(lane, [ray.origin, ray.dir], &band.heading, band.ratio, u);
+        self.weights[lane] = weights;
+        self.normals[lane] = band.normal;
+        self.per_entry[lane] = band.per_entry;
+        self.flights[lane] = 1;
+        self.guidance.find(vector(self.steps.ends(), lane), lane, &mut self.found);
+    }
+
+    /// The stream of a walk, behind all numbers that it has drawn.
+    pub(in crate::estimators) fn stream(&self, lane: usize) -> Stream {
+        self.streams[lane].clone()
+    }
+
+    /// The state of a walk at the begin of its flight.
+    pub(in crate::estimators) fn state(&self, lane: usize, band: &mut GuidedBand<'a>) -> Weights {
+        (band.ratio, band.heading) = self.steps.state(lane);
+        self.weights[lane]
+    }
+
+    /// The ray of a walk's flight, its length if no boundary ends it, and where it ends then.
+    #[inline(always)]
+    pub(in crate::estimators) fn flight(&self, lane: usize) -> (Ray, f64, DVec3) {
+        let [origin, dir] = self.steps.flight(lane);
+        (Ray { origin, dir }, self.steps.lengths()[lane], vector(self.steps.ends(), lane))
+    }
+
+    /// How many flights a walk has begun since it was put in.
+    #[inline]
+    pub(in crate::estimators) fn flights(&self, lane: usize) -> u64 {
+        self.flights[lane]
+    }
+
+    /// Ends all flights in the medium, and begins the next ones; returns which walks survive roulette.
+    #[inline(always)]
+    pub(in crate::estimators) fn scatter(&mut self) -> [bool; LANES] {
+        let Guidance { turns, share, .. } = self.guidance;
+        let StepRule { roulette, survival, .. } = self.rule;
+        let ends = self.steps.ends();
+        let phi = self.guidance.guide_all(ends, &self.normals, &self.found, &mut self.guides);
+        let ratios = self.steps.arrive();
+        let mut importance = [0.0; LANES];
+        for lane in 0..LANES {
+            let found = phi[lane] * self.per_entry[lane];
+            importance[lane] = (if found > 0.0 { found } else { 1.0 }) / ratios[lane];
+        }
+        let mut goes_on = [false; LANES];
+        for lane in 0..LANES {
+            let stream = &mut self.streams[lane];
+            let [throughput, seen] = &mut self.weights[lane];
+            let importance = || importance[lane];
+            goes_on[lane] = roulette.survive([throughput, seen], survival, importance, stream).is_some();
+            if goes_on[lane] {
+                self.draws.draw(lane, turns, *share, &self.guides, || stream.draw());
+            } else {
+                self.draws.end(lane);
+            }
+        }
+        let streams = &mut self.streams;
+        self.steps.depart(turns, &self.guides, &mut self.draws, |lane| streams[lane].draw());
+        self.guidance.find_all(self.steps.ends(), &mut self.found);
+        self.flights.iter_mut().for_each(|flights| *flights += 1);
+        goes_on
+    }
+}
