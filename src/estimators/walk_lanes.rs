@@ -99,7 +99,11 @@ pub(in crate::estimators) fn trace_side_by_side(
     }
     while walks.iter().any(Option::is_some) {
         let survives = lanes.scatter();
-        let is_clear: [bool; LANES] = std::array::from_fn(|lane| paths.is_clear(&lanes, lane));
+        // A loop: `array::from_fn` is not inlined here.
+        let mut is_clear = [false; LANES];
+        for lane in 0..LANES {
+            is_clear[lane] = paths.is_clear(&lanes, lane);
+        }
         for lane in 0..LANES {
             if survives[lane] && is_clear[lane] {
                 continue;
