@@ -110,13 +110,13 @@ pub(in crate::estimators) fn trace_side_by_side(
             }
             let Some(walk) = &mut walks[lane] else { continue };
             let onward = if survives[lane] {
-                match walk.end_flight(&lanes, lane) {
+                match walk.end_flight(&mut lanes, lane) {
                     FlightEnd::Medium => continue,
                     FlightEnd::Elsewhere(onward) => onward,
                 }
             } else {
                 let vertices = lanes.flights(lane) - 1;
-                walk.take_out(&lanes, lane, vertices, vertices);
+                walk.take_out(&mut lanes, lane, vertices, vertices);
                 None
             };
             paths.go_on(&mut lanes, lane, &mut walks[lane], onward);
@@ -220,7 +220,7 @@ impl<'a> LaneWalk<'a> {
 
     /// Ends a flight that may have met the boundary. Where it has, the path leaves its lane, and meets the boundary.
     #[inline(never)]
-    fn end_flight(&mut self, lanes: &GuidedLanes<'a>, lane: usize) -> FlightEnd {
+    fn end_flight(&mut self, lanes: &mut GuidedLanes<'a>, lane: usize) -> FlightEnd {
         let walk = &mut self.walk;
         let (ray, t, _) = lanes.flight(lane);
         let from = walk.from.filter(|_| lanes.flights(lane) == 1);
@@ -228,7 +228,8 @@ impl<'a> LaneWalk<'a> {
         if hit.is_none() && t < f64::INFINITY && !flights::is_lost(walk.bounds, ray.at(t)) {
             return FlightEnd::Medium;
         }
-        self.take_out(lanes, lane, lanes.flights(lane), lanes.flights(lane) - 1);
+        let begun = lanes.flights(lane);
+        self.take_out(lanes, lane, begun, begun - 1);
         let walk = &mut self.walk;
         let Some(hit) = hit else {
             // A path may fly to infinity in a half-space; in a finite body the ray is lost.
@@ -245,9 +246,9 @@ impl<'a> LaneWalk<'a> {
     }
 
     /// Takes the path out of its lane, where it has made so many flights, of which these have ended in the medium.
-    fn take_out(&mut self, lanes: &GuidedLanes<'a>, lane: usize, flights: u64, vertices: u64) {
+    fn take_out(&mut self, lanes: &mut GuidedLanes<'a>, lane: usize, flights: u64, vertices: u64) {
         let walk = &mut self.walk;
-        walk.stream = lanes.stream(lane);
+        walk.stream = lanes.take(lane);
         walk.scores.count_many(Cost::Rays, flights);
         walk.scores.count_many(Cost::MediumEvents, vertices);
         if vertices > 0 {

@@ -255,17 +255,12 @@ impl Importance {
 
 impl ImportanceGrid {
     #[inline(always)]
-    fn index(&self, x: DVec3) -> usize {
+    fn node(&self, x: DVec3) -> &Node {
         let counts = self.counts;
         let place = (x - self.low) * self.per_spacing;
         // The cast takes what is negative to 0.
         let cell = |axis: usize| (place[axis] as u32 as usize).min(counts[axis] - 1);
-        (cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)
-    }
-
-    #[inline(always)]
-    fn node(&self, x: DVec3) -> &Node {
-        &self.nodes[self.index(x)]
+        &self.nodes[(cell(2) * counts[1] + cell(1)) * counts[0] + cell(0)]
     }
 
     #[inline(always)]

@@ -32,7 +32,17 @@ impl ImportanceGrid {
     /// Looks up what is stored where a walk is.
     #[inline(always)]
     pub(in crate::estimators::guidance) fn find(&self, x: DVec3, lane: usize, found: &mut FoundLanes) {
-        self.find_in(self.index(x), lane, found);
+        let node = self.node(x);
+        set(&mut found.axes, lane, node.axis);
+        found.levels[lane] = (node.level_and_exit & 0xff) as i32;
+        found.phi[lane] = node.phi;
+        // Without an exit, an escape has no chance.
+        let (normal, offset, chance) = match self.exit(node) {
+            Some(exit) => (exit.normal, exit.offset, exit.chance),
+            None => (Vec3::Z, 0.0, 0.0),
+        };
+        set(&mut found.normals, lane, normal);
+        (found.offsets[lane], found.chances[lane]) = (offset, chance);
     }
 
     /// The same for all walks.
@@ -45,21 +55,6 @@ impl ImportanceGrid {
         for lane in 0..LANES {
             self.find(vector(points, lane), lane, found);
         }
-    }
-
-    #[inline(always)]
-    fn find_in(&self, cell: usize, lane: usize, found: &mut FoundLanes) {
-        let node = &self.nodes[cell];
-        set(&mut found.axes, lane, node.axis);
-        found.levels[lane] = (node.level_and_exit & 0xff) as i32;
-        found.phi[lane] = node.phi;
-        // Without an exit, an escape has no chance.
-        let (normal, offset, chance) = match self.exit(node) {
-            Some(exit) => (exit.normal, exit.offset, exit.chance),
-            None => (Vec3::Z, 0.0, 0.0),
-        };
-        set(&mut found.normals, lane, normal);
-        (found.offsets[lane], found.chances[lane]) = (offset, chance);
     }
 
     /// What guides steps from these points, of which this has been found, and phi there.

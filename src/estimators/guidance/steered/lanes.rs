@@ -8,10 +8,12 @@ use crate::math::DVec3;
 use crate::optics::guided::{DrawLanes, GuideLanes, LANES, Lanes, StepLanes, vector};
 use crate::sampling::stream::Stream;
 
-/// Walks inside the body, each of which has begun a flight.
+/// Walks inside the body, each of which has begun a flight. An empty lane takes part in what is computed together, with numbers
+/// of no meaning, and draws none.
 pub(in crate::estimators) struct GuidedLanes<'a> {
     guidance: &'a Guidance,
     rule: StepRule<'a>,
+    is_empty: [bool; LANES],
     weights: [Weights; LANES],
     steps: StepLanes,
     guides: GuideLanes,
@@ -32,6 +34,7 @@ impl<'a> GuidedLanes<'a> {
         GuidedLanes {
             guidance,
             rule,
+            is_empty: [true; LANES],
             weights: [[0.0; 2]; LANES],
             steps: StepLanes::new(rule.medium.sigma_t, guidance.share),
             guides: GuideLanes::none(),
@@ -53,6 +56,7 @@ impl<'a> GuidedLanes<'a> {
         weights: Weights,
         stream: &Stream,
     ) {
+        self.is_empty[lane] = false;
         self.streams[lane] = stream.clone();
         let u = self.streams[lane].draw();
         self.steps.put(lane, [ray.origin, ray.dir], &band.heading, band.ratio, u);
@@ -63,8 +67,9 @@ impl<'a> GuidedLanes<'a> {
         self.guidance.find(vector(self.steps.ends(), lane), lane, &mut self.found);
     }
 
-    /// The stream of a walk, behind all numbers that it has drawn.
-    pub(in crate::estimators) fn stream(&self, lane: usize) -> Stream {
+    /// Empties a lane; returns the stream of its walk, behind all numbers that it has drawn.
+    pub(in crate::estimators) fn take(&mut self, lane: usize) -> Stream {
+        self.is_empty[lane] = true;
         self.streams[lane].clone()
     }
 
@@ -105,7 +110,8 @@ impl<'a> GuidedLanes<'a> {
             let stream = &mut self.streams[lane];
             let [throughput, seen] = &mut self.weights[lane];
             let importance = || importance[lane];
-            goes_on[lane] = roulette.survive([throughput, seen], survival, importance, stream).is_some();
+            goes_on[lane] = !self.is_empty[lane]
+                && roulette.survive([throughput, seen], survival, importance, stream).is_some();
             if goes_on[lane] {
                 self.draws.draw(lane, turns, *share, &self.guides, || stream.draw());
             } else {
