@@ -101,8 +101,8 @@ pub(in crate::estimators) fn trace_side_by_side(
         let survives = lanes.scatter();
         // A loop: `array::from_fn` is not inlined here.
         let mut is_clear = [false; LANES];
-        for lane in 0..LANES {
-            is_clear[lane] = paths.is_clear(&lanes, lane);
+        for (lane, is_clear) in is_clear.iter_mut().enumerate() {
+            *is_clear = paths.is_clear(&lanes, lane);
         }
         for lane in 0..LANES {
             if survives[lane] && is_clear[lane] {
