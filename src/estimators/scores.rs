@@ -186,7 +186,7 @@ pub struct Scores {
     pub cost: [u64; Cost::ALL.len()],
     /// Anomalies counted, indexed by [`Anomaly`].
     pub anomalies: [u64; Anomaly::ALL.len()],
-    /// What has been held back, where contributions are.
+    /// Contributions in their order, if they are held back; nothing is added then.
     held: Option<Vec<Contribution>>,
 }
 
@@ -226,9 +226,9 @@ impl Scores {
         }
     }
 
-    /// Takes what has been held back; `others` is held on with, empty.
-    pub(super) fn take_held(&mut self, others: Vec<Contribution>) -> Vec<Contribution> {
-        self.held.replace(others).unwrap_or_default()
+    /// Takes what has been held back, and leaves `empty`, a list whose memory is used again.
+    pub(super) fn take_held(&mut self, empty: Vec<Contribution>) -> Vec<Contribution> {
+        self.held.replace(empty).unwrap_or_default()
     }
 
     /// Adds contributions that were held back, and empties them.

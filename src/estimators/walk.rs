@@ -143,7 +143,7 @@ struct Onward {
     side: Side,
 }
 
-/// The refracted ray of a first hit, with the state of the path there.
+/// The refracted ray of a first hit, with the state of the path there: what following the reflected ray first would change.
 struct Later<B> {
     at: (Hit, Frame, BoundarySample),
     path: (Ray, Option<FaceId>, Option<WalkExit>),

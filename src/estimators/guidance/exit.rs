@@ -44,6 +44,14 @@ pub(super) fn unit(vector: Vec3) -> DVec3 {
     renormalized(vector.as_dvec3())
 }
 
+/// The chance of an escape at a depth (mm), over that at the plane: e^{-tau / mu} with a finite range.
+#[inline(always)]
+pub(super) fn fading(depth: f64, sigma_t: f64) -> f64 {
+    let tau = depth.max(0.0) * sigma_t;
+    let part = (1.0 - tau * (1.0 / REACH)).max(0.0);
+    (part * part) * (part * part)
+}
+
 /// What exits of one band have in common.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ExitRule {
@@ -87,9 +95,7 @@ impl ExitRule {
     /// From a point inside.
     #[inline]
     pub(super) fn escape(&self, exit: &ExitPlane, x: DVec3) -> Escape {
-        let depth = exit.depth(x).max(0.0) * self.sigma_t;
-        let part = (1.0 - depth * (1.0 / REACH)).max(0.0);
-        let chance = f64::from(exit.chance) * ((part * part) * (part * part));
+        let chance = f64::from(exit.chance) * fading(exit.depth(x), self.sigma_t);
         Escape { normal: unit(exit.normal), least_cosine: self.least_cosine, chance }
     }
 }

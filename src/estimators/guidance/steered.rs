@@ -132,12 +132,18 @@ impl WalkBands for GuidedBand<'_> {
     #[inline(always)]
     fn importance(&mut self, at: DVec3) -> f64 {
         self.at(at);
-        let importance = self.last.2 * self.per_entry;
-        (if importance > 0.0 { importance } else { 1.0 }) / self.ratio
+        importance(self.last.2, self.per_entry, self.ratio)
     }
 
     #[inline]
     fn density(&self) -> f64 {
         self.ratio * self.heading.turned()
     }
+}
+
+/// phi over its value where the walk came in, 1 if that is unknown, over the density of the walk.
+#[inline(always)]
+fn importance(phi: f64, per_entry: f64, ratio: f64) -> f64 {
+    let importance = phi * per_entry;
+    (if importance > 0.0 { importance } else { 1.0 }) / ratio
 }

@@ -30,7 +30,7 @@ pub type VectorLanes = [Lanes; 3];
 const ZERO: Lanes = [0.0; LANES];
 const NONE: VectorLanes = [ZERO; 3];
 
-/// [`super::StepDraw`], in the same order.
+/// Kinds of steps ([`super::StepDraw`]).
 const PLAIN: f64 = 0.0;
 const GUIDED: f64 = 1.0;
 const ESCAPE: f64 = 2.0;
@@ -70,15 +70,15 @@ pub struct StepLanes {
 /// What guides steps ([`StepGuide`]).
 #[derive(Clone, Debug)]
 pub struct GuideLanes {
-    /// Of pulls, and their levels.
+    /// Unit axes of pulls.
     pub axes: VectorLanes,
-    /// See there.
+    /// Levels of pulls.
     pub levels: [i32; LANES],
-    /// Of escapes.
+    /// Unit normals of escapes.
     pub normals: VectorLanes,
-    /// See there.
+    /// Least cosines of escapes.
     pub least_cosines: Lanes,
-    /// See there.
+    /// Probabilities that guided steps are escapes.
     pub chances: Lanes,
 }
 
@@ -189,8 +189,8 @@ impl StepLanes {
         mut draw: impl FnMut(usize) -> f64,
     ) {
         let levels = ProductLanes::new(levels, guides);
-        let (dirs, guides_of) = (&self.dirs, guides);
-        let mut tried = vectorized(FirstTry { phase, dirs, guides: guides_of, levels: &levels, draws });
+        let dirs = &self.dirs;
+        let mut tried = vectorized(FirstTry { phase, dirs, guides, levels: &levels, draws });
         for lane in 0..LANES {
             if tried.rejected[lane] > 0.0 {
                 let local = levels.try_again(phase, &tried, lane, || draw(lane));

@@ -1,6 +1,7 @@
 //! Importance where several walks are.
 
-use super::{ImportanceGrid, REACH};
+use super::ImportanceGrid;
+use crate::estimators::guidance::exit::fading;
 use crate::math::{DVec3, Vec3, Vectorized, renormalized, vectorized};
 use crate::optics::guided::{GuideLanes, LANES, Lanes, VectorLanes, vector};
 
@@ -104,8 +105,7 @@ impl Vectorized for Guides<'_> {
             let normal = wide(nx[lane], ny[lane], nz[lane]);
             (u[lane], v[lane], w[lane]) = (normal.x, normal.y, normal.z);
             let depth = f64::from(offsets[lane]) - normal.dot(DVec3::new(px[lane], py[lane], pz[lane]));
-            let part = (1.0 - depth.max(0.0) * sigma_t * (1.0 / REACH)).max(0.0);
-            chance[lane] = f64::from(chances[lane]) * ((part * part) * (part * part));
+            chance[lane] = f64::from(chances[lane]) * fading(depth, sigma_t);
         }
         (guides.axes, guides.normals, guides.chances) = (axes, normals, chance);
         phi

@@ -1,6 +1,6 @@
 //! Guided walks of one band side by side.
 
-use super::GuidedBand;
+use super::{GuidedBand, importance};
 use crate::estimators::guidance::{FoundLanes, Guidance};
 use crate::estimators::steps::{StepRule, Weights};
 use crate::geometry::Ray;
@@ -100,16 +100,15 @@ impl<'a> GuidedLanes<'a> {
         let ends = self.steps.ends();
         let phi = self.guidance.guide_all(ends, &self.normals, &self.found, &mut self.guides);
         let ratios = self.steps.arrive();
-        let mut importance = [0.0; LANES];
+        let mut importances = [0.0; LANES];
         for lane in 0..LANES {
-            let found = phi[lane] * self.per_entry[lane];
-            importance[lane] = (if found > 0.0 { found } else { 1.0 }) / ratios[lane];
+            importances[lane] = importance(phi[lane], self.per_entry[lane], ratios[lane]);
         }
         let mut goes_on = [false; LANES];
         for lane in 0..LANES {
             let stream = &mut self.streams[lane];
             let [throughput, seen] = &mut self.weights[lane];
-            let importance = || importance[lane];
+            let importance = || importances[lane];
             goes_on[lane] = !self.is_empty[lane]
                 && roulette.survive([throughput, seen], survival, importance, stream).is_some();
             if goes_on[lane] {
