@@ -159,7 +159,8 @@ fn weights_of_both_techniques_sum_to_one() {
         let u = [0.754_877_666, 0.569_840_291, 0.438_579_021].map(|a| (a * f64::from(i)).fract());
         let drawn = boundary.sample(wo, u).filter(|s| s.wi.z > 0.0);
         let (wi, own, pdf) = match (i % 2, drawn) {
-            (0, Some(BoundarySample { wi, density: Density::Finite(own), .. })) => {
+            (0, Some(BoundarySample { wi, .. })) => {
+                let Density::Finite(own) = boundary.density(wo, wi) else { panic!("a delta lobe") };
                 (wi, own, light.eval(0, wi).1)
             }
             (1, _) => {

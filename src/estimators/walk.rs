@@ -25,7 +25,7 @@ use super::vertices::{Unscattered, WalkExit};
 use super::{Anomaly, Cost, History, Scores, TransportClass};
 use crate::geometry::{BoundingSphere, FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
-use crate::optics::boundary::{Boundary, BoundarySample, Density, Event};
+use crate::optics::boundary::{Boundary, BoundarySample, Event, FACETS_FROM_OUTSIDE};
 use crate::optics::medium::Medium;
 use crate::sampling::distance::transmittance;
 use crate::sampling::stream::{Purpose, Stream};
@@ -122,6 +122,9 @@ enum DirectionDraw {
     Alone,
     /// Also by light sampling, in competition with this density per solid angle.
     Competing(f64),
+    /// The same, by a rough surface, from `wo` to `wi` in its frame. The density is asked where the path meets a light: most
+    /// directions lead to another point of the surface, and theirs would be computed for nothing.
+    Surface { wo: DVec3, wi: DVec3 },
 }
 
 /// A light and a direction to it, drawn by light sampling.
@@ -145,7 +148,7 @@ struct Onward {
 
 /// The refracted ray of a first hit, with the state of the path there: what following the reflected ray first would change.
 struct Later<B> {
-    at: (Hit, Frame, BoundarySample),
+    at: (Hit, Frame, DVec3, BoundarySample),
     path: (Ray, Option<FaceId>, Option<WalkExit>),
     weights: [f64; 2],
     events: (History, PathMeasure),
@@ -324,26 +327,27 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         later: &mut Option<Later<B>>,
     ) -> Option<Onward> {
         let (frame, wo) = self.meet(&hit, Side::Outside)?;
-        let [reflection, refraction] = self.boundary.sample_both(wo, self.stream.draw3(), facets);
+        let [reflection, refraction] =
+            self.boundary.sample_both(wo, self.stream.draw3(), facets.min(FACETS_FROM_OUTSIDE));
         *later = refraction.map(|sample| Later {
-            at: (hit, frame, sample),
+            at: (hit, frame, wo, sample),
             path: (self.ray, self.from, self.exit),
             weights: [self.throughput, self.survival],
             events: (self.history, self.measure),
             bands: self.bands.clone(),
         });
-        let side = self.leave(&hit, Side::Outside, &frame, reflection?)?;
+        let side = self.leave(&hit, Side::Outside, (&frame, wo), reflection?)?;
         Some(Onward { from: hit, side })
     }
 
     /// Once the reflected ray of a first hit has been followed, goes on with the refracted one.
     fn follow_refraction(&mut self, later: &mut Option<Later<B>>) -> Option<Onward> {
-        let Later { at: (hit, frame, sample), path, weights, events, bands } = later.take()?;
+        let Later { at: (hit, frame, wo, sample), path, weights, events, bands } = later.take()?;
         (self.ray, self.from, self.exit) = path;
         [self.throughput, self.survival] = weights;
         (self.history, self.measure) = events;
         self.bands = bands;
-        let side = self.leave(&hit, Side::Outside, &frame, sample)?;
+        let side = self.leave(&hit, Side::Outside, (&frame, wo), sample)?;
         Some(Onward { from: hit, side })
     }
 
@@ -487,7 +491,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         } else {
             self.boundary.sample(wo, u)?
         };
-        self.leave(hit, side, &frame, sample)
+        self.leave(hit, side, (&frame, wo), sample)
     }
 
     /// Moves the path to a point of the boundary.
@@ -519,8 +523,15 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         Some((frame, local))
     }
 
-    /// Leaves the boundary in a sampled direction; returns the side on which the path continues.
-    fn leave(&mut self, hit: &Hit, side: Side, frame: &Frame, sample: BoundarySample) -> Option<Side> {
+    /// Leaves the boundary in a direction that was sampled for `wo` in this frame; returns the side on which the path
+    /// continues.
+    fn leave(
+        &mut self,
+        hit: &Hit,
+        side: Side,
+        (frame, wo): (&Frame, DVec3),
+        sample: BoundarySample,
+    ) -> Option<Side> {
         let dir = frame.to_world(sample.wi);
         let next_side = if sample.event == Event::Refract { other(side) } else { side };
         if (dir.dot(hit.normal) > 0.0) != (next_side == Side::Outside) {
@@ -528,7 +539,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             return None;
         }
         self.unscattered = match (side, sample.event, self.unscattered) {
-            _ if sample.density != Density::Delta => Unscattered::No,
+            _ if !self.boundary.is_delta() => Unscattered::No,
             (Side::Outside, Event::Reflect, _) => Unscattered::Reflected,
             (Side::Outside, Event::Refract, _) => Unscattered::Inside,
             (Side::Inside, Event::Refract, Unscattered::Inside) => Unscattered::Through,
@@ -540,9 +551,10 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         self.throughput *= sample.weight;
         self.survival *= sample.weight * radiance_scale(side, next_side, &self.boundary);
         self.ray.dir = dir;
-        self.drawn = match sample.density {
-            Density::Delta => DirectionDraw::Alone,
-            Density::Finite(pdf) => DirectionDraw::Competing(pdf),
+        self.drawn = if self.boundary.is_delta() {
+            DirectionDraw::Alone
+        } else {
+            DirectionDraw::Surface { wo, wi: sample.wi }
         };
         Some(next_side)
     }
@@ -559,16 +571,15 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                 if bsdf == 0.0 {
                     continue;
                 }
-                let (own, sum) = match (self.drawn, &self.exit) {
-                    (DirectionDraw::Alone, Some(exit)) if rivals > 0.0 => {
-                        // A delta lobe's density is its probability.
-                        let own = self.boundary.transmittance_smooth(exit.wo);
-                        (own, walks * own + rivals)
-                    }
-                    (DirectionDraw::Alone, _) => (1.0, walks),
-                    (DirectionDraw::Competing(own), _) => {
-                        (own, walks * (own + by_light * (self.choice[index] * pdf)) + rivals)
-                    }
+                let by_light = match self.drawn {
+                    DirectionDraw::Alone => 0.0,
+                    _ => by_light * (self.choice[index] * pdf),
+                };
+                let (own, sum) = if by_light == 0.0 && rivals == 0.0 {
+                    (1.0, walks)
+                } else {
+                    let own = self.own_density();
+                    (own, walks * (own + by_light) + rivals)
                 };
                 if rivals > 0.0 {
                     self.rivals.weigh(sum);
@@ -576,6 +587,17 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                 let value = self.throughput * (own / sum) * radiance;
                 self.score(class, index, self.ray.origin, value);
             }
+        }
+    }
+
+    /// The density with which the path's own sampling has drawn its direction.
+    fn own_density(&self) -> f64 {
+        match (self.drawn, &self.exit) {
+            (DirectionDraw::Competing(pdf), _) => pdf,
+            (DirectionDraw::Surface { wo, wi }, _) => self.boundary.eval(wo, wi).1,
+            // The density of a delta lobe is its probability.
+            (DirectionDraw::Alone, Some(exit)) => self.boundary.transmittance_smooth(exit.wo),
+            (DirectionDraw::Alone, None) => 1.0,
         }
     }
 

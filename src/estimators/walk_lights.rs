@@ -5,6 +5,9 @@ use super::*;
 impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
     /// Samples a light from a rough surface vertex.
     pub(super) fn connect_from_surface(&mut self, hit: &Hit, frame: &Frame, wo: DVec3) {
+        if self.choice.iter().all(|&share| share == 0.0) {
+            return;
+        }
         let u = self.light_stream.draw3();
         let Some((index, choice)) = choose_light(self.choice, u[0]) else { return };
         let sample = self.scene.lights[index].sample(self.band, [u[1], u[2]]);

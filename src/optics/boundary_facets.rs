@@ -17,6 +17,10 @@ const MOST_FACETS: usize = 8;
 /// Facets for walks that know little of what light finds.
 pub const FEW_FACETS: usize = 3;
 
+/// The most facets that pay for light that meets the surface from outside, of which few facets send any to the wrong side; so many
+/// fill one vector.
+pub const FACETS_FROM_OUTSIDE: usize = 4;
+
 /// The second coordinates of a lattice, one per facet; the first are multiples of one part of their number.
 const LATTICE: [f64; MOST_FACETS] = {
     let mut points = [0.0; MOST_FACETS];
@@ -36,13 +40,16 @@ struct FacetLobe {
     /// Facets.
     count: usize,
     weights: [f64; MOST_FACETS],
+    /// Of the weights.
+    sum: f64,
     /// x, y, z of each facet's direction.
     directions: [[f64; MOST_FACETS]; 3],
 }
 
 impl FacetLobe {
     fn none(count: usize) -> FacetLobe {
-        FacetLobe { count, weights: [0.0; MOST_FACETS], directions: [[0.0; MOST_FACETS]; 3] }
+        let (weights, directions) = ([0.0; MOST_FACETS], [[0.0; MOST_FACETS]; 3]);
+        FacetLobe { count, weights, sum: 0.0, directions }
     }
 
     /// Of light that belongs on this side of the surface, with its G1.
@@ -54,18 +61,15 @@ impl FacetLobe {
         (x[facet], y[facet], z[facet]) = (wi.x, wi.y, wi.z);
     }
 
-    fn sum(&self) -> f64 {
-        self.weights[..self.count].iter().sum()
-    }
-
     /// Mean over the facets.
+    #[inline]
     fn weight(&self) -> f64 {
-        self.sum() / self.count as f64
+        self.sum / self.count as f64
     }
 
     /// One direction, in proportion to its weight; `None` where none weighs anything.
     fn choose(&self, u: f64) -> Option<DVec3> {
-        let mut rest = u * self.sum();
+        let mut rest = u * self.sum;
         let mut chosen = None;
         for (facet, weight) in self.weights[..self.count].iter().enumerate() {
             if *weight > 0.0 {
@@ -99,8 +103,8 @@ impl Boundary {
     /// [`Boundary::sample`] out of `count` facets (at most 8), which a rough surface has, and both lobes of each: one direction in
     /// proportion to its weight, times `gain` where it is refracted, and weighted accordingly. With a gain of 1 the weight is
     /// the mean weight of a facet; with what refracted light finds over what reflected light finds, the product of weight and
-    /// light found is the same for both. Its density is that of [`Self::sample`]: weights of the balance heuristic may use
-    /// it, since they need but sum to 1.
+    /// light found is the same for both. Weights of the balance heuristic may use [`Self::density`], which is that of
+    /// [`Self::sample`], since they need but sum to 1.
     pub fn sample_of_several(
         &self,
         wo: DVec3,
@@ -109,7 +113,8 @@ impl Boundary {
         count: usize,
     ) -> Option<BoundarySample> {
         if let Boundary::Rough { eta, facets } = *self {
-            let lobes = Meeting { wo, relative: side_eta(eta, wo), facets }.lobes([u[1], u[2]], count);
+            let mut lobes = [FacetLobe::none(count), FacetLobe::none(count)];
+            Meeting { wo, relative: side_eta(eta, wo), facets }.fill(&mut lobes, [u[1], u[2]]);
             let (lobe, weight, u) = choose_lobe(lobes.each_ref().map(FacetLobe::weight), gain, u[0])?;
             return Some(self.sample_of(wo, lobes[lobe].choose(u)?, EVENTS[lobe], weight));
         }
@@ -123,7 +128,8 @@ impl Boundary {
     /// refraction, weighing together what [`Self::sample_of_several`] weighs; without what weighs nothing or fails.
     pub fn sample_both(&self, wo: DVec3, u: [f64; 3], count: usize) -> [Option<BoundarySample>; 2] {
         if let Boundary::Rough { eta, facets } = *self {
-            let lobes = Meeting { wo, relative: side_eta(eta, wo), facets }.lobes([u[1], u[2]], count);
+            let mut lobes = [FacetLobe::none(count), FacetLobe::none(count)];
+            Meeting { wo, relative: side_eta(eta, wo), facets }.fill(&mut lobes, [u[1], u[2]]);
             return [0, 1].map(|i| {
                 let lobe = &lobes[i];
                 Some(self.sample_of(wo, lobe.choose(u[0])?, EVENTS[i], lobe.weight()))
@@ -152,26 +158,22 @@ struct Meeting {
 }
 
 impl Meeting {
-    /// Where several facets reflect and refract `wo`. They are the points of a lattice that `u` shifts, each of them
+    /// Where several facets reflect and refract `wo`, in both lobes. They are the points of a lattice that `u` shifts, each of them
     /// uniform, and together spread evenly, so that their mean varies less than that of independent ones.
     #[inline]
-    fn lobes(self, u: [f64; 2], count: usize) -> [FacetLobe; 2] {
-        let mut lobes = [FacetLobe::none(count), FacetLobe::none(count)];
+    fn fill(self, lobes: &mut [FacetLobe; 2], u: [f64; 2]) {
+        let count = lobes[0].count;
         match self.facets.kind {
-            MicrofacetKind::Ggx if count <= 4 => {
-                vectorized(GgxLobes::<4> { meeting: self, u, lobes: &mut lobes });
-            }
-            MicrofacetKind::Ggx => {
-                vectorized(GgxLobes::<MOST_FACETS> { meeting: self, u, lobes: &mut lobes });
-            }
+            MicrofacetKind::Ggx if count <= 4 => vectorized(GgxLobes::<4> { meeting: self, u, lobes }),
+            MicrofacetKind::Ggx => vectorized(GgxLobes::<MOST_FACETS> { meeting: self, u, lobes }),
             MicrofacetKind::Beckmann => {
                 for facet in 0..count {
                     let h = visible_facet(&self.facets, self.wo, lattice_point(u, facet, count));
-                    self.send(h, |wi| self.facets.g1(wi), facet, &mut lobes);
+                    self.send(h, |wi| self.facets.g1(wi), facet, lobes);
                 }
             }
         }
-        lobes
+        lobes.iter_mut().for_each(|lobe| lobe.sum = lobe.weights[..count].iter().sum());
     }
 
     /// Where a facet of normal `h` reflects and refracts light, and what each way weighs: its share of the light times `g1`, 0
@@ -255,13 +257,12 @@ fn choose_lobe([reflected, refracted]: [f64; 2], gain: f64, u: f64) -> Option<(u
 
 #[cfg(test)]
 mod tests {
-    use super::super::Density;
     use super::super::tests::{direction, rough_surfaces};
     use super::*;
     use crate::sampling::stream::{Purpose, StreamKey};
 
     /// Several facets, both lobes of each, and a choice that prefers refraction are what one facet gives on average: weight, and
-    /// a direction weighted by it; with densities that are those of the directions.
+    /// a direction weighted by it.
     #[test]
     fn several_facets_are_the_mean_of_one() {
         let smooth = [Boundary::Smooth { eta: 1.4 }, Boundary::Smooth { eta: 0.7 }, Boundary::Matched];
@@ -281,11 +282,6 @@ mod tests {
                         [[surface.sample(wo, u), None], [several, None], [a, b], [leaving, None]];
                     for (sums, drawn) in sums.iter_mut().zip(drawn) {
                         for s in drawn.into_iter().flatten() {
-                            let own = match surface {
-                                Boundary::Rough { .. } => Density::Finite(surface.eval(wo, s.wi).1),
-                                _ => Density::Delta,
-                            };
-                            assert_eq!(s.density, own);
                             let values = [s.weight, s.weight * s.wi.x, s.weight * s.wi.z];
                             for (sum, x) in
                                 sums[usize::from(s.event == Event::Refract)].iter_mut().zip(values)
@@ -359,11 +355,13 @@ mod tests {
                     let none = || [FacetLobe::none(count), FacetLobe::none(count)];
                     let (mut least, mut single) = (none(), none());
                     GgxLobes::<MOST_FACETS> { meeting, u, lobes: &mut least }.call();
+                    let mut filled = none();
+                    meeting.fill(&mut filled, u);
                     for facet in 0..count {
                         let h = visible_facet(&facets, wo, lattice_point(u, facet, count));
                         meeting.send(h, |wi| facets.g1(wi), facet, &mut single);
                     }
-                    for lobes in [meeting.lobes(u, count), least] {
+                    for lobes in [filled, least] {
                         for (lobe, expected) in lobes.iter().zip(&single) {
                             let bits = |lobe: &FacetLobe| {
                                 let [x, y, z] = lobe.directions;

@@ -323,8 +323,9 @@ impl RoughSampler {
             let wi = self.boundary.sample_refraction(self.wo, stream.draw2())?;
             return Some((Event::Refract, wi, self.boundary.pdf_refraction(self.wo, wi)));
         }
-        let BoundarySample { wi, density, event, .. } = self.boundary.sample(self.wo, stream.draw3())?;
+        let BoundarySample { wi, event, .. } = self.boundary.sample(self.wo, stream.draw3())?;
         // The rough surface has no delta lobe: a density that claims one is wrong.
+        let density = self.boundary.density(self.wo, wi);
         let pdf = if let Density::Finite(pdf) = density { pdf } else { f64::NAN };
         Some((event, wi, pdf))
     }
@@ -557,7 +558,8 @@ impl Sampler for SmoothSampler {
             }
         };
         let is_right = (sample.wi - wi).length() < 1e-12 && (sample.weight / weight - 1.0).abs() < 1e-12;
-        Draw::Delta { index, exact: is_right && sample.density == Density::Delta }
+        let is_delta = self.boundary.density(self.wo, sample.wi) == Density::Delta;
+        Draw::Delta { index, exact: is_right && is_delta }
     }
 
     fn pieces(&self) -> Vec<Piece> {

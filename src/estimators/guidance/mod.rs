@@ -62,8 +62,11 @@ pub enum WalkDraw {
         #[serde(default = "nodes")]
         #[schemars(range(min = 4, max = 256))]
         nodes: u32,
-        /// Walks stay plain in a finite body that is nowhere as deep as this many mean free paths after similarity,
-        /// 1 / (sigma_t (1 - albedo g)): light leaves such a body too soon for a guide to pay.
+        /// Walks stay plain in a finite body or a slab that is nowhere as deep as this: light leaves such a body too soon for a
+        /// guide to pay.
+        ///
+        /// In units of (2 + 1 / (1 - albedo g)) / (3 sigma_t), two thirds of a mean free path and one third of that after
+        /// similarity.
         #[serde(default = "least_depth")]
         #[schemars(range(min = 0.0))]
         least_depth: f64,
@@ -117,7 +120,7 @@ fn most() -> f64 {
 }
 
 fn least_depth() -> f64 {
-    5.0
+    4.7
 }
 
 fn nodes() -> u32 {

@@ -260,9 +260,16 @@ fn where_nothing_guides() {
     let still = scene(SPHERE, SMOOTH, medium(5.0, 0.0, 0.0), vec![sky()]);
     let guided = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0, near_lights: true };
     assert!(first(Guidance::of_bands(&still, guided)).is_none());
-    let shallow = |depth| scene(SPHERE, SMOOTH, medium(depth, 0.9, 0.0), vec![sky()]);
-    assert!(first(Importance::of_bands(&shallow(4.0), 16, 5.0)).is_none());
-    assert!(first(Importance::of_bands(&shallow(6.0), 16, 5.0)).is_some());
+    for shape in [SPHERE, Shape::Slab { thickness: 2.0 }] {
+        // By similarity a mean free path becomes 1 / (1 - 0.9 * 0.8) of it; a third of this counts.
+        for (g, unit) in [(0.0, 1.0), (0.8, (2.0 + 1.0 / 0.28) / 3.0)] {
+            for (depth, is_deep) in [(4.99, false), (5.01, true)] {
+                let scene = scene(shape.clone(), SMOOTH, medium(depth * unit, 0.9, g), vec![sky()]);
+                let found = first(Importance::of_bands(&scene, 16, 5.0));
+                assert_eq!(found.is_some(), is_deep, "{shape:?} {g} {depth}");
+            }
+        }
+    }
     // Where little is absorbed and a sky is everywhere, walks find the same whatever they do; not if light comes from one side.
     let bright = |albedo, boundary, light: Light| {
         first(Importance::of_bands(
