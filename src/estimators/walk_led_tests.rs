@@ -70,8 +70,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let (ray, throughput) = (self.ray, self.throughput);
         let (weight, drawn) = match (self.exit, self.boundary) {
             (Some(exit), Boundary::Rough { .. }) => {
-                let (f_cos, pdf) = self.boundary.eval(exit.wo, exit.frame.to_local(wi));
-                (f_cos / pdf, DirectionDraw::Competing(pdf))
+                let (wo, wi) = (exit.wo, exit.frame.to_local(wi));
+                let (f_cos, pdf) = self.boundary.eval(wo, wi);
+                (f_cos / pdf, DirectionDraw::Surface { wo, wi })
             }
             (Some(_), boundary) => (boundary.eta() * boundary.eta(), DirectionDraw::Alone),
             (None, _) => {
