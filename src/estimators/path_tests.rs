@@ -11,7 +11,7 @@ use super::super::{Cost, Layout};
 use super::*;
 use crate::geometry::{Ray, Shape, procedural};
 use crate::math::{DVec3, Frame};
-use crate::optics::boundary::{BoundarySample, Density};
+use crate::optics::boundary::BoundarySample;
 use crate::optics::medium::Medium;
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::optics::phase::HenyeyGreenstein;
@@ -159,10 +159,7 @@ fn weights_of_both_techniques_sum_to_one() {
         let u = [0.754_877_666, 0.569_840_291, 0.438_579_021].map(|a| (a * f64::from(i)).fract());
         let drawn = boundary.sample(wo, u).filter(|s| s.wi.z > 0.0);
         let (wi, own, pdf) = match (i % 2, drawn) {
-            (0, Some(BoundarySample { wi, .. })) => {
-                let Density::Finite(own) = boundary.density(wo, wi) else { panic!("a delta lobe") };
-                (wi, own, light.eval(0, wi).1)
-            }
+            (0, Some(BoundarySample { wi, .. })) => (wi, boundary.eval(wo, wi).1, light.eval(0, wi).1),
             (1, _) => {
                 let sample = light.sample(0, [u[0], u[1]]);
                 let pdf = sample.pdf.unwrap_or(0.0);

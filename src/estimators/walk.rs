@@ -575,6 +575,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                     DirectionDraw::Alone => 0.0,
                     _ => by_light * (self.choice[index] * pdf),
                 };
+                // What nothing competes with has weight 1, without its density, which costs as much as the meeting itself.
                 let (own, sum) = if by_light == 0.0 && rivals == 0.0 {
                     (1.0, walks)
                 } else {

@@ -42,15 +42,6 @@ pub enum Boundary {
     Matched,
 }
 
-/// How densely a direction was sampled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Density {
-    /// Density per solid angle, 1/sr.
-    Finite(f64),
-    /// A delta lobe: no other technique can draw this direction.
-    Delta,
-}
-
 /// Event at the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
@@ -114,12 +105,6 @@ impl Boundary {
         let radiance =
             if event == Event::Refract { 1.0 / square(side_eta(self.eta(), wo)) } else { 1.0 };
         BoundarySample { wi, weight: weight * radiance, event }
-    }
-
-    /// How densely [`Self::sample`] draws `wi`, the choice of lobe included.
-    #[inline]
-    pub fn density(&self, wo: DVec3, wi: DVec3) -> Density {
-        if self.is_delta() { Density::Delta } else { Density::Finite(self.eval(wo, wi).1) }
     }
 
     /// f |cos_i| (1/sr) and the density of `wi` given `wo` (1/sr), both without delta lobes: the pair
@@ -354,7 +339,7 @@ mod tests {
                         for u2 in grid(16) {
                             let Some(s) = surface.sample(wo, [u0, u1, u2]) else { continue };
                             let (value, pdf) = surface.eval(wo, s.wi);
-                            assert!(pdf > 0.0 && surface.density(wo, s.wi) == Density::Finite(pdf));
+                            assert!(pdf > 0.0);
                             assert!(
                                 (s.weight * pdf / value - 1.0).abs() < 1e-10,
                                 "{surface:?} {cos}: {s:?} {value}"
@@ -422,7 +407,7 @@ mod tests {
         for cos in [0.9, 0.5, 0.1] {
             let wo = direction(cos, 0.7);
             let s = surface.sample(wo, [0.999_999, 0.0, 0.0]).expect("refracts");
-            assert_eq!(surface.density(wo, s.wi), Density::Delta);
+            assert!(surface.is_delta() && surface.eval(wo, s.wi) == (0.0, 0.0));
             assert!(((1.0 - cos * cos).sqrt() / (1.0 - s.wi.z * s.wi.z).sqrt() - 1.4).abs() < 1e-12);
             assert!((s.weight - 1.0 / (1.4 * 1.4)).abs() < 1e-15);
             let back = surface.sample(s.wi, [0.999_999, 0.0, 0.0]).expect("refracts back");

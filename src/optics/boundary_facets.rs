@@ -103,8 +103,8 @@ impl Boundary {
     /// [`Boundary::sample`] out of `count` facets (at most 8), which a rough surface has, and both lobes of each: one direction in
     /// proportion to its weight, times `gain` where it is refracted, and weighted accordingly. With a gain of 1 the weight is
     /// the mean weight of a facet; with what refracted light finds over what reflected light finds, the product of weight and
-    /// light found is the same for both. Weights of the balance heuristic may use [`Self::density`], which is that of
-    /// [`Self::sample`], since they need but sum to 1.
+    /// light found is the same for both. Weights of the balance heuristic may use the density of [`Self::sample`], since they need
+    /// but sum to 1.
     pub fn sample_of_several(
         &self,
         wo: DVec3,

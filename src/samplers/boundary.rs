@@ -9,7 +9,7 @@ use super::kind::{SamplerKind, sampler_kind};
 use super::sampler::{Contrast, Coordinate, Discrete, Draw, Null, Piece, Sampler};
 use crate::error::{Error, Result};
 use crate::math::{DVec3, acos, asin, atan2, integrate, sin, tan};
-use crate::optics::boundary::{Boundary, BoundarySample, Density, Event};
+use crate::optics::boundary::{Boundary, BoundarySample, Event};
 use crate::optics::fresnel::fresnel;
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::sampling::stream::Stream;
@@ -324,10 +324,7 @@ impl RoughSampler {
             return Some((Event::Refract, wi, self.boundary.pdf_refraction(self.wo, wi)));
         }
         let BoundarySample { wi, event, .. } = self.boundary.sample(self.wo, stream.draw3())?;
-        // The rough surface has no delta lobe: a density that claims one is wrong.
-        let density = self.boundary.density(self.wo, wi);
-        let pdf = if let Density::Finite(pdf) = density { pdf } else { f64::NAN };
-        Some((event, wi, pdf))
+        Some((event, wi, self.boundary.eval(self.wo, wi).1))
     }
 
     fn point(&self, event: Event, wi: DVec3, pdf: f64) -> Option<Draw> {
@@ -558,8 +555,9 @@ impl Sampler for SmoothSampler {
             }
         };
         let is_right = (sample.wi - wi).length() < 1e-12 && (sample.weight / weight - 1.0).abs() < 1e-12;
-        let is_delta = self.boundary.density(self.wo, sample.wi) == Density::Delta;
-        Draw::Delta { index, exact: is_right && is_delta }
+        let has_no_density =
+            self.boundary.is_delta() && self.boundary.eval(self.wo, sample.wi) == (0.0, 0.0);
+        Draw::Delta { index, exact: is_right && has_no_density }
     }
 
     fn pieces(&self) -> Vec<Piece> {

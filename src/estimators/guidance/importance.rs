@@ -91,9 +91,9 @@ const UNKNOWN: Node = Node { axis: Vec3::Z, phi: 0.0, level_and_exit: NO_EXIT <<
 const LEAST_CONTRAST: f64 = 0.016;
 
 /// What the depth of a body is measured in, mm: two thirds of a mean free path and one third of that after similarity. How
-/// often a walk scatters before it leaves grows with the latter; what its first and last flight cost does not. Under a sky,
-/// behind a smooth boundary and at albedo 0.8 to 0.99, guided and plain walks are level in spheres of 3.7 to 4.84 of these
-/// units, for g from -0.5 to 0.95; the default of `least_depth` is just above.
+/// often a walk scatters before it leaves grows with the latter; what its first and last flight cost does not. Under a sky and
+/// behind a smooth boundary guided walks have 0.98 to 1.2 of the efficiency of plain ones in spheres of 3.8 to 4.84 of these
+/// units, for g from -0.5 to 0.95 (experiments/compare/walks-depth.toml); the default of `least_depth` is just above.
 fn unit_of_depth(medium: &Medium) -> f64 {
     let after_similarity = 1.0 / (1.0 - medium.albedo * medium.phase.g);
     (2.0 + after_similarity) / (3.0 * medium.sigma_t)
@@ -403,16 +403,18 @@ impl Cells {
         self.lattice.neighbour(index, offset).map_or(NONE, |index| self.numbers[index])
     }
 
-    /// How far from the boundary a point may be (a lower bound of it), mm: the deepest middle, moved by less and less of a cell
-    /// as long as that leads deeper.
+    /// How far from the boundary a point inside may be (a lower bound of it), mm: the deepest middle, moved by less and less of a
+    /// cell as long as that leads deeper.
     fn depth(&self, shape: &Shape) -> f64 {
         let below = |point: DVec3| (shape.clearance(point), point);
         let middles = self.inside.iter().map(|&index| below(self.lattice.middle(index)));
         let deeper = |a: (f64, DVec3), b: (f64, DVec3)| if b.0 > a.0 { b } else { a };
-        let mut deepest = middles.fold((0.0, DVec3::ZERO), deeper);
+        let Some(mut deepest) = middles.reduce(deeper) else { return 0.0 };
         let mut step = 0.5 * self.lattice.spacing;
         while step > 0.01 * self.lattice.spacing {
-            let ways = DVec3::AXES.into_iter().flat_map(|axis| [axis * step, axis * -step]);
+            // No farther than the boundary: the clearance of a mesh does not tell outside from inside.
+            let reach = step.min(deepest.0);
+            let ways = DVec3::AXES.into_iter().flat_map(|axis| [axis * reach, axis * -reach]);
             let moved = ways.map(|way| below(deepest.1 + way)).fold(deepest, deeper);
             // Steps that gain next to nothing would only be many.
             step *= if moved.0 > deepest.0 + 0.01 * step { 1.0 } else { 0.5 };

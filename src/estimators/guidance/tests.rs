@@ -270,6 +270,16 @@ fn where_nothing_guides() {
             }
         }
     }
+    // On a coarse grid, too, a ring is at most as deep as its radius, though there is more room in its middle.
+    let ring = |radius| Shape::Mesh(procedural::torus(1.0, radius, [96, 24], false).expect("closed"));
+    for (radius, is_deep) in [(0.06, false), (0.15, false), (0.2, false), (0.4, true)] {
+        let scene = scene(ring(radius), SMOOTH, medium(20.0, 0.9, 0.0), vec![sky()]);
+        for nodes in [4, 5, 8, 11, 16, 24] {
+            let found = first(Importance::of_bands(&scene, nodes, 5.0));
+            assert!(found.is_none() || is_deep, "{radius} {nodes}");
+            assert!(found.is_some() || !is_deep || nodes < 8, "{radius} {nodes}");
+        }
+    }
     // Where little is absorbed and a sky is everywhere, walks find the same whatever they do; not if light comes from one side.
     let bright = |albedo, boundary, light: Light| {
         first(Importance::of_bands(
