@@ -10,6 +10,12 @@ use crate::optics::boundary::Boundary;
 use crate::sampling::stream::PassKey;
 use crate::scene::Scene;
 
+/// Albedo after similarity from which on plain walks at a rough boundary find an even light better without light samples. A dark
+/// body needs them: most of its light is reflected at the surface, where a plain walk follows one lobe in many. Measured under
+/// a sky at GGX roughness 0.04, 0.2 and 0.5, up to the depth from which on walks are guided, with g from -0.5 to 0.95: 0.97 to
+/// 6.8 times the efficiency above 0.7, 0.62 to 1.3 below 0.65.
+const FINDS_EVEN: f64 = 0.75;
+
 /// Data that all walks of an estimator share.
 #[derive(Debug)]
 pub(super) struct Field {
@@ -41,16 +47,31 @@ impl Field {
         Field { choice: shares_of_uneven(&self.scene), ..self }
     }
 
-    /// The same in bands whose walks are guided, and at matched boundaries, where light samples at every vertex are most of the
-    /// noise whatever the walk. Plain walks through a rough boundary may need the samples.
-    pub(super) fn finding_even_lights_where_guided(self) -> Field {
+    /// The same in bands where it pays: where walks are guided; at matched boundaries, where light samples at every vertex are
+    /// most of the noise whatever the walk; and at rough ones where the body scatters more than [`FINDS_EVEN`].
+    pub(super) fn finding_even_lights_where_it_pays(self) -> Field {
         let uneven = shares_of_uneven(&self.scene);
         let finds = |band: usize| {
-            self.guidance(band).is_some() || matches!(self.scene.boundary[band], Boundary::Matched)
+            self.guidance(band).is_some()
+                || match self.scene.boundary[band] {
+                    Boundary::Matched => true,
+                    Boundary::Rough { .. } => self.scene.medium[band].similar_albedo() >= FINDS_EVEN,
+                    Boundary::Smooth { .. } => false,
+                }
         };
         let choose = |(band, uneven)| if finds(band) { uneven } else { self.choice[band].clone() };
         let choice = uneven.into_iter().enumerate().map(choose).collect();
         Field { choice, ..self }
+    }
+
+    /// Per band, the share of even lights in all light, by strength.
+    pub(super) fn shares_of_even(&self) -> Vec<f64> {
+        let uneven = shares_of_uneven(&self.scene);
+        let of_band = |(all, uneven): (&Vec<f64>, Vec<f64>)| {
+            let even = |(share, uneven): (&f64, f64)| if uneven == 0.0 { *share } else { 0.0 };
+            all.iter().zip(uneven).map(even).sum()
+        };
+        self.choice.iter().zip(uneven).map(of_band).collect()
     }
 
     /// What guides the walks of a band; `None` where they are plain.

@@ -47,14 +47,19 @@ impl TaughtField {
         TaughtField { untaught: self.untaught.finding_even_lights(), ..self }
     }
 
-    /// The same where walks are guided: [`Field::finding_even_lights_where_guided`].
-    pub(super) fn finding_even_lights_where_guided(self) -> TaughtField {
-        TaughtField { untaught: self.untaught.finding_even_lights_where_guided(), ..self }
+    /// The same where it pays: [`Field::finding_even_lights_where_it_pays`].
+    pub(super) fn finding_even_lights_where_it_pays(self) -> TaughtField {
+        TaughtField { untaught: self.untaught.finding_even_lights_where_it_pays(), ..self }
     }
 
     /// The same with plain walks in some bands.
     pub(super) fn plain_in(self, is_plain: impl Fn(usize, &Guidance) -> bool) -> TaughtField {
         TaughtField { untaught: self.untaught.plain_in(is_plain), ..self }
+    }
+
+    /// Per band, the share of even lights in all light, by strength.
+    pub(super) fn shares_of_even(&self) -> Vec<f64> {
+        self.untaught.shares_of_even()
     }
 
     /// The scene.

@@ -70,8 +70,9 @@ pub enum WalkDraw {
         #[serde(default = "least_depth")]
         #[schemars(range(min = 0.0))]
         least_depth: f64,
-        /// Whether walks are guided even where subdivision connects to every light and the lights illuminate the points at
-        /// which walks enter: there connections find the light, and a plain step costs less.
+        /// Whether walks are guided even where other techniques find the light whatever the walk, so that a plain step costs
+        /// less: in `snee` where subdivision connects to every light and the lights illuminate the points at which walks
+        /// enter; in `path` where small lights do and little is absorbed, and in matched bodies under small lights.
         #[serde(default)]
         near_lights: bool,
     },
@@ -137,6 +138,10 @@ fn paths() -> u64 {
 
 /// Number of sensor rays that sample the points at which walks enter.
 const RAYS: usize = 64;
+
+/// Importance at the points at which walks enter, over its largest in the body, from which on the lights illuminate these points
+/// ([`Guidance::at_first_hits`]).
+pub(super) const NEAR: f64 = 0.1;
 
 /// How the growth of importance is determined.
 #[derive(Clone, Debug)]

@@ -35,7 +35,7 @@ use std::sync::{Arc, OnceLock};
 use super::bands::{MAX_SHARED, OneBand, SharedBands, WalkBands};
 use super::connection::{self, Conic};
 use super::field::Path;
-use super::guidance::GuidedBand;
+use super::guidance::{GuidedBand, NEAR};
 use super::illumination::unscattered_notes;
 use super::walk::{CameraWalk, Unrivalled, trace_alone};
 use super::warm_up::TaughtField;
@@ -59,10 +59,6 @@ pub use options::{EdgeTechnique, JointKind, SneeChoices, SneeOptions, SneePreset
 pub use probe::ProbeShares;
 pub use specular::ConnectionCall;
 pub use two_bounce::TwoBounce;
-
-/// Importance where walks come in, over its largest in the body, from which on they stay plain under lights that are all
-/// connected to.
-const NEAR: f64 = 0.1;
 
 /// Data of connections, for one band.
 #[derive(Clone, Debug)]
@@ -186,7 +182,7 @@ impl Snee {
             });
         }
         if options.walk.is_guided() && options.strategies.bsdf {
-            walks = walks.finding_even_lights_where_guided();
+            walks = walks.finding_even_lights_where_it_pays();
         }
         Ok(Snee { walks, options, setups, learned: OnceLock::new() })
     }
