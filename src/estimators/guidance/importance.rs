@@ -93,7 +93,8 @@ const LEAST_CONTRAST: f64 = 0.016;
 /// What the depth of a body is measured in, mm: two thirds of a mean free path and one third of that after similarity. How
 /// often a walk scatters before it leaves grows with the latter; what its first and last flight cost does not. Under a sky and
 /// behind a smooth boundary guided walks have 0.98 to 1.2 of the efficiency of plain ones in spheres of 3.8 to 4.84 of these
-/// units, for g from -0.5 to 0.95 (experiments/compare/walks-depth.toml); the default of `least_depth` is just above.
+/// units, for g from -0.5 to 0.95 (experiments/compare/walks-depth.toml; 1.15 to 1.35 on another machine); the default of
+/// `least_depth` is just above.
 fn unit_of_depth(medium: &Medium) -> f64 {
     let after_similarity = 1.0 / (1.0 - medium.albedo * medium.phase.g);
     (2.0 + after_similarity) / (3.0 * medium.sigma_t)
