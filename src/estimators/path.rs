@@ -45,8 +45,8 @@ const EVEN_ENOUGH: f64 = 0.25;
 /// Light samples find such lights from any vertex at the boundary (in a matched body, from any vertex), and the choice among them
 /// causes most of the variance; guiding shortens walks, which pays where they absorb enough for that. Measured in spheres of 5
 /// to 30 mean free paths (g from -0.5 to 0.8) under parallel light and discs of 0.2 to 3 sr: rough boundaries are level at an
-/// albedo of 0.9 after similarity, smooth ones at 0.96 to 0.99. Matched bodies lost from the lit side, and from behind below an albedo
-/// of 0.94.
+/// albedo of 0.9 after similarity, smooth ones at 0.96 to 0.99. Matched bodies lost from the lit side; from behind they lost up to
+/// an albedo of 0.9 and gained from 0.95 on.
 fn pays_under_small_lights(boundary: &Boundary, medium: &Medium, is_near: bool) -> bool {
     match boundary {
         Boundary::Matched => !is_near && medium.albedo >= 0.94,
@@ -65,9 +65,8 @@ pub struct PathOptions {
     /// How walks are sampled inside the body; all choices are unbiased.
     #[serde(default)]
     pub walk: WalkDraw,
-    /// Whether even lights, with 4 pi int L^2 / (int L)^2 < 2, are also light-sampled, beside BSDF sampling at the boundary;
-    /// by default they are if walks are not guided; if they are, only in bands whose walks stay plain at a rough boundary of a
-    /// dark body.
+    /// Whether even lights, with 4 pi int L^2 / (int L)^2 < 2, are also light-sampled, beside BSDF sampling at the boundary. By
+    /// default they are; with `walk = { guided = {} }` only where walks stay plain at the rough boundary of a dark body.
     pub sample_even_lights: Option<bool>,
 }
 
