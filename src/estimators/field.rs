@@ -7,13 +7,14 @@ use super::guidance::{Guidance, WalkDraw};
 use super::roulette::Roulette;
 use crate::geometry::BoundingSphere;
 use crate::optics::boundary::Boundary;
+use crate::optics::bssrdf::Reduced;
 use crate::sampling::stream::PassKey;
 use crate::scene::Scene;
 
-/// Albedo after similarity from which on plain walks at a rough boundary find an even light better without light samples. A dark
-/// body needs them: most of its light is reflected at the surface, where a plain walk follows one lobe in many. Measured under
-/// a sky at GGX roughness 0.04, 0.2 and 0.5, up to the depth from which on walks are guided, with g from -0.5 to 0.95: 0.97 to
-/// 6.8 times the efficiency from 0.7 on, 0.62 to 1.4 below 0.65.
+/// Reduced albedo from which on plain walks at a rough boundary find an even light better without light samples. A dark body
+/// needs them: most of its light is reflected at the surface, and a plain walk rarely follows that lobe. Measured under a sky
+/// in bodies up to the depth from which on walks are guided: 1.09 to 3.8 times the efficiency from here on, 0.63 to 1.4 below
+/// (experiments/compare/walks-even.toml).
 const FINDS_EVEN: f64 = 0.75;
 
 /// Data that all walks of an estimator share.
@@ -48,14 +49,17 @@ impl Field {
     }
 
     /// The same in bands where it pays: where walks are guided; at matched boundaries, where light samples at every vertex are
-    /// most of the noise whatever the walk; and at rough ones where the body scatters more than [`FINDS_EVEN`].
+    /// most of the noise whatever the walk; and at rough ones where the reduced albedo is [`FINDS_EVEN`] or more.
     pub(super) fn finding_even_lights_where_it_pays(self) -> Field {
         let uneven = shares_of_uneven(&self.scene);
         let finds = |band: usize| {
             self.guidance(band).is_some()
                 || match self.scene.boundary[band] {
                     Boundary::Matched => true,
-                    Boundary::Rough { .. } => self.scene.medium[band].similar_albedo() >= FINDS_EVEN,
+                    Boundary::Rough { .. } => {
+                        let medium = &self.scene.medium[band];
+                        medium.sigma_t > 0.0 && Reduced::of(medium).albedo >= FINDS_EVEN
+                    }
                     Boundary::Smooth { .. } => false,
                 }
         };

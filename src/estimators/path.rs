@@ -22,36 +22,37 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::guidance::{Guidance, NEAR, WalkDraw};
+use super::guidance::WalkDraw;
 use super::illumination::unscattered_notes;
 use super::walk::trace_alone;
 use super::warm_up::TaughtField;
 use super::{Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::Result;
 use crate::optics::boundary::Boundary;
+use crate::optics::bssrdf::Reduced;
 use crate::optics::medium::Medium;
 use crate::sampling::stream::PassKey;
 use crate::scene::Scene;
 
 pub use super::Roulette;
 
-/// Share of even lights from which on walks are guided whatever the other lights: boundaries and phase functions find an even
-/// light in any direction, so that what is left of the variance is that of the walk. In spheres of 10 mean free paths (albedo
-/// 0.95 and 0.99) under parallel light and a sky, guided and plain walks were level at a share of 0.27.
+/// Share of even lights, by strength, from which on walks are guided whatever the other lights: boundaries and phase functions
+/// find an even light in any direction, so that what is left of the variance is that of the walk. Under parallel light and a
+/// sky that has a share of 0.27, guided walks are level with plain ones or better (experiments/compare/walks-small-lights.toml).
 const EVEN_ENOUGH: f64 = 0.25;
 
 /// Whether guided walks pay under lights that are sampled, where these illuminate the points at which walks enter, or do not.
 ///
 /// Light samples find such lights from any vertex at the boundary (in a matched body, from any vertex), and the choice among them
-/// causes most of the variance; guiding shortens walks, which pays where they absorb enough for that. Measured in spheres of 5
-/// to 30 mean free paths (g from -0.5 to 0.8) under parallel light and discs of 0.2 to 3 sr: rough boundaries are level at an
-/// albedo of 0.9 after similarity, smooth ones at 0.96 to 0.99. Matched bodies lost from the lit side; from behind they lost up to
-/// an albedo of 0.9 and gained from 0.95 on.
-fn pays_under_small_lights(boundary: &Boundary, medium: &Medium, is_near: bool) -> bool {
+/// causes most of the variance; guiding shortens walks, which pays where they absorb enough for that. Measured under parallel
+/// light and discs (experiments/compare/walks-small-lights.toml): at rough boundaries guiding gains up to a reduced albedo of
+/// 0.9, and loses at 0.95 (parallel light) and above; at smooth ones it gains at 0.95 and loses at 0.99. Matched bodies lose
+/// from the lit side; from behind they lose at an albedo of 0.9 and gain from 0.95 on.
+fn pays_under_small_lights(boundary: &Boundary, medium: &Medium, is_lit: bool) -> bool {
     match boundary {
-        Boundary::Matched => !is_near && medium.albedo >= 0.94,
-        Boundary::Rough { .. } => !is_near || medium.similar_albedo() <= 0.88,
-        Boundary::Smooth { .. } => !is_near || medium.similar_albedo() <= 0.96,
+        Boundary::Matched => !is_lit && medium.albedo >= 0.94,
+        Boundary::Rough { .. } => !is_lit || Reduced::of(medium).albedo <= 0.88,
+        Boundary::Smooth { .. } => !is_lit || Reduced::of(medium).albedo <= 0.96,
     }
 }
 
@@ -102,12 +103,12 @@ impl PathTracer {
         PathTracer::KIND.check(&scene)?;
         let mut walks = TaughtField::new(scene.clone(), options.roulette, options.walk);
         if options.walk.is_guided() && !options.walk.is_near_lights() {
-            let pays = |band: usize, guidance: &Guidance| {
-                let is_near = guidance.at_first_hits(&scene) > NEAR;
-                pays_under_small_lights(&scene.boundary[band], &scene.medium[band], is_near)
-            };
             let even = walks.shares_of_even();
-            walks = walks.plain_in(|band, guidance| even[band] < EVEN_ENOUGH && !pays(band, guidance));
+            walks = walks.plain_in(|band, guidance| {
+                let (boundary, medium) = (&scene.boundary[band], &scene.medium[band]);
+                even[band] < EVEN_ENOUGH
+                    && !pays_under_small_lights(boundary, medium, guidance.is_lit_at_entry(&scene))
+            });
         }
         let walks = match options.sample_even_lights {
             Some(true) => walks,

@@ -442,45 +442,44 @@ fn paths_side_by_side_are_paths_one_by_one() {
 fn walks_are_guided_under_small_lights_where_it_pays() {
     let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.2 };
     let (rough, smooth) = (Boundary::Rough { eta: 1.4, facets }, Boundary::Smooth { eta: 1.4 });
-    let lamp = |toward: DVec3| environment(1.0, toward, 0.02, "lamp");
+    let cap = |toward: DVec3, height: f64, radiance: [f64; 2]| {
+        let emission = Emission::Cap { frame: Frame::about(toward), height, radiance: radiance.into() };
+        Light { name: "cap".into(), emission }
+    };
     let [side, behind] = [DVec3::new(0.9, 0.0, 0.5), DVec3::new(0.3, 0.0, -0.9)];
-    let guided = |boundary, [albedo, g]: [f64; 2], lights, near_lights| {
-        let dense = medium(10.0 / (1.0 - albedo * g), albedo, g);
-        let one = scene(SPHERE, boundary, dense, lights, off_axis());
-        let scene = Scene { boundary: vec![boundary; 2], medium: vec![dense; 2], ..one };
-        let walk = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0, near_lights };
-        let options = PathOptions { walk, ..PathOptions::default() };
-        let tracer =
-            PathTracer::with_options(Arc::new(scene), &options).expect("a scene that it serves");
-        [0, 1].map(|band| tracer.walks.field().guidance(band).is_some())
-    };
-    let both = |light: Light, radiance: [f64; 2]| match light.emission {
-        Emission::Cap { frame, height, .. } => {
-            Light { emission: Emission::Cap { frame, height, radiance: radiance.into() }, ..light }
+    let lamp = |toward| cap(toward, 0.02, [1.0; 2]);
+    let mesh = Shape::Mesh(procedural::icosphere(1.0, 3, true).expect("closed"));
+    for shape in [SPHERE, mesh] {
+        let guided = |boundary, [albedo, g]: [f64; 2], lights: Vec<Light>, near_lights| {
+            let dense = medium(10.0 / (1.0 - albedo * g), albedo, g);
+            let one = scene(shape.clone(), boundary, dense, lights, off_axis());
+            let scene = Scene { boundary: vec![boundary; 2], medium: vec![dense; 2], ..one };
+            let walk = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0, near_lights };
+            let options = PathOptions { walk, ..PathOptions::default() };
+            let tracer = PathTracer::with_options(Arc::new(scene), &options).expect("a scene");
+            [0, 1].map(|band| tracer.walks.field().guidance(band).is_some())
+        };
+        for (boundary, [albedo, g], toward, expected) in [
+            (rough, [0.8, 0.0], side, true),
+            (rough, [0.9, 0.0], side, false),
+            (rough, [0.95, 0.0], side, false),
+            (rough, [0.95, 0.8], side, true),
+            (rough, [0.99, 0.8], side, false),
+            (rough, [0.99, 0.0], behind, true),
+            (smooth, [0.95, 0.0], side, true),
+            (smooth, [0.99, 0.0], side, false),
+            (smooth, [0.99, 0.0], behind, true),
+            (Boundary::Matched, [0.8, 0.0], side, false),
+            (Boundary::Matched, [0.9, 0.0], behind, false),
+            (Boundary::Matched, [0.95, 0.0], behind, true),
+        ] {
+            let name = format!("{boundary:?} {albedo} {g} {toward}");
+            let lights = || vec![lamp(toward)];
+            assert_eq!(guided(boundary, [albedo, g], lights(), false), [expected; 2], "{name}");
+            assert_eq!(guided(boundary, [albedo, g], lights(), true), [true; 2], "{name}");
         }
-        _ => unreachable!("a cap"),
-    };
-    let one = |toward| vec![both(lamp(toward), [1.0; 2])];
-    for (boundary, [albedo, g], toward, expected) in [
-        (rough, [0.8, 0.0], side, true),
-        (rough, [0.95, 0.0], side, false),
-        (rough, [0.95, 0.8], side, true),
-        (rough, [0.99, 0.8], side, false),
-        (rough, [0.99, 0.0], behind, true),
-        (smooth, [0.95, 0.0], side, true),
-        (smooth, [0.99, 0.0], side, false),
-        (smooth, [0.99, 0.0], behind, true),
-        (Boundary::Matched, [0.8, 0.0], side, false),
-        (Boundary::Matched, [0.95, 0.0], behind, true),
-        (rough, [0.9, 0.0], side, false),
-        (Boundary::Matched, [0.9, 0.0], behind, false),
-    ] {
-        let name = format!("{boundary:?} {albedo} {g} {toward}");
-        assert_eq!(guided(boundary, [albedo, g], one(toward), false), [expected; 2], "{name}");
-        assert_eq!(guided(boundary, [albedo, g], one(toward), true), [true; 2], "{name}");
+        // By strength, radiance times solid angle, the sky has shares of 0.05 and 0.5.
+        let lights = vec![lamp(side), cap(DVec3::Z, 2.0, [0.0005, 0.01])];
+        assert_eq!(guided(rough, [0.95, 0.0], lights, false), [false, true]);
     }
-    // The lamp's strength is 0.126, that of the sky 4 pi times its radiance: shares of 0.05 and 0.5.
-    let sky = both(environment(1.0, DVec3::Z, 2.0, "sky"), [0.0005, 0.01]);
-    let lights = vec![both(lamp(side), [1.0; 2]), sky];
-    assert_eq!(guided(rough, [0.95, 0.0], lights, false), [false, true]);
 }

@@ -25,12 +25,6 @@ impl Medium {
         Medium { sigma_t, albedo, phase: HenyeyGreenstein { g }, emission: 0.0 }
     }
 
-    /// Albedo of the medium that scatters isotropically and is alike by similarity: a (1 - g) / (1 - a g).
-    pub fn similar_albedo(&self) -> f64 {
-        let Medium { albedo, phase, .. } = self;
-        albedo * (1.0 - phase.g) / (1.0 - albedo * phase.g)
-    }
-
     /// Emission that reaches the end of a ray of length `t` without being scattered, W/(mm^2 sr):
     ///   int_0^t emission e^(-sigma_t s) ds = emission (1 - e^(-sigma_t t)) / sigma_t.
     #[inline]

@@ -140,8 +140,8 @@ fn paths() -> u64 {
 const RAYS: usize = 64;
 
 /// Importance at the points at which walks enter, over its largest in the body, from which on the lights illuminate these points
-/// ([`Guidance::at_first_hits`]).
-pub(super) const NEAR: f64 = 0.1;
+/// ([`Guidance::is_lit_at_entry`]).
+const NEAR: f64 = 0.1;
 
 /// How the growth of importance is determined.
 #[derive(Clone, Debug)]
@@ -263,8 +263,13 @@ impl Guidance {
         }
     }
 
+    /// Whether the lights illuminate the points at which walks enter.
+    pub(super) fn is_lit_at_entry(&self, scene: &Scene) -> bool {
+        self.at_first_hits(scene) > NEAR
+    }
+
     /// Importance at the first hits of sensor rays, over its largest value in the body; 1 where it is unknown.
-    pub(super) fn at_first_hits(&self, scene: &Scene) -> f64 {
+    fn at_first_hits(&self, scene: &Scene) -> f64 {
         let Aim::Solution(importance) = &self.aim else { return 1.0 };
         let rays = scene.sensor.rays_per_pass();
         let at_hit = |i: usize| {

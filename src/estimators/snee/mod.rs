@@ -35,7 +35,7 @@ use std::sync::{Arc, OnceLock};
 use super::bands::{MAX_SHARED, OneBand, SharedBands, WalkBands};
 use super::connection::{self, Conic};
 use super::field::Path;
-use super::guidance::{GuidedBand, NEAR};
+use super::guidance::GuidedBand;
 use super::illumination::unscattered_notes;
 use super::walk::{CameraWalk, Unrivalled, trace_alone};
 use super::warm_up::TaughtField;
@@ -177,8 +177,7 @@ impl Snee {
         let mut walks = TaughtField::new(scene.clone(), options.roulette, options.walk);
         if !options.walk.is_near_lights() {
             walks = walks.plain_in(|band, guidance| {
-                setups[band].connects_to_all(&scene.lights, band)
-                    && guidance.at_first_hits(&scene) > NEAR
+                setups[band].connects_to_all(&scene.lights, band) && guidance.is_lit_at_entry(&scene)
             });
         }
         if options.walk.is_guided() && options.strategies.bsdf {
