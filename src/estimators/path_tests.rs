@@ -6,7 +6,7 @@ use super::super::guidance::GuidedBand;
 use super::super::roulette::roulette;
 use super::super::testing;
 use super::super::vertices::WalkExit;
-use super::super::walk::{CameraWalk, Rivals, Unrivalled, are_silent, trace_side_by_side};
+use super::super::walk::{CameraWalk, Rivals, Unrivalled, may_fly_side_by_side, trace_side_by_side};
 use super::super::{Cost, Layout};
 use super::*;
 use crate::geometry::{Ray, Shape, procedural};
@@ -378,8 +378,8 @@ fn assert_the_same_side_by_side(scene: Arc<Scene>, options: &PathOptions) -> u64
     let [side_by_side, one_by_one] = &mut both;
     for band in 0..field.scene.bands() {
         let guidance = field.guidance(band).expect("guided");
-        assert!(are_silent(field, band));
-        trace_side_by_side(field, band, &key, guidance, side_by_side);
+        assert!(may_fly_side_by_side(field, band));
+        trace_side_by_side(field, band, &key, guidance, side_by_side, |_| Unrivalled);
         for index in 0..field.scene.sensor.rays_per_pass() {
             let path = Path { field, band, index, key: &key };
             let guided = GuidedBand::new(guidance, &field.scene.medium[band]);

@@ -32,9 +32,7 @@ use crate::sampling::stream::{Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::sensor::PathMeasure;
 
-pub(super) use lanes::trace_alone;
-#[cfg(test)]
-pub(super) use lanes::{are_silent, trace_side_by_side};
+pub(super) use lanes::{may_fly_side_by_side, trace_alone, trace_side_by_side};
 
 /// Techniques beside unidirectional sampling.
 pub(super) trait Rivals: Sized {

@@ -4,16 +4,17 @@
 //!
 //! ```text
 //! next path -> [ meets the body, is reflected, flies outside ] -> lane -> [ flights and turns of all lanes ] -> boundary
-//!                      ^                                                                                           |
+//!                      ^                                                          ^                                |
+//!                      |                                                          +-> rivals, walk by walk         |
 //!                      +-------------------------------------------------------------------------------------------+
 //! ```
 
 use std::collections::VecDeque;
 
-use super::{CameraWalk, Later, Onward, Unrivalled, Unscattered, flights};
+use super::{CameraWalk, Later, Onward, Rivals, Unrivalled, Unscattered, flights};
 use crate::estimators::bands::{OneBand, WalkBands};
 use crate::estimators::field::{Field, Path};
-use crate::estimators::guidance::{Guidance, GuidedBand, GuidedLanes};
+use crate::estimators::guidance::{Guidance, GuidedBand, GuidedLanes, LaneVertex};
 use crate::estimators::scores::Contribution;
 use crate::estimators::steps::StepRule;
 use crate::estimators::{Anomaly, Cost, Scores};
@@ -22,14 +23,16 @@ use crate::optics::guided::LANES;
 use crate::sampling::stream::PassKey;
 
 /// A path.
-struct LaneWalk<'a> {
+struct LaneWalk<'a, R> {
     index: usize,
-    walk: CameraWalk<'a, Unrivalled, GuidedBand<'a>>,
+    walk: CameraWalk<'a, R, GuidedBand<'a>>,
     later: Option<Later<GuidedBand<'a>>>,
 }
 
 /// The paths of a pass in one band.
-struct Paths<'a, 's> {
+struct Paths<'a, 's, N> {
+    /// The rivals of a path.
+    rivals: N,
     field: &'a Field,
     band: usize,
     key: &'a PassKey,
@@ -53,8 +56,8 @@ pub(in crate::estimators) fn trace_alone(
     scores: &mut Scores,
 ) {
     let guidance = field.guidance(band);
-    if let Some(guidance) = guidance.filter(|_| are_silent(field, band)) {
-        return trace_side_by_side(field, band, key, guidance, scores);
+    if let Some(guidance) = guidance.filter(|_| may_fly_side_by_side(field, band)) {
+        return trace_side_by_side(field, band, key, guidance, scores, |_| Unrivalled);
     }
     for index in 0..field.scene.sensor.rays_per_pass() {
         let path = Path { field, band, index, key };
@@ -68,37 +71,45 @@ pub(in crate::estimators) fn trace_alone(
     }
 }
 
-/// Whether walks in this band do nothing inside but fly and scatter.
-pub(in crate::estimators) fn are_silent(field: &Field, band: usize) -> bool {
+/// Whether guided walks in this band may be traced side by side: inside they only fly, scatter and call rivals.
+pub(in crate::estimators) fn may_fly_side_by_side(field: &Field, band: usize) -> bool {
     let scene = &field.scene;
     let medium = &scene.medium[band];
     let is_matched = matches!(scene.boundary[band], super::Boundary::Matched);
     medium.sigma_t > 0.0 && medium.emission == 0.0 && !is_matched && scene.sensor.measure().is_off()
 }
 
-/// Traces the paths of a pass in a band whose walks are silent, with the scores and counts of [`CameraWalk::trace`] of one
-/// after the other.
-pub(in crate::estimators) fn trace_side_by_side(
+/// Traces the paths of a pass in a band of which [`may_fly_side_by_side`] holds, with the scores and counts of
+/// [`CameraWalk::trace`] of one after the other.
+pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
     field: &Field,
     band: usize,
     key: &PassKey,
     guidance: &Guidance,
     scores: &mut Scores,
+    rivals: impl Fn(&Path) -> R,
 ) {
     let mut holding: [Scores; LANES] = std::array::from_fn(|_| scores.holding());
     let count = field.scene.sensor.rays_per_pass();
     let (ended, empty) = (VecDeque::new(), Vec::new());
-    let mut paths = Paths { field, band, key, guidance, next: 0, count, scores, first: 0, ended, empty };
+    let mut paths =
+        Paths { rivals, field, band, key, guidance, next: 0, count, scores, first: 0, ended, empty };
     let medium = &field.scene.medium[band];
     let rule = StepRule { medium, roulette: field.roulette, survival: medium.albedo };
     let mut lanes = GuidedLanes::new(guidance, rule);
-    let mut walks: [Option<LaneWalk<'_>>; LANES] = [const { None }; LANES];
+    let mut walks: [Option<LaneWalk<'_, R>>; LANES] = [const { None }; LANES];
     for (lane, holding) in holding.iter_mut().enumerate() {
         let onward = paths.begin(&mut walks[lane], holding);
         paths.go_on(&mut lanes, lane, &mut walks[lane], onward);
     }
     while walks.iter().any(Option::is_some) {
-        let survives = lanes.scatter();
+        let survives = lanes.scatter(|lane, vertex| {
+            if !R::IS_SILENT
+                && let Some(LaneWalk { walk, .. }) = &mut walks[lane]
+            {
+                walk.call_from_lane(vertex);
+            }
+        });
         // A loop: `array::from_fn` is not inlined here.
         let mut is_clear = [false; LANES];
         for (lane, is_clear) in is_clear.iter_mut().enumerate() {
@@ -126,9 +137,21 @@ pub(in crate::estimators) fn trace_side_by_side(
     holding.iter().for_each(|holding| scores.add_counts(holding));
 }
 
-impl<'a> Paths<'a, '_> {
+impl<'a, R: Rivals> CameraWalk<'a, R, GuidedBand<'a>> {
+    /// Has come to a medium vertex in a lane, and survived roulette.
+    fn call_from_lane(&mut self, vertex: &LaneVertex) {
+        self.ray = vertex.ray;
+        [self.throughput, self.survival] = vertex.weights;
+        (self.from, self.unscattered) = (None, Unscattered::No);
+        self.bands.arrive(vertex);
+        self.history.scatter();
+        R::call(self);
+    }
+}
+
+impl<'a, R: Rivals, N: Fn(&Path) -> R> Paths<'a, '_, N> {
     /// Begins the next path, whose scores are held back; leaves nothing where none is left.
-    fn begin(&mut self, slot: &mut Option<LaneWalk<'a>>, holding: &'a mut Scores) -> Option<Onward> {
+    fn begin(&mut self, slot: &mut Option<LaneWalk<'a, R>>, holding: &'a mut Scores) -> Option<Onward> {
         *slot = None;
         if self.next == self.count {
             return None;
@@ -138,7 +161,7 @@ impl<'a> Paths<'a, '_> {
         self.ended.push_back(None);
         let path = Path { field, band, index, key };
         let guided = GuidedBand::new(guidance, &field.scene.medium[band]);
-        let walk = CameraWalk::start(path, holding, Unrivalled, guided);
+        let walk = CameraWalk::start(path, holding, (self.rivals)(&path), guided);
         let LaneWalk { walk, later, .. } = slot.insert(LaneWalk { index, walk, later: None });
         walk.meet_body(path, later)
     }
@@ -150,7 +173,7 @@ impl<'a> Paths<'a, '_> {
         &mut self,
         lanes: &mut GuidedLanes<'a>,
         lane: usize,
-        slot: &mut Option<LaneWalk<'a>>,
+        slot: &mut Option<LaneWalk<'a, R>>,
         mut onward: Option<Onward>,
     ) {
         while let Some(walk) = slot {
@@ -202,13 +225,14 @@ enum FlightEnd {
     Elsewhere(Option<Onward>),
 }
 
-impl<'a> LaneWalk<'a> {
+impl<'a, R: Rivals> LaneWalk<'a, R> {
     /// Follows the path outside until it is inside, and puts it into its lane; false where it has ended.
     fn enter(&mut self, lanes: &mut GuidedLanes<'a>, lane: usize, mut onward: Option<Onward>) -> bool {
         let LaneWalk { walk, later, .. } = self;
         while let Some(Onward { from, side }) = onward.or_else(|| walk.follow_refraction(later)) {
             if side == Side::Inside {
                 walk.bands.enter(from.point, from.normal, walk.ray.dir);
+                R::depart(walk);
                 let weights = [walk.throughput, walk.survival];
                 lanes.put(lane, &walk.bands, &walk.ray, weights, &walk.stream);
                 return true;
@@ -253,7 +277,10 @@ impl<'a> LaneWalk<'a> {
         walk.scores.count_many(Cost::MediumEvents, vertices);
         if vertices > 0 {
             (walk.from, walk.unscattered) = (None, Unscattered::No);
-            walk.history.scatter_often(vertices);
+            // Rivals are called with the history of each vertex.
+            if R::IS_SILENT {
+                walk.history.scatter_often(vertices);
+            }
         }
     }
 }

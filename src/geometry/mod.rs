@@ -7,6 +7,7 @@ mod analytic;
 mod audit;
 mod body_surface;
 mod clearance;
+mod cone;
 mod imported;
 mod lines;
 mod measure;
@@ -27,6 +28,7 @@ mod tree;
 mod triangle;
 
 pub use body_surface::{BodyPoint, BodySampler, FaceChoice};
+pub use cone::Cone;
 pub use lines::{Line, Lines, Met};
 pub use mesh::Mesh;
 pub use mesh_file::{Placement, load_mesh};
@@ -249,6 +251,21 @@ impl Shape {
             Shape::Sphere { radius } => radius - point.length(),
             Shape::Mesh(ref mesh) => mesh.clearance(point),
         }
+    }
+
+    /// A lower bound of the distance from a point of the body to its surface along any direction of a cone, mm, and cheap;
+    /// infinite where no direction of the cone leads out. Exact for the sphere and the half-space, but for a part of 1e-9 that
+    /// covers rounding; of a mesh it is [`Self::clearance`].
+    #[inline]
+    pub fn clearance_within(&self, point: DVec3, cone: &Cone) -> f64 {
+        let bound = match *self {
+            Shape::HalfSpace => cone.through_half_space(point),
+            Shape::Slab { thickness } => cone.through_slab(thickness, point),
+            Shape::Box { half } => cone.through_cuboid(half, point),
+            Shape::Sphere { radius } => cone.through_sphere(radius, point),
+            Shape::Mesh(ref mesh) => return mesh.clearance(point),
+        };
+        bound * (1.0 - 1e-9)
     }
 
     /// Whether the body is known to be convex: then all its points see each other.

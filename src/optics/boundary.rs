@@ -117,6 +117,13 @@ impl Boundary {
         }
     }
 
+    /// The least cosine between a direction and what it is refracted to, whatever the normal: at grazing incidence on the side
+    /// of the lower index, where the other direction has the critical angle.
+    pub fn least_cosine_of_refraction(&self) -> f64 {
+        let eta = self.eta();
+        eta.min(1.0 / eta)
+    }
+
     /// Draws the direction on the other side for `from`, with forced refraction: h is drawn from the visible
     /// normals of `from` and followed by Snell's law about h, without a choice of lobe. `None` is a failed
     /// sample and scores 0: the facet reflects totally, or sends the light back to its own side. A delta

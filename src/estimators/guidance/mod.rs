@@ -36,7 +36,7 @@ use importance::{FoundLanes, Importance};
 
 pub(super) use learned::{FoundLight, LearnedPulls, LearningCells, Lessons};
 pub use slice::GuideSlice;
-pub(super) use steered::{GuidedBand, GuidedLanes};
+pub(super) use steered::{GuidedBand, GuidedLanes, LaneVertex};
 
 /// How walks are sampled inside the body; all choices are unbiased.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]

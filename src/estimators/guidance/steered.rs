@@ -15,7 +15,7 @@
 
 mod lanes;
 
-pub(in crate::estimators) use lanes::GuidedLanes;
+pub(in crate::estimators) use lanes::{GuidedLanes, LaneVertex};
 
 use super::Guidance;
 use crate::estimators::bands::WalkBands;
@@ -57,6 +57,12 @@ impl<'a> GuidedBand<'a> {
             per_entry: 0.0,
             last: (DVec3::NAN, StepGuide::NONE, 0.0),
         }
+    }
+
+    /// The walk has arrived at a medium vertex, by flights that it made in a lane.
+    #[inline]
+    pub(in crate::estimators) fn arrive(&mut self, vertex: &LaneVertex) {
+        (self.ratio, self.heading) = (vertex.ratio, Heading::NONE);
     }
 
     #[inline(always)]

@@ -77,7 +77,7 @@ impl Bidirectional {
             .map(|band| match scene.boundary[band] {
                 Boundary::Matched => Vec::new(),
                 _ if scene.medium[band].sigma_t == 0.0 => Vec::new(),
-                _ => Guide::all(&scene.lights, band, 1.0),
+                _ => Guide::all(&scene.lights, band, 1.0, &scene.boundary[band]),
             })
             .collect();
         Ok(Bidirectional { field: Field::new(scene, roulette), bounds, guides })

@@ -42,16 +42,24 @@ impl Call {
         if self.decay == 0.0 { self.most } else { self.most * exp(-self.decay * sigma * distance) }
     }
 
-    /// The distance up to which the call is made, for one uniform number; `None` if it is not made at
-    /// all. P(reach > d) is [`Self::probability`], and a lower bound of d may decide before d is known.
-    pub(super) fn reach(&self, sigma: f64, u: f64) -> Option<f64> {
+    /// The distance up to which the call is made, for one uniform number; `None` if it is not made from `least` on, mm.
+    /// P(reach > d) is [`Self::probability`], and a lower bound of d may decide before d is known.
+    #[inline]
+    pub(super) fn reach(&self, sigma: f64, u: f64, least: f64) -> Option<f64> {
         if u >= self.most {
-            None
-        } else if self.decay == 0.0 {
-            Some(f64::INFINITY)
-        } else {
-            Some(-ln(u / self.most) / (self.decay * sigma))
+            return None;
         }
+        if self.decay == 0.0 {
+            return Some(f64::INFINITY);
+        }
+        // Most calls fail by far, which needs no logarithm: e^x is above its series.
+        let x = self.decay * sigma * least;
+        let below = 1.0 + x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 6.0 + x * (1.0 / 24.0))));
+        if x > 0.0 && u * below > self.most * (1.0 + 1e-9) {
+            return None;
+        }
+        let reach = -ln(u / self.most) / (self.decay * sigma);
+        (least < reach).then_some(reach)
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
+use crate::geometry::Cone;
 use crate::math::DVec3;
+use crate::optics::boundary::Boundary;
 use crate::scene::{Bright, Emission, Light, LightSample};
 
 /// The concentrated part of one light in one band.
@@ -16,6 +18,8 @@ pub(super) struct Guide {
     pub axis: DVec3,
     /// Half the angle that it covers, rad; 0 for parallel light.
     pub half_angle: f64,
+    /// The directions from a point inside against the axis's light, whatever the normal at which that is refracted.
+    pub refracted: Cone,
     /// Part of a map; the other lights are concentrated as a whole or not at all.
     bright: Option<Bright>,
 }
@@ -29,22 +33,30 @@ const COMPACT: f64 = 0.3;
 impl Guide {
     /// The guides among lights whose concentration reaches `least`. A map is split: the part of it that
     /// is far brighter than its mean, and near its brightest texel, is the guide; the rest has none.
-    pub(super) fn all(lights: &[Light], band: usize, least: f64) -> Vec<Guide> {
+    pub(super) fn all(lights: &[Light], band: usize, least: f64, boundary: &Boundary) -> Vec<Guide> {
         let mut guides: Vec<Guide> = lights
             .iter()
             .enumerate()
-            .filter_map(|(index, light)| Guide::of(index, light, band, least))
+            .filter_map(|(index, light)| Guide::of(index, light, band, least, boundary))
             .collect();
         let total: f64 = guides.iter().map(|guide| guide.choice).sum();
         guides.iter_mut().for_each(|guide| guide.choice /= total);
         guides
     }
 
-    fn of(index: usize, light: &Light, band: usize, least: f64) -> Option<Guide> {
+    fn of(index: usize, light: &Light, band: usize, least: f64, boundary: &Boundary) -> Option<Guide> {
         let strength = light.strength(band);
+        let refracted = |axis| Cone::new(axis, boundary.least_cosine_of_refraction());
         let whole = |axis, half_angle| {
             let is_guide = strength > 0.0 && light.concentration() >= least;
-            is_guide.then_some(Guide { light: index, choice: strength, axis, half_angle, bright: None })
+            is_guide.then(|| Guide {
+                light: index,
+                choice: strength,
+                axis,
+                half_angle,
+                refracted: refracted(axis),
+                bright: None,
+            })
         };
         match &light.emission {
             Emission::Directional { toward, .. } => whole(*toward, 0.0),
@@ -61,6 +73,7 @@ impl Guide {
                     choice: bright.strength(),
                     axis: bright.axis(),
                     half_angle: bright.half_angle(),
+                    refracted: refracted(bright.axis()),
                     bright: Some(bright),
                 })
             }

@@ -171,16 +171,29 @@ pub(super) struct GuidedEnd<'a> {
 }
 
 /// Draws the technique at the walk's latest vertex.
+#[inline]
 pub(super) fn draw<'a, B: WalkBands>(
     walk: &mut CameraWalk<'_, Connections<'a>, B>,
     technique: &LastVertex,
 ) -> Option<GuidedEnd<'a>> {
-    let sigma = walk.rivals.setup.sigma;
-    let reach = technique.call().reach(sigma, walk.rivals.stream.draw())?;
+    let setup = walk.rivals.setup;
+    let u = walk.rivals.stream.draw();
+    let least = match &setup.guides[..] {
+        [only] => walk.least_distance(only),
+        _ => walk.scene.shape.clearance(walk.rivals.vertex(Slot::Latest).point),
+    };
+    let reach = technique.call().reach(setup.sigma, u, least)?;
+    draw_within(walk, technique, reach)
+}
+
+/// The same for a call that is made up to this distance of the guess, mm. Most calls at the vertices of a walk do not come here.
+#[inline(never)]
+fn draw_within<'a, B: WalkBands>(
+    walk: &mut CameraWalk<'_, Connections<'a>, B>,
+    technique: &LastVertex,
+    reach: f64,
+) -> Option<GuidedEnd<'a>> {
     let x_j = walk.rivals.vertex(Slot::Latest);
-    if walk.scene.shape.clearance(x_j.point) >= reach {
-        return None;
-    }
     let guide = walk.rivals.choose_guide()?;
     let guess = walk.guess(Slot::Latest, guide).filter(|guess| guess.distance < reach)?;
     let lobe = technique.lobe(&walk.boundary, guide, &guess)?;

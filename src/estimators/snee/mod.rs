@@ -37,7 +37,7 @@ use super::connection::{self, Conic};
 use super::field::Path;
 use super::guidance::GuidedBand;
 use super::illumination::unscattered_notes;
-use super::walk::{CameraWalk, Unrivalled, trace_alone};
+use super::walk::{CameraWalk, Unrivalled, may_fly_side_by_side, trace_alone, trace_side_by_side};
 use super::warm_up::TaughtField;
 use super::{BandUse, Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::{Error, Result};
@@ -144,7 +144,7 @@ impl Snee {
             let guides = if is_matched || !scatters {
                 Vec::new()
             } else {
-                Guide::all(&scene.lights, band, options.least_concentration)
+                Guide::all(&scene.lights, band, options.least_concentration, &scene.boundary[band])
             };
             let phase = scene.medium[band].phase;
             let joint = match options.joint {
@@ -235,8 +235,16 @@ impl Estimator for Snee {
                     trace_alone(field, band, key, scores);
                     continue;
                 }
+                let setup = &setups[band];
+                if let Some(guidance) =
+                    field.guidance(band).filter(|_| may_fly_side_by_side(field, band))
+                {
+                    let connections = |path: &Path| Connections::of_path(setup, path);
+                    trace_side_by_side(field, band, key, guidance, scores, connections);
+                    continue;
+                }
                 for index in 0..rays {
-                    self.trace(&setups[band], None, Path { field, band, index, key }, scores);
+                    self.trace(setup, None, Path { field, band, index, key }, scores);
                 }
             }
         }
@@ -330,8 +338,7 @@ fn trace_with<B: WalkBands>(
     if setup.guides.is_empty() {
         CameraWalk::trace(path, scores, Unrivalled, bands);
     } else {
-        let stream = path.key.stream(path.index as u64, Purpose::Connection);
-        let mut connections = Connections::new(setup, stream);
+        let mut connections = Connections::of_path(setup, &path);
         connections.notes = notes;
         CameraWalk::trace(path, scores, connections, bands);
     }

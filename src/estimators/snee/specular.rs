@@ -144,11 +144,8 @@ pub(super) fn draw<'a, B: WalkBands>(
 ) -> Option<LitVertex<'a>> {
     let sigma = walk.rivals.setup.sigma;
     let call = technique.call.call(Slot::Latest, walk.rivals.count);
-    let reach = call.reach(sigma, walk.rivals.stream.draw())?;
     let x_j = walk.rivals.vertex(Slot::Latest).point;
-    if clearance(walk, x_j) >= reach {
-        return None;
-    }
+    call.reach(sigma, walk.rivals.stream.draw(), clearance(walk, x_j))?;
     let guide = walk.rivals.choose_guide()?;
     let light = &walk.scene.lights[guide.light];
     let sample = guide.sample(light, walk.band, walk.rivals.stream.draw2());

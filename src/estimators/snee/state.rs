@@ -8,11 +8,12 @@ use super::guide::Guide;
 use super::learned_calls::{CallNotes, CalledTechnique};
 use crate::estimators::bands::WalkBands;
 use crate::estimators::connection::{Root, SolverWork};
+use crate::estimators::field::Path;
 use crate::estimators::vertices::{WalkExit, WalkVertex};
 use crate::estimators::walk::CameraWalk;
 use crate::math::DVec3;
 use crate::sampling::discrete::choose_share;
-use crate::sampling::stream::Stream;
+use crate::sampling::stream::{Purpose, Stream};
 
 /// Which of the vertices that are held.
 #[derive(Clone, Copy, Debug)]
@@ -31,14 +32,19 @@ struct Held {
     vertex: WalkVertex,
     /// Cached specular guess for the last guide.
     guess: Option<(usize, Option<Guess>)>,
+    /// Cached lower bound of that guess's distance for the last guide, mm.
+    least: Option<(usize, f64)>,
 }
 
 /// State that a walk carries for connections.
 pub(super) struct Connections<'a> {
     pub setup: &'a BandSetup,
     pub stream: Stream,
-    /// Vertices held, indexed by [`Slot`].
+    /// Vertices held.
     held: [Held; 3],
+    /// Index of the latest vertex, 0 or 1; the other is that of the one before, and the last that of the drawn one. So the
+    /// walk's vertices are not copied from slot to slot.
+    latest: usize,
     /// Medium vertices since the boundary was last met.
     pub count: u32,
     /// Only the first edge is subdivided, and only the second vertex is a last one.
@@ -54,13 +60,19 @@ pub(super) struct Connections<'a> {
 }
 
 impl<'a> Connections<'a> {
+    /// Of a path, with its own stream.
+    pub(super) fn of_path(setup: &'a BandSetup, path: &Path) -> Connections<'a> {
+        Connections::new(setup, path.key.stream(path.index as u64, Purpose::Connection))
+    }
+
     pub(super) fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
         let nowhere = WalkVertex { point: DVec3::NAN, arrival: DVec3::Z, walks: 1.0 };
-        let held = [Held { vertex: nowhere, guess: None }; 3];
+        let held = [Held { vertex: nowhere, guess: None, least: None }; 3];
         Connections {
             setup,
             stream,
             held,
+            latest: 0,
             count: 0,
             is_edge_alone: false,
             seen: None,
@@ -87,19 +99,28 @@ impl<'a> Connections<'a> {
 
     /// The walk has come to a new medium vertex.
     pub(super) fn arrive(&mut self, vertex: WalkVertex) {
-        self.held[Slot::Previous as usize] = self.held[Slot::Latest as usize];
+        self.latest = 1 - self.latest;
         self.hold(Slot::Latest, vertex);
         self.count += 1;
     }
 
+    #[inline]
+    fn index(&self, slot: Slot) -> usize {
+        match slot {
+            Slot::Previous => 1 - self.latest,
+            Slot::Latest => self.latest,
+            Slot::Drawn => 2,
+        }
+    }
+
     /// Puts a new vertex into a slot.
     pub(super) fn hold(&mut self, slot: Slot, vertex: WalkVertex) {
-        self.held[slot as usize] = Held { vertex, guess: None };
+        self.held[self.index(slot)] = Held { vertex, guess: None, least: None };
     }
 
     #[inline]
     pub(super) fn vertex(&self, slot: Slot) -> WalkVertex {
-        self.held[slot as usize].vertex
+        self.held[self.index(slot)].vertex
     }
 
     /// A guide by its probability; without a draw where there is one alone.
@@ -126,13 +147,28 @@ impl<'a> Connections<'a> {
 impl<B: WalkBands> CameraWalk<'_, Connections<'_>, B> {
     /// The specular guess at a vertex for a guide, found once.
     pub(super) fn guess(&mut self, slot: Slot, guide: &Guide) -> Option<Guess> {
-        let Held { vertex, guess } = self.rivals.held[slot as usize];
+        let index = self.rivals.index(slot);
+        let Held { vertex, guess, .. } = self.rivals.held[index];
         match guess {
             Some((light, guess)) if light == guide.light => guess,
             _ => {
                 let guess = Guess::new(self, vertex.point, guide.axis);
-                self.rivals.held[slot as usize].guess = Some((guide.light, guess));
+                self.rivals.held[index].guess = Some((guide.light, guess));
                 guess
+            }
+        }
+    }
+
+    /// A lower bound of the distance of the specular guess at the latest vertex for a guide, mm, found once.
+    #[inline]
+    pub(super) fn least_distance(&mut self, guide: &Guide) -> f64 {
+        let Held { vertex, least, .. } = &mut self.rivals.held[self.rivals.latest];
+        match *least {
+            Some((light, distance)) if light == guide.light => distance,
+            _ => {
+                let distance = self.scene.shape.clearance_within(vertex.point, &guide.refracted);
+                *least = Some((guide.light, distance));
+                distance
             }
         }
     }

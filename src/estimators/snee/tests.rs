@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use super::state::Slot;
 use super::*;
 use crate::estimators::path::PathTracer;
+use crate::estimators::vertices::WalkVertex;
 use crate::estimators::{Cost, Layout, Roulette, WalkDraw};
-use crate::geometry::{Ray, Shape};
+use crate::geometry::{Ray, Shape, procedural};
 use crate::math::{DVec3, Frame};
 use crate::optics::medium::Medium;
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
@@ -166,5 +168,87 @@ fn bodies_without_scattering_are_the_walks() {
         let test = "bodies_without_scattering_are_the_walks";
         let [snee, path] = [run(&scene, &snee, test), run(&scene, &path, test)];
         assert_eq!(bits(&snee.observables), bits(&path.observables));
+    }
+}
+
+/// Guided walks that connect at their vertices, side by side in lanes and one after the other: scores, counters and anomalies
+/// are the same, to the last bit. The sun is behind the body, a disc is not.
+#[test]
+fn connections_side_by_side_are_connections_one_by_one() {
+    let walk = WalkDraw::Guided { share: 0.9, nodes: 12, least_depth: 0.0, near_lights: true };
+    let called = SneeOptions { walk, ..guided() };
+    let connected = SneeOptions { connection: Some(ConnectionCall::default()), ..called.clone() };
+    let mesh = procedural::bumpy_sphere(1.0, 3, 0.2, 5.0, true).expect("closed");
+    let bodies = [Shape::Sphere { radius: 1.0 }, Shape::Slab { thickness: 1.5 }, Shape::Mesh(mesh)];
+    let toward = DVec3::new(0.0, 0.6, -0.8);
+    let sun = || Emission::Directional { toward, irradiance: vec![1.0, 0.3] };
+    let mut events = 0;
+    for (body, boundary, options) in bodies
+        .iter()
+        .flat_map(|body| [(body, ROUGH, &called), (body, SMOOTH, &called), (body, SMOOTH, &connected)])
+    {
+        let disc = scene(boundary, &[(9.0, 0.9, 0.0), (6.0, 0.99, 0.7)], cap(0.2, 2));
+        let lights = vec![cap(0.2, 2), Light { name: "sun".into(), emission: sun() }];
+        let sphere = Arc::into_inner(disc).expect("not shared");
+        let scene = Arc::new(Scene { shape: Arc::new(body.clone()), lights, ..sphere });
+        let snee = Snee::new(scene.clone(), options.clone()).expect("a scene that it serves");
+        let field = snee.walks.field();
+        let key = StreamKey::named("connections_side_by_side_are_connections_one_by_one").pass(0);
+        let mut both = [Scores::new(Layout::new(&scene)), Scores::new(Layout::new(&scene))];
+        let [side_by_side, one_by_one] = &mut both;
+        snee.pass(&[0, 1], &key, side_by_side);
+        for band in [0, 1] {
+            assert!(field.guidance(band).is_some() && may_fly_side_by_side(field, band));
+            for index in 0..scene.sensor.rays_per_pass() {
+                snee.trace(&snee.setups[band], None, Path { field, band, index, key: &key }, one_by_one);
+            }
+        }
+        assert_eq!(bits(&side_by_side.observables), bits(&one_by_one.observables));
+        assert_eq!(side_by_side.cost, one_by_one.cost);
+        assert_eq!(side_by_side.anomalies, one_by_one.anomalies);
+        assert!(one_by_one.observables.iter().any(|&score| score > 0.0));
+        events += one_by_one.cost[Cost::MediumEvents as usize];
+    }
+    assert!(events > 30_000, "{events} events");
+}
+
+/// No specular guess is nearer than its lower bound, which lets calls fail before the guess is made.
+#[test]
+fn guesses_are_no_nearer_than_their_bound() {
+    let mesh = procedural::bumpy_sphere(1.0, 3, 0.2, 5.0, true).expect("closed");
+    let half = DVec3::new(0.5, 0.8, 0.4);
+    let bodies =
+        [Shape::Sphere { radius: 1.0 }, Shape::Box { half }, Shape::HalfSpace, Shape::Mesh(mesh)];
+    let stream = &mut StreamKey::named("guesses_are_no_nearer_than_their_bound").pass(0);
+    let mut stream = stream.stream(0, Purpose::Walk);
+    for (body, eta) in bodies.iter().flat_map(|body| [(body, 1.4), (body, 0.8)]) {
+        let sphere = scene(Boundary::Smooth { eta }, &[(9.0, 0.9, 0.0)], cap(0.2, 1));
+        let sphere = Arc::into_inner(sphere).expect("not shared");
+        let scene = Arc::new(Scene { shape: Arc::new(body.clone()), ..sphere });
+        let snee = Snee::new(scene.clone(), guided()).expect("a scene that it serves");
+        let mut scores = Scores::new(Layout::new(&scene));
+        let key = StreamKey::named("guesses_are_no_nearer_than_their_bound").pass(1);
+        let path = Path { field: snee.walks.field(), band: 0, index: 0, key: &key };
+        let connections = Connections::of_path(&snee.setups[0], &path);
+        let guide = &snee.setups[0].guides[0];
+        let (mut guesses, mut beyond) = (0, 0);
+        let mut walk = CameraWalk::led(path, &mut scores, connections, OneBand, DVec3::ZERO);
+        for _ in 0..2000 {
+            let [x, y] = stream.draw2().map(|u| 1.6 * u - 0.8);
+            let point = DVec3::new(x, y, 1.6 * stream.draw() - 0.8);
+            if !scene.shape.contains(point) {
+                continue;
+            }
+            walk.rivals.arrive(WalkVertex { point, arrival: DVec3::Z, walks: 1.0 });
+            let least = walk.least_distance(guide);
+            let Some(guess) = walk.guess(Slot::Latest, guide) else { continue };
+            assert!(least <= guess.distance, "{body:?} {eta} {point}: {least} and {}", guess.distance);
+            guesses += 1;
+            beyond += u32::from(least > 1.05 * scene.shape.clearance(point));
+        }
+        assert!(guesses > 200, "{body:?} {eta}: {guesses}");
+        // It is worth more than the clearance where the light's side of the body is not the nearest.
+        let has_other_sides = matches!(body, Shape::Sphere { .. } | Shape::Box { .. });
+        assert!(!has_other_sides || beyond > guesses / 4, "{body:?} {eta}: {beyond}");
     }
 }

@@ -135,7 +135,8 @@ fn play<B: super::super::bands::WalkBands>(
             score(1, &mut walk, &|walk| walk.score_light_sample(path.light, path.w_l));
         }
     }
-    let mut any = Guide::all(&walk.scene.lights[path.light..=path.light], walk.band, 1.0);
+    let mut any =
+        Guide::all(&walk.scene.lights[path.light..=path.light], walk.band, 1.0, &walk.boundary);
     any[0].light = path.light;
     let f = End::new(&walk, &any[0], &path.exit, path.w_l, [1.0; 2], Some(path.radiance)).value;
     (scores, walk.throughput * f)
@@ -158,7 +159,7 @@ fn alone(snee: &[Snee; 2], path: &FixedPath, course: Course) -> [f64; 5] {
         walk.lead_to(path.x_j, course.vertices > 1);
         walk.lead_out(&path.exit);
         let [bsdf, by_light] = walk.rivals.takes_part(course.vertices);
-        let any = Guide::all(&walk.scene.lights, 0, 1.0);
+        let any = Guide::all(&walk.scene.lights, 0, 1.0, &walk.boundary);
         let end = |keep| End::new(&walk, &any[0], &path.exit, path.w_l, keep, None);
         densities[0] = end([bsdf, 0.0]).unidirectional;
         densities[1] = end([0.0, by_light]).unidirectional;

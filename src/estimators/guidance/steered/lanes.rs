@@ -8,6 +8,16 @@ use crate::math::DVec3;
 use crate::optics::guided::{DrawLanes, GuideLanes, LANES, Lanes, StepLanes, vector};
 use crate::sampling::stream::Stream;
 
+/// A medium vertex of a walk that has survived roulette.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::estimators) struct LaneVertex {
+    /// The vertex and the direction of arrival.
+    pub ray: Ray,
+    pub weights: Weights,
+    /// As in [`GuidedBand`].
+    pub ratio: f64,
+}
+
 /// Walks inside the body, each of which has begun a flight. An empty lane takes part in what is computed together, with numbers
 /// of no meaning, and draws none.
 pub(in crate::estimators) struct GuidedLanes<'a> {
@@ -92,14 +102,18 @@ impl<'a> GuidedLanes<'a> {
         self.flights[lane]
     }
 
-    /// Ends all flights in the medium, and begins the next ones; returns which walks survive roulette.
+    /// Ends all flights in the medium, and begins the next ones; returns which walks survive roulette. Each of these is told
+    /// of its vertex, before its direction is drawn.
     #[inline(always)]
-    pub(in crate::estimators) fn scatter(&mut self) -> [bool; LANES] {
+    pub(in crate::estimators) fn scatter(
+        &mut self,
+        mut arrive: impl FnMut(usize, &LaneVertex),
+    ) -> [bool; LANES] {
         let Guidance { turns, share, .. } = self.guidance;
         let StepRule { roulette, survival, .. } = self.rule;
         let ends = self.steps.ends();
         let phi = self.guidance.guide_all(ends, &self.normals, &self.found, &mut self.guides);
-        let ratios = self.steps.arrive();
+        let ratios = *self.steps.arrive();
         let mut importances = [0.0; LANES];
         for lane in 0..LANES {
             importances[lane] = importance(phi[lane], self.per_entry[lane], ratios[lane]);
@@ -112,6 +126,10 @@ impl<'a> GuidedLanes<'a> {
             goes_on[lane] = !self.is_empty[lane]
                 && roulette.survive([throughput, seen], survival, importance, stream).is_some();
             if goes_on[lane] {
+                // At the vertex, with the direction of arrival still.
+                let [origin, dir] = self.steps.flight(lane);
+                let (weights, ratio) = (self.weights[lane], ratios[lane]);
+                arrive(lane, &LaneVertex { ray: Ray { origin, dir }, weights, ratio });
                 self.draws.draw(lane, turns, *share, &self.guides, || stream.draw());
             } else {
                 self.draws.end(lane);
