@@ -254,8 +254,8 @@ impl Shape {
     }
 
     /// A lower bound of the distance from a point of the body to its surface along any direction of a cone, mm, and cheap;
-    /// infinite where no direction of the cone leads out. Exact for the sphere and the half-space, but for a part of 1e-9 that
-    /// covers rounding; of a mesh it is [`Self::clearance`].
+    /// infinite where no direction of the cone leads out. For analytic shapes it is the least distance, but for a part of 1e-9
+    /// that covers rounding; of a mesh it is [`Self::clearance`].
     #[inline]
     pub fn clearance_within(&self, point: DVec3, cone: &Cone) -> f64 {
         let bound = match *self {

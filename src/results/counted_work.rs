@@ -2,7 +2,8 @@
 
 /// By kind, the largest factor between the cost of a run by counted work (`verify::weights`) and by CPU
 /// time, both relative to path tracing in the same cell: over 27 cells of light transport and 12 of BSSRDF
-/// models, on a sphere, on any machine where that was measured. For `path` itself it is that of analog roulette. Printed by
+/// models, on a sphere: the largest of two machines, by the weights of their time. For `path` itself it is that of analog
+/// roulette. Printed by
 ///
 /// ```text
 /// cargo test --release --test integration -- --ignored --nocapture cpu_time_follows_the_counters
@@ -11,7 +12,7 @@
 /// One set of weights cannot serve all kinds: the counters know how often something was done, not what of
 /// it was done (the Newton steps of a connection, light samples below the horizon, points of a cloud that
 /// were put in order). BSSRDF models are farthest off under a matched boundary, where a shadow ray of path
-/// tracing is one visibility test at every event and costs a fifth of its weight.
+/// tracing is one visibility test at every event and costs far less than its weight.
 pub const FACTORS: [(&str, f64); 8] = [
     ("path", 1.2),
     ("snee", 3.2),

@@ -42,17 +42,20 @@ impl Call {
         if self.decay == 0.0 { self.most } else { self.most * exp(-self.decay * sigma * distance) }
     }
 
-    /// The distance up to which the call is made, for one uniform number; `None` if it is not made from `least` on, mm.
-    /// P(reach > d) is [`Self::probability`], and a lower bound of d may decide before d is known.
+    /// The distance up to which the call is made, mm, for one uniform number; `None` if that is no more than `least`, a lower
+    /// bound of the distance d, which may decide before d is known. P(reach > d) is [`Self::probability`]. The bound is asked
+    /// for only where it matters.
     #[inline]
-    pub(super) fn reach(&self, sigma: f64, u: f64, least: f64) -> Option<f64> {
+    pub(super) fn reach(&self, sigma: f64, u: f64, least: impl FnOnce() -> f64) -> Option<f64> {
         if u >= self.most {
             return None;
         }
         if self.decay == 0.0 {
             return Some(f64::INFINITY);
         }
-        // Most calls fail by far, which needs no logarithm: e^x is above its series.
+        // Most calls fail by far, which needs no logarithm: e^x is above its series. The margin covers rounding, so that the
+        // logarithm decides what is close.
+        let least = least();
         let x = self.decay * sigma * least;
         let below = 1.0 + x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 6.0 + x * (1.0 / 24.0))));
         if x > 0.0 && u * below > self.most * (1.0 + 1e-9) {

@@ -178,11 +178,10 @@ pub(super) fn draw<'a, B: WalkBands>(
 ) -> Option<GuidedEnd<'a>> {
     let setup = walk.rivals.setup;
     let u = walk.rivals.stream.draw();
-    let least = match &setup.guides[..] {
+    let reach = technique.call().reach(setup.sigma, u, || match &setup.guides[..] {
         [only] => walk.least_distance(only),
         _ => walk.scene.shape.clearance(walk.rivals.vertex(Slot::Latest).point),
-    };
-    let reach = technique.call().reach(setup.sigma, u, least)?;
+    })?;
     draw_within(walk, technique, reach)
 }
 
@@ -195,6 +194,9 @@ fn draw_within<'a, B: WalkBands>(
 ) -> Option<GuidedEnd<'a>> {
     let x_j = walk.rivals.vertex(Slot::Latest);
     let guide = walk.rivals.choose_guide()?;
+    if reach < f64::INFINITY && walk.least_distance(guide) >= reach {
+        return None; // one guide of several: now it is known which
+    }
     let guess = walk.guess(Slot::Latest, guide).filter(|guess| guess.distance < reach)?;
     let lobe = technique.lobe(&walk.boundary, guide, &guess)?;
 

@@ -145,7 +145,8 @@ pub(super) fn draw<'a, B: WalkBands>(
     let sigma = walk.rivals.setup.sigma;
     let call = technique.call.call(Slot::Latest, walk.rivals.count);
     let x_j = walk.rivals.vertex(Slot::Latest).point;
-    call.reach(sigma, walk.rivals.stream.draw(), clearance(walk, x_j))?;
+    let u = walk.rivals.stream.draw();
+    call.reach(sigma, u, || clearance(walk, x_j))?;
     let guide = walk.rivals.choose_guide()?;
     let light = &walk.scene.lights[guide.light];
     let sample = guide.sample(light, walk.band, walk.rivals.stream.draw2());

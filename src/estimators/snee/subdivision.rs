@@ -164,8 +164,8 @@ pub(super) fn draw_edge<'a, B: WalkBands>(
     let guide = walk.rivals.choose_guide()?;
     let call = options.call_for(&walk.boundary, guide);
     let x_i = walk.rivals.vertex(Slot::Latest);
-    let least = walk.least_distance(guide);
-    let reach = call.reach(setup.sigma, walk.rivals.stream.draw(), least)?;
+    let u = walk.rivals.stream.draw();
+    let reach = call.reach(setup.sigma, u, || walk.least_distance(guide))?;
     let needs_guess = call.decay > 0.0 || options.probe.needs_guess();
     let guess = if needs_guess { walk.guess(Slot::Latest, guide) } else { None };
     if reach < f64::INFINITY && guess.is_none_or(|guess| guess.distance >= reach) {
