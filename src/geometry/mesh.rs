@@ -20,6 +20,8 @@ pub struct Mesh {
     tree: BoxTree,
     /// The triangles in the tree's order, with their corners.
     leaves: Vec<Leaf>,
+    /// Where a triangle is among them.
+    slots: Vec<u32>,
     clearance: Clearance,
     /// The distance by which rounding may displace a point of the surface, mm: a point is a sum of three corners
     /// and, on a ray, of origin and flight, each rounded a few times at the size of its coordinates.
@@ -59,6 +61,8 @@ impl Around {
 #[derive(Clone, Debug)]
 struct Leaf {
     corners: [DVec3; 3],
+    /// The corners' normals, if shading normals are interpolated.
+    normals: [u32; 3],
     triangle: u32,
 }
 
@@ -149,13 +153,29 @@ impl Mesh {
         let leaves: Vec<Leaf> = tree
             .order()
             .iter()
-            .map(|&i| Leaf { corners: corners(&triangles[i as usize]), triangle: i })
+            .map(|&triangle| {
+                let index = triangle as usize;
+                let normals = normals.as_ref().map_or([0; 3], |normals| normals.corners[index]);
+                Leaf { corners: corners(&triangles[index]), normals, triangle }
+            })
             .collect();
-        let clearance = Clearance::new(&frame, extent, leaves.iter().map(|leaf| &leaf.corners));
+        let mut slots = vec![0; leaves.len()];
+        leaves.iter().enumerate().for_each(|(slot, leaf)| slots[leaf.triangle as usize] = slot as u32);
+        let mut last = 0;
+        let distance = |place: DVec3| {
+            let point = frame.point(place);
+            let distance2;
+            (last, distance2) = tree.nearest(place, last, |slot| {
+                triangle::distance2(&leaves[slot].corners, point) * (frame.scale * frame.scale)
+            });
+            distance2.sqrt()
+        };
+        let corners = leaves.iter().map(|leaf| &leaf.corners);
+        let clearance = Clearance::new(&frame, extent, corners, distance);
         let bounds = bounding_sphere(extent, &vertices);
         let slack = 16.0 * f64::EPSILON * extent.0.abs().max(extent.1.abs()).max_element();
         let around = Around::new(vertices.len(), &triangles);
-        Ok(Mesh { vertices, triangles, normals, bounds, tree, leaves, clearance, slack, around })
+        Ok(Mesh { vertices, triangles, normals, bounds, tree, leaves, slots, clearance, slack, around })
     }
 
     /// The vertices, mm.
@@ -187,10 +207,17 @@ impl Mesh {
 
     /// See [`super::Shape::intersect`].
     pub fn intersect(&self, ray: &Ray, side: Side, from: Option<FaceId>, t_max: f64) -> Option<Hit> {
-        if t_max <= self.clearance(ray.origin) {
+        if t_max < f64::INFINITY && self.is_clear(ray.origin, ray.at(t_max)) {
             return None;
         }
         self.search(ray, side, from, t_max)
+    }
+
+    /// Whether there surely is no surface between two points.
+    #[inline]
+    pub(super) fn is_clear(&self, start: DVec3, end: DVec3) -> bool {
+        let frame = &self.tree.frame;
+        self.clearance.has_ball_around(frame.place(start), frame.place(end))
     }
 
     /// A lower bound of the distance from a point to the surface, mm.
@@ -245,6 +272,7 @@ impl Mesh {
             + self.normals.as_ref().map_or(0, Normals::heap_bytes)
             + self.tree.heap_bytes()
             + size_of_val(&*self.leaves)
+            + size_of_val(&*self.slots)
             + self.clearance.heap_bytes()
             + size_of_val(&*self.around.starts)
             + size_of_val(&*self.around.triangles)
@@ -260,8 +288,9 @@ impl Mesh {
     /// with fewer than a hundred edges across.
     fn at_once(&self, ray: &Ray, side: Side, from: FaceId) -> Option<Hit> {
         let margin = 1e3 * self.slack;
-        let corners = self.corners(from.0);
-        if !triangle::is_on_edge(&corners, ray.origin, margin) {
+        // The leaf has just been visited, the triangle's vertices have not.
+        let Leaf { corners, .. } = &self.leaves[self.slots[from.0 as usize] as usize];
+        if !triangle::is_on_edge(corners, ray.origin, margin) {
             return None;
         }
         self.first_beside(ray, side, from, margin)
@@ -281,33 +310,41 @@ impl Mesh {
         let beside = self.triangles[from.0 as usize].into_iter().flat_map(|v| self.around.of(v));
         let met = beside.filter(|face| **face != from.0).filter_map(through);
         let (face, weights) = met.min_by_key(|(face, _)| *face)?;
-        Some(self.hit(Crossing { t: f64::MIN_POSITIVE, weights }, &self.corners(face), face))
+        Some(
+            self.hit_leaf(
+                Crossing { t: f64::MIN_POSITIVE, weights },
+                self.slots[face as usize] as usize,
+            ),
+        )
     }
 
+    #[inline]
     fn corners(&self, face: u32) -> [DVec3; 3] {
-        self.triangles[face as usize].map(|i| self.vertices[i as usize])
+        // Not `map`, which is not inlined.
+        let [a, b, c] = self.triangles[face as usize];
+        [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 
     #[inline(always)]
     fn meet(&self, ray: &Sheared, slot: usize, from: Option<FaceId>) -> Option<(Crossing, u32)> {
-        let Leaf { corners, triangle } = &self.leaves[slot];
+        let Leaf { corners, triangle, .. } = &self.leaves[slot];
         // Few are met at all: whether it is the ray's own is asked last.
         let crossing = ray.meet(corners, self.slack)?;
         (from != Some(FaceId(*triangle))).then_some((crossing, *triangle))
     }
 
     fn hit_leaf(&self, crossing: Crossing, slot: usize) -> Hit {
-        let Leaf { corners, triangle } = &self.leaves[slot];
-        self.hit(crossing, corners, *triangle)
+        self.hit(crossing, &self.leaves[slot])
     }
 
-    fn hit(&self, Crossing { t, weights }: Crossing, corners: &[DVec3; 3], face: u32) -> Hit {
+    fn hit(&self, Crossing { t, weights }: Crossing, leaf: &Leaf) -> Hit {
+        let Leaf { corners, normals, triangle } = leaf;
         let [a, b, c] = *corners;
         let point = a * weights[0] + b * weights[1] + c * weights[2];
         let normal = triangle::normal(corners);
-        let smooth = self.normals.as_ref().and_then(|n| n.at(face as usize, weights));
+        let smooth = self.normals.as_ref().and_then(|n| n.between(*normals, weights));
         let shading_normal = smooth.unwrap_or(normal);
-        Hit { t, point, normal, shading_normal, face: FaceId(face) }
+        Hit { t, point, normal, shading_normal, face: FaceId(*triangle) }
     }
 }
 
@@ -430,7 +467,7 @@ mod tests {
             let Shape::Mesh(mesh) = &shape else { unreachable!("bodies are meshes") };
             for i in 0..40_000 {
                 let slot = (u.next() * mesh.leaves.len() as f64) as usize;
-                let Leaf { corners: [a, b, c], triangle } = mesh.leaves[slot];
+                let Leaf { corners: [a, b, c], triangle, .. } = mesh.leaves[slot];
                 // On an edge, within some roundings of it, or at a corner.
                 let off = [0.0, 1e-17, 1e-16, 1e-15][i % 4];
                 let s = if i % 8 < 4 { u.next() * (1.0 - off) } else { 0.0 };
@@ -438,6 +475,26 @@ mod tests {
                 let ray = Ray { origin, dir: inward(triangle::normal(&[a, b, c]), &mut u) };
                 let hit = mesh.intersect(&ray, Side::Inside, Some(FaceId(triangle)), f64::INFINITY);
                 assert!(hit.is_some_and(|hit| hit.t > 0.0), "{name} {i} {ray:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearest_triangle_is_that_of_all() {
+        let mut u = Uniform::named("the_nearest_triangle_is_that_of_all");
+        for (name, shape) in bodies() {
+            let Shape::Mesh(mesh) = &shape else { unreachable!("bodies are meshes") };
+            let sphere = mesh.bounds();
+            for _ in 0..300 {
+                let point = sphere.center + direction(&mut u) * (1.5 * u.next() * sphere.radius);
+                let distance2 = |slot: usize| {
+                    let scale = mesh.tree.frame.scale;
+                    triangle::distance2(&mesh.leaves[slot].corners, point) * (scale * scale)
+                };
+                let first = (u.next() * mesh.leaves.len() as f64) as usize;
+                let (slot, found) = mesh.tree.nearest(mesh.tree.frame.place(point), first, distance2);
+                let all = (0..mesh.leaves.len()).map(distance2).fold(f64::INFINITY, f64::min);
+                assert_eq!((found, distance2(slot)), (all, all), "{name}: {point}");
             }
         }
     }

@@ -180,7 +180,7 @@ impl Shape {
     }
 
     /// Whether a flight of length `t` from a point of the body (on or in it, but for rounding) to `end` surely has met nothing:
-    /// most flights of a walk end in the medium. In a mesh the start shows that, in a convex shape the end. That end must be
+    /// most flights of a walk end in the medium. In a mesh both ends show that, in a convex shape the end alone. That end must be
     /// farther inside than the rounding of what [`Self::intersect`] computes: a crossing of a plane is known to some 2^-53 of
     /// the shape's size (of the half-space: of the depth of the start). On a sphere of radius 1 a chord that reaches a depth of
     /// 5e-10 is at least 6e-5 long, so that the square root that its ends are found by has lost no more than 1e-11.
@@ -195,7 +195,7 @@ impl Shape {
             }
             Shape::Box { half } => end.abs().cmplt(half * (1.0 - MARGIN)).all(),
             Shape::Sphere { radius } => end.length_squared() < radius * radius * (1.0 - MARGIN),
-            Shape::Mesh(ref mesh) => t <= mesh.clearance(ray.origin),
+            Shape::Mesh(ref mesh) => mesh.is_clear(ray.origin, end),
         }
     }
 

@@ -1,4 +1,4 @@
-//! A ray against the eight boxes of a node of obvhs's tree, all at once.
+//! A ray or a point against the eight boxes of a node of obvhs's tree, all at once.
 //!
 //! The arithmetic is that of `CwBvhNode::intersect_ray_basic`, product and sum rounded each, without its least time: eight
 //! lanes of plain loops, which the compiler turns into vectors of whatever width the caller's target features allow. No lane
@@ -12,18 +12,12 @@ use obvhs::ray::Ray as CullRay;
 pub(super) struct Slabs {
     origin: [f32; 3],
     inverse: [f32; 3],
-    is_backward: [bool; 3],
 }
 
 impl Slabs {
     #[inline(always)]
     pub(super) fn new(ray: &CullRay) -> Slabs {
-        let direction = ray.direction.to_array();
-        Slabs {
-            origin: ray.origin.to_array(),
-            inverse: ray.inv_direction.to_array(),
-            is_backward: direction.map(|d| d < 0.0),
-        }
+        Slabs { origin: ray.origin.to_array(), inverse: ray.inv_direction.to_array() }
     }
 
     /// The boxes that the ray is in at some time from 0 to `tau`, as obvhs's traversal wants them: a bit of the upper
@@ -41,10 +35,11 @@ impl Slabs {
             let step = f32::from_bits(u32::from(node.e[axis]) << 23) * self.inverse[axis];
             let start = (corner[axis] - self.origin[axis]) * self.inverse[axis];
             let (low, high) = planes[axis];
-            let (near, far) = if self.is_backward[axis] { (high, low) } else { (low, high) };
             for lane in 0..8 {
-                enter[lane] = later(f32::from(near[lane]) * step + start, enter[lane]);
-                leave[lane] = earlier(f32::from(far[lane]) * step + start, leave[lane]);
+                // In vectors two more comparisons are cheaper than the choice of the nearer plane by the ray's direction.
+                let (a, b) = (f32::from(low[lane]) * step + start, f32::from(high[lane]) * step + start);
+                enter[lane] = later(earlier(a, b), enter[lane]);
+                leave[lane] = earlier(later(a, b), leave[lane]);
             }
         }
         let (bits, shifts) = node.get_child_and_index_bits(octant);
@@ -56,6 +51,30 @@ impl Slabs {
         }
         met.into_iter().fold(0, |all, bits| all | bits)
     }
+}
+
+/// The squared distance of a point to each box of a node.
+#[inline]
+pub(super) fn distances2(node: &CwBvhNode, point: [f32; 3]) -> [f32; 8] {
+    let corner = node.p.to_array();
+    let planes = [
+        (&node.child_min_x, &node.child_max_x),
+        (&node.child_min_y, &node.child_max_y),
+        (&node.child_min_z, &node.child_max_z),
+    ];
+    let mut away2 = [0.0; 8];
+    for axis in 0..3 {
+        let step = f32::from_bits(u32::from(node.e[axis]) << 23);
+        let start = corner[axis] - point[axis];
+        let (low, high) = planes[axis];
+        for lane in 0..8 {
+            let below = f32::from(low[lane]) * step + start;
+            let above = -(f32::from(high[lane]) * step + start);
+            let away = later(later(below, above), 0.0);
+            away2[lane] += away * away;
+        }
+    }
+    away2
 }
 
 /// The later of two times; of equal ones the second. One instruction, which `f32::max` is not.

@@ -34,8 +34,13 @@ impl Normals {
 
     /// The interpolated unit normal at barycentric coordinates of a triangle; none if it vanishes.
     pub fn at(&self, triangle: usize, weights: [f64; 3]) -> Option<DVec3> {
+        self.between(self.corners[triangle], weights)
+    }
+
+    /// The same between normals by their indices.
+    #[inline]
+    pub(super) fn between(&self, [a, b, c]: [u32; 3], weights: [f64; 3]) -> Option<DVec3> {
         // Not `map`, which is not inlined.
-        let [a, b, c] = self.corners[triangle];
         let (a, b, c) = (self.vectors[a as usize], self.vectors[b as usize], self.vectors[c as usize]);
         (a * weights[0] + b * weights[1] + c * weights[2]).try_normalize()
     }

@@ -38,7 +38,7 @@ use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::ray::Ray as CullRay;
 
 use super::Ray;
-use super::node::Slabs;
+use super::node::{Slabs, distances2};
 use crate::error::{Error, Result};
 use crate::math::{DVec3, UVec2, Vec3, Vectorized, vectorized};
 
@@ -74,6 +74,11 @@ impl MeshFrame {
     /// A point in units of the frame.
     pub(super) fn place(&self, point: DVec3) -> DVec3 {
         (point - self.center) * self.scale
+    }
+
+    /// The point, mm, that is at a place in the frame.
+    pub(super) fn point(&self, place: DVec3) -> DVec3 {
+        place / self.scale + self.center
     }
 
     /// The f32 ray and its skip; none if it passes beside the mesh or stops before it.
@@ -160,6 +165,43 @@ impl BoxTree {
     pub(super) fn search(&self, ray: &Ray, t_max: f64, visitor: &mut impl Visit) {
         let Some((ray, skip)) = self.frame.cull_ray(ray, t_max) else { return };
         vectorized(BoxSearch { tree: self, ray, skip, visitor });
+    }
+
+    /// The nearest slot to a point, in units of the frame, and its squared distance there. `first` is one that may be near.
+    pub(super) fn nearest(
+        &self,
+        point: DVec3,
+        first: usize,
+        mut distance2: impl FnMut(usize) -> f64,
+    ) -> (usize, f64) {
+        let place = point.as_vec3().to_array();
+        let mut nearest = (first, distance2(first));
+        let mut open = vec![(0.0, 0)];
+        while let Some((away2, index)) = open.pop() {
+            // The padding of boxes is more than the rounding of the distance to them.
+            if f64::from(away2) > nearest.1 {
+                continue;
+            }
+            let node = &self.bvh.nodes[index as usize];
+            let below = open.len();
+            for (child, away2) in distances2(node, place).into_iter().enumerate() {
+                if f64::from(away2) > nearest.1 || node.is_child_empty(child) {
+                    continue;
+                }
+                if node.is_leaf(child) {
+                    let (start, count) = node.child_primitives(child);
+                    for slot in start as usize..(start + count) as usize {
+                        let slot = (slot, distance2(slot));
+                        nearest = if slot.1 < nearest.1 { slot } else { nearest };
+                    }
+                } else {
+                    open.push((away2, node.child_node_index(child)));
+                }
+            }
+            // The nearest last, to be next.
+            open[below..].sort_unstable_by(|a: &(f32, u32), b| b.0.total_cmp(&a.0));
+        }
+        nearest
     }
 
     /// Memory behind the tree, bytes.
