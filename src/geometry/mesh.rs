@@ -66,6 +66,14 @@ struct Leaf {
     triangle: u32,
 }
 
+impl Leaf {
+    /// The squared distance of a point, both in units of the frame.
+    fn distance2(&self, frame: &MeshFrame, point: DVec3) -> f64 {
+        let [a, b, c] = self.corners;
+        triangle::distance2(&[frame.place(a), frame.place(b), frame.place(c)], point)
+    }
+}
+
 /// The nearest crossing so far. At equal distances (a hit on an edge) the smaller index wins, so that the
 /// result does not depend on the order of visits.
 struct Nearest {
@@ -161,13 +169,11 @@ impl Mesh {
             .collect();
         let mut slots = vec![0; leaves.len()];
         leaves.iter().enumerate().for_each(|(slot, leaf)| slots[leaf.triangle as usize] = slot as u32);
+        // In units of the frame, whose squares neither overflow nor vanish.
         let mut last = 0;
-        let distance = |place: DVec3| {
-            let point = frame.point(place);
+        let distance = |point: DVec3| {
             let distance2;
-            (last, distance2) = tree.nearest(place, last, |slot| {
-                triangle::distance2(&leaves[slot].corners, point) * (frame.scale * frame.scale)
-            });
+            (last, distance2) = tree.nearest(point, last, |slot| leaves[slot].distance2(&frame, point));
             distance2.sqrt()
         };
         let corners = leaves.iter().map(|leaf| &leaf.corners);
@@ -487,12 +493,11 @@ mod tests {
             let sphere = mesh.bounds();
             for _ in 0..300 {
                 let point = sphere.center + direction(&mut u) * (1.5 * u.next() * sphere.radius);
-                let distance2 = |slot: usize| {
-                    let scale = mesh.tree.frame.scale;
-                    triangle::distance2(&mesh.leaves[slot].corners, point) * (scale * scale)
-                };
+                let frame = &mesh.tree.frame;
+                let place = frame.place(point);
+                let distance2 = |slot: usize| mesh.leaves[slot].distance2(frame, place);
                 let first = (u.next() * mesh.leaves.len() as f64) as usize;
-                let (slot, found) = mesh.tree.nearest(mesh.tree.frame.place(point), first, distance2);
+                let (slot, found) = mesh.tree.nearest(place, first, distance2);
                 let all = (0..mesh.leaves.len()).map(distance2).fold(f64::INFINITY, f64::min);
                 assert_eq!((found, distance2(slot)), (all, all), "{name}: {point}");
             }

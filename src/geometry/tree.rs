@@ -76,11 +76,6 @@ impl MeshFrame {
         (point - self.center) * self.scale
     }
 
-    /// The point, mm, that is at a place in the frame.
-    pub(super) fn point(&self, place: DVec3) -> DVec3 {
-        place / self.scale + self.center
-    }
-
     /// The f32 ray and its skip; none if it passes beside the mesh or stops before it.
     fn cull_ray(&self, ray: &Ray, t_max: f64) -> Option<(CullRay, f64)> {
         let origin = self.place(ray.origin);
