@@ -24,15 +24,10 @@ impl Slabs {
     /// eight for an inner child in the order of visits, up to three of the lower 24 for the primitives of a leaf.
     #[inline(always)]
     pub(super) fn meet(&self, node: &CwBvhNode, octant: u32, tau: f32) -> u32 {
-        let corner = node.p.to_array();
-        let planes = [
-            (&node.child_min_x, &node.child_max_x),
-            (&node.child_min_y, &node.child_max_y),
-            (&node.child_min_z, &node.child_max_z),
-        ];
+        let (corner, planes) = (node.p.to_array(), planes(node));
         let (mut enter, mut leave) = ([0.0; 8], [tau; 8]);
         for axis in 0..3 {
-            let step = f32::from_bits(u32::from(node.e[axis]) << 23) * self.inverse[axis];
+            let step = step_of(node, axis) * self.inverse[axis];
             let start = (corner[axis] - self.origin[axis]) * self.inverse[axis];
             let (low, high) = planes[axis];
             for lane in 0..8 {
@@ -56,15 +51,10 @@ impl Slabs {
 /// The squared distance of a point to each box of a node.
 #[inline]
 pub(super) fn distances2(node: &CwBvhNode, point: [f32; 3]) -> [f32; 8] {
-    let corner = node.p.to_array();
-    let planes = [
-        (&node.child_min_x, &node.child_max_x),
-        (&node.child_min_y, &node.child_max_y),
-        (&node.child_min_z, &node.child_max_z),
-    ];
+    let (corner, planes) = (node.p.to_array(), planes(node));
     let mut away2 = [0.0; 8];
     for axis in 0..3 {
-        let step = f32::from_bits(u32::from(node.e[axis]) << 23);
+        let step = step_of(node, axis);
         let start = corner[axis] - point[axis];
         let (low, high) = planes[axis];
         for lane in 0..8 {
@@ -75,6 +65,22 @@ pub(super) fn distances2(node: &CwBvhNode, point: [f32; 3]) -> [f32; 8] {
         }
     }
     away2
+}
+
+/// Least and greatest coordinates of the boxes by axis, in steps from the node's corner.
+#[inline(always)]
+fn planes(node: &CwBvhNode) -> [(&[u8; 8], &[u8; 8]); 3] {
+    [
+        (&node.child_min_x, &node.child_max_x),
+        (&node.child_min_y, &node.child_max_y),
+        (&node.child_min_z, &node.child_max_z),
+    ]
+}
+
+/// The length of a step, whose exponent the node holds.
+#[inline(always)]
+fn step_of(node: &CwBvhNode, axis: usize) -> f32 {
+    f32::from_bits(u32::from(node.e[axis]) << 23)
 }
 
 /// The later of two times; of equal ones the second. One instruction, which `f32::max` is not.

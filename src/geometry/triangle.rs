@@ -156,7 +156,8 @@ pub(super) fn nearest(corners: &[DVec3; 3], point: DVec3) -> [f64; 3] {
 }
 
 /// The squared distance of a point to a triangle. The distance is known to a few 1e-8 of the triangle's size: a projection
-/// onto the plane is as exact as the triangle is wide, and where it is narrow an edge is as near.
+/// onto the plane is as exact as the triangle is wide, and where it is narrow an edge is as near. The point that [`nearest`] finds
+/// can be farther away where a triangle is narrow.
 pub(super) fn distance2(corners: &[DVec3; 3], point: DVec3) -> f64 {
     let [a, b, c] = *corners;
     let n = (b - a).cross(c - a);
