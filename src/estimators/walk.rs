@@ -33,85 +33,7 @@ use crate::scene::Scene;
 use crate::scene::sensor::PathMeasure;
 
 pub(super) use lanes::{may_fly_side_by_side, trace_alone, trace_side_by_side};
-
-/// Techniques beside unidirectional sampling.
-pub(super) trait Rivals: Sized {
-    /// Nothing happens at a medium vertex.
-    const IS_SILENT: bool = false;
-
-    /// Called at a medium vertex that survived roulette, before its direction is drawn; the walk's ray holds
-    /// the vertex and the direction of arrival. Draws samples and scores them.
-    fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>);
-
-    /// Called after the walk was refracted or reflected into the body; its ray is the next flight.
-    fn depart<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>);
-
-    /// Number of sensor rays per walk at which [`Self::look`] scores lights; the walk continues with one of them.
-    fn views(&self) -> u32 {
-        1
-    }
-
-    /// The walk has met a smooth boundary from outside, from the direction `wo` in the frame of the shading normal:
-    /// scores lights that are seen without scattering by their expectation.
-    fn look<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _: &Hit, _: &Frame, _wo: DVec3) {}
-
-    /// Whether [`Self::look`] scores a light that is seen in this way.
-    fn is_expected<B: WalkBands>(
-        _: &CameraWalk<'_, Self, B>,
-        _: Unscattered,
-        _light: usize,
-        _wi: DVec3,
-    ) -> bool {
-        false
-    }
-
-    /// Which of BSDF and light sampling take part at the end of a path that leaves from the walk's
-    /// latest medium vertex: 1 or 0 each.
-    fn unidirectional(&self) -> [f64; 2] {
-        [1.0, 1.0]
-    }
-
-    /// What the walk has scored, once for each score, also by [`CameraWalk::score_with`].
-    #[inline]
-    fn scored(&mut self, _value: f64) {}
-
-    /// The next score is divided by this sum of densities, which the rivals' latest [`Self::densities`] are a part of.
-    #[inline]
-    fn weigh(&mut self, _sum: f64) {}
-
-    /// Sum over the rivals of their densities of the path that ends at `exit` and continues towards
-    /// `wi`, light `light`, relative to the density of the walk's medium vertices.
-    fn densities<B: WalkBands>(
-        walk: &mut CameraWalk<'_, Self, B>,
-        exit: &WalkExit,
-        light: usize,
-        wi: DVec3,
-    ) -> f64;
-}
-
-/// No additional techniques.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Unrivalled;
-
-impl Rivals for Unrivalled {
-    const IS_SILENT: bool = true;
-
-    #[inline]
-    fn call<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>) {}
-
-    #[inline]
-    fn depart<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>) {}
-
-    #[inline]
-    fn densities<B: WalkBands>(
-        _: &mut CameraWalk<'_, Self, B>,
-        _: &WalkExit,
-        _: usize,
-        _: DVec3,
-    ) -> f64 {
-        0.0
-    }
-}
+pub(super) use rivals::{Rivals, Unrivalled};
 
 /// How the path's current direction was drawn, as light sampling sees it.
 #[derive(Clone, Copy)]
@@ -686,6 +608,8 @@ mod flights;
 mod lanes;
 #[path = "walk_lights.rs"]
 mod lights;
+#[path = "walk_rivals.rs"]
+mod rivals;
 
 #[cfg(test)]
 #[path = "walk_led_tests.rs"]

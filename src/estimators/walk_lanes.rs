@@ -17,8 +17,9 @@ use crate::estimators::field::{Field, Path};
 use crate::estimators::guidance::{Guidance, GuidedBand, GuidedLanes, LaneVertex};
 use crate::estimators::scores::Contribution;
 use crate::estimators::steps::StepRule;
+use crate::estimators::vertices::WalkVertex;
 use crate::estimators::{Anomaly, Cost, Scores};
-use crate::geometry::Side;
+use crate::geometry::{Ray, Side};
 use crate::optics::guided::LANES;
 use crate::sampling::stream::PassKey;
 
@@ -27,6 +28,8 @@ struct LaneWalk<'a, R> {
     index: usize,
     walk: CameraWalk<'a, R, GuidedBand<'a>>,
     later: Option<Later<GuidedBand<'a>>>,
+    /// Medium vertices that the rivals have passed and the history of the path does not have yet.
+    passed: u64,
 }
 
 /// The paths of a pass in one band.
@@ -103,18 +106,17 @@ pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
         paths.go_on(&mut lanes, lane, &mut walks[lane], onward);
     }
     while walks.iter().any(Option::is_some) {
+        let shape = &field.scene.shape;
+        let any = walks.iter().flatten().next().filter(|_| !R::IS_SILENT);
+        let bounds = any.and_then(|any| any.walk.rivals.bounds(shape, lanes.ends()));
         let survives = lanes.scatter(|lane, vertex| {
             if !R::IS_SILENT
-                && let Some(LaneWalk { walk, .. }) = &mut walks[lane]
+                && let Some(walk) = &mut walks[lane]
             {
-                walk.call_from_lane(vertex);
+                walk.call(vertex, bounds.map(|bounds| bounds[lane]));
             }
         });
-        // A loop: `array::from_fn` is not inlined here.
-        let mut is_clear = [false; LANES];
-        for (lane, is_clear) in is_clear.iter_mut().enumerate() {
-            *is_clear = paths.is_clear(&lanes, lane);
-        }
+        let is_clear = shape.are_clear(lanes.flights());
         for lane in 0..LANES {
             if survives[lane] && is_clear[lane] {
                 continue;
@@ -126,7 +128,7 @@ pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
                     FlightEnd::Elsewhere(onward) => onward,
                 }
             } else {
-                let vertices = lanes.flights(lane) - 1;
+                let vertices = lanes.begun(lane) - 1;
                 walk.take_out(&mut lanes, lane, vertices, vertices);
                 None
             };
@@ -139,9 +141,10 @@ pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
 
 impl<'a, R: Rivals> CameraWalk<'a, R, GuidedBand<'a>> {
     /// Has come to a medium vertex in a lane, and survived roulette.
-    fn call_from_lane(&mut self, vertex: &LaneVertex) {
-        self.ray = vertex.ray;
-        [self.throughput, self.survival] = vertex.weights;
+    #[inline(never)]
+    fn call_from_lane(&mut self, vertex: LaneVertex<'_>) {
+        self.ray = vertex.ray();
+        [self.throughput, self.survival] = vertex.weights();
         (self.from, self.unscattered) = (None, Unscattered::No);
         self.bands.arrive(vertex);
         self.history.scatter();
@@ -162,7 +165,7 @@ impl<'a, R: Rivals, N: Fn(&Path) -> R> Paths<'a, '_, N> {
         let path = Path { field, band, index, key };
         let guided = GuidedBand::new(guidance, &field.scene.medium[band]);
         let walk = CameraWalk::start(path, holding, (self.rivals)(&path), guided);
-        let LaneWalk { walk, later, .. } = slot.insert(LaneWalk { index, walk, later: None });
+        let LaneWalk { walk, later, .. } = slot.insert(LaneWalk { index, walk, later: None, passed: 0 });
         walk.meet_body(path, later)
     }
 
@@ -226,6 +229,27 @@ enum FlightEnd {
 }
 
 impl<'a, R: Rivals> LaneWalk<'a, R> {
+    /// Calls the rivals at a medium vertex that has survived roulette, with what they know of it. Where they pass it, the walk
+    /// itself does not hear of it.
+    #[inline(always)]
+    fn call(&mut self, vertex: LaneVertex<'_>, bound: Option<f64>) {
+        let Ray { origin: point, dir: arrival } = vertex.ray();
+        if let Some(bound) = bound
+            && self.walk.rivals.passes(&WalkVertex { point, arrival, walks: vertex.ratio() }, bound)
+        {
+            self.passed += 1;
+        } else {
+            self.catch_up();
+            self.walk.call_from_lane(vertex);
+        }
+    }
+
+    /// Tells the history of the vertices that were passed.
+    #[inline]
+    fn catch_up(&mut self) {
+        self.walk.history.scatter_often(std::mem::take(&mut self.passed));
+    }
+
     /// Follows the path outside until it is inside, and puts it into its lane; false where it has ended.
     fn enter(&mut self, lanes: &mut GuidedLanes<'a>, lane: usize, mut onward: Option<Onward>) -> bool {
         let LaneWalk { walk, later, .. } = self;
@@ -247,12 +271,12 @@ impl<'a, R: Rivals> LaneWalk<'a, R> {
     fn end_flight(&mut self, lanes: &mut GuidedLanes<'a>, lane: usize) -> FlightEnd {
         let walk = &mut self.walk;
         let (ray, t, _) = lanes.flight(lane);
-        let from = walk.from.filter(|_| lanes.flights(lane) == 1);
+        let from = walk.from.filter(|_| lanes.begun(lane) == 1);
         let hit = walk.scene.shape.end_of_unclear(&ray, from, t);
         if hit.is_none() && t < f64::INFINITY && !flights::is_lost(walk.bounds, ray.at(t)) {
             return FlightEnd::Medium;
         }
-        let begun = lanes.flights(lane);
+        let begun = lanes.begun(lane);
         self.take_out(lanes, lane, begun, begun - 1);
         let walk = &mut self.walk;
         let Some(hit) = hit else {
@@ -282,5 +306,6 @@ impl<'a, R: Rivals> LaneWalk<'a, R> {
                 walk.history.scatter_often(vertices);
             }
         }
+        self.catch_up();
     }
 }

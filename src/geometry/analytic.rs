@@ -14,6 +14,34 @@ pub(super) struct Range {
     pub t_max: f64,
 }
 
+/// How far inside a shape, in parts of its size, the end of a flight is that surely has met nothing
+/// ([`super::Shape::is_clear`]).
+const MARGIN: f64 = 1e-9;
+
+/// Whether a flight of length `t` surely ends in the half-space z < 0. Without an end it leaves it at no point, and does not.
+#[inline(always)]
+pub(super) fn ends_in_half_space(origin: DVec3, end: DVec3, t: f64) -> bool {
+    end.z < MARGIN * origin.z && t < f64::INFINITY
+}
+
+/// Whether a flight surely ends in the slab -thickness < z < 0.
+#[inline(always)]
+pub(super) fn ends_in_slab(thickness: f64, end: DVec3) -> bool {
+    end.z < -MARGIN * thickness && end.z > -(1.0 - MARGIN) * thickness
+}
+
+/// Whether a flight surely ends in the box.
+#[inline(always)]
+pub(super) fn ends_in_cuboid(half: DVec3, end: DVec3) -> bool {
+    end.abs().cmplt(half * (1.0 - MARGIN)).all()
+}
+
+/// Whether a flight surely ends in the sphere.
+#[inline(always)]
+pub(super) fn ends_in_sphere(radius: f64, end: DVec3) -> bool {
+    end.length_squared() < radius * radius * (1.0 - MARGIN)
+}
+
 /// A crossing of an unshaded surface.
 #[inline(always)]
 fn hit(t: f64, point: DVec3, normal: DVec3, face: u32) -> Option<Hit> {

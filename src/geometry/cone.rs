@@ -2,6 +2,9 @@
 
 use crate::math::DVec3;
 
+/// What is left of a bound for analytic shapes when a part of it covers rounding.
+pub(super) const LESS: f64 = 1.0 - 1e-9;
+
 /// Directions about an axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Cone {
@@ -22,32 +25,35 @@ impl Cone {
     /// The largest component of a direction of the cone along a vector, times the vector's length, of which this is the square;
     /// `along` is the same of the axis. With the angle a between axis and vector and w that of the cone: the length where
     /// a <= w, else cos(a - w) times the length. w is below a right angle.
-    #[inline]
+    #[inline(always)]
     fn most_along(&self, squared: f64, along: f64) -> f64 {
-        if along > 0.0 && along * along >= self.cosine * self.cosine * squared {
-            return squared.sqrt();
-        }
+        let is_inside = along > 0.0 && along * along >= self.cosine * self.cosine * squared;
         let across = (squared - along * along).max(0.0).sqrt();
-        along * self.cosine + across * self.sine
+        // Both are computed, as in vectors.
+        let at_rim = along * self.cosine + across * self.sine;
+        if is_inside { squared.sqrt() } else { at_rim }
     }
 
     /// The distance to a plane whose height above the point is `height`, and whose unit normal has the component `along` on
     /// the axis.
-    #[inline]
+    #[inline(always)]
     fn reach_plane(&self, height: f64, along: f64) -> f64 {
         let most = self.most_along(1.0, along);
         if most > 0.0 { height / most } else { f64::INFINITY }
     }
 
+    #[inline(always)]
     pub(super) fn through_half_space(&self, point: DVec3) -> f64 {
         self.reach_plane(-point.z, self.axis.z)
     }
 
+    #[inline(always)]
     pub(super) fn through_slab(&self, thickness: f64, point: DVec3) -> f64 {
         let down = self.reach_plane(thickness + point.z, -self.axis.z);
         self.through_half_space(point).min(down)
     }
 
+    #[inline(always)]
     pub(super) fn through_cuboid(&self, half: DVec3, point: DVec3) -> f64 {
         let along = |axis: usize| {
             let up = self.reach_plane(half[axis] - point[axis], self.axis[axis]);
@@ -57,7 +63,7 @@ impl Cone {
     }
 
     /// The distance along w from x to the sphere is sqrt(R^2 - x^2 + (x.w)^2) - x.w, which falls with x.w.
-    #[inline]
+    #[inline(always)]
     pub(super) fn through_sphere(&self, radius: f64, point: DVec3) -> f64 {
         let squared = point.length_squared();
         let most = self.most_along(squared, point.dot(self.axis));

@@ -18,6 +18,7 @@ mod normals;
 mod obj;
 mod ply;
 pub mod procedural;
+mod several;
 mod surface;
 #[cfg(test)]
 mod testing;
@@ -33,6 +34,7 @@ pub use lines::{Line, Lines, Met};
 pub use mesh::Mesh;
 pub use mesh_file::{Placement, load_mesh};
 pub use normals::Normals;
+pub use several::Flights;
 pub use surface::{SurfacePoint, SurfaceSampler, Triangle};
 
 use crate::math::{DVec3, Frame};
@@ -186,15 +188,11 @@ impl Shape {
     /// 5e-10 is at least 6e-5 long, so that the square root that its ends are found by has lost no more than 1e-11.
     #[inline]
     pub(crate) fn is_clear(&self, ray: &Ray, end: DVec3, t: f64) -> bool {
-        const MARGIN: f64 = 1e-9;
         match *self {
-            // A flight without an end leaves a half-space at no point, and is not clear.
-            Shape::HalfSpace => end.z < MARGIN * ray.origin.z && t < f64::INFINITY,
-            Shape::Slab { thickness } => {
-                end.z < -MARGIN * thickness && end.z > -(1.0 - MARGIN) * thickness
-            }
-            Shape::Box { half } => end.abs().cmplt(half * (1.0 - MARGIN)).all(),
-            Shape::Sphere { radius } => end.length_squared() < radius * radius * (1.0 - MARGIN),
+            Shape::HalfSpace => analytic::ends_in_half_space(ray.origin, end, t),
+            Shape::Slab { thickness } => analytic::ends_in_slab(thickness, end),
+            Shape::Box { half } => analytic::ends_in_cuboid(half, end),
+            Shape::Sphere { radius } => analytic::ends_in_sphere(radius, end),
             Shape::Mesh(ref mesh) => mesh.is_clear(ray.origin, end),
         }
     }
@@ -265,7 +263,7 @@ impl Shape {
             Shape::Sphere { radius } => cone.through_sphere(radius, point),
             Shape::Mesh(ref mesh) => return mesh.clearance(point),
         };
-        bound * (1.0 - 1e-9)
+        bound * cone::LESS
     }
 
     /// Whether the body is known to be convex: then all its points see each other.

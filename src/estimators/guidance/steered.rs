@@ -61,8 +61,8 @@ impl<'a> GuidedBand<'a> {
 
     /// The walk has arrived at a medium vertex, by flights that it made in a lane.
     #[inline]
-    pub(in crate::estimators) fn arrive(&mut self, vertex: &LaneVertex) {
-        (self.ratio, self.heading) = (vertex.ratio, Heading::NONE);
+    pub(in crate::estimators) fn arrive(&mut self, vertex: LaneVertex<'_>) {
+        (self.ratio, self.heading) = (vertex.ratio(), Heading::NONE);
     }
 
     #[inline(always)]

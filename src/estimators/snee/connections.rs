@@ -26,13 +26,14 @@ use super::expected;
 use super::last_vertex::{self, GuidedEnd};
 use super::learned_calls::CalledTechnique;
 use super::specular;
-use super::state::{Connections, Slot};
+use super::state::{AllCalls, Connections, Slot};
 use super::subdivision::{self, Subdivided};
 use crate::estimators::bands::WalkBands;
 use crate::estimators::vertices::{Unscattered, WalkExit, WalkVertex};
 use crate::estimators::walk::{CameraWalk, Rivals};
-use crate::geometry::{Hit, Ray};
+use crate::geometry::{Hit, Ray, Shape};
 use crate::math::{DVec3, Frame};
+use crate::optics::guided::{Lanes, VectorLanes};
 
 impl Rivals for Connections<'_> {
     fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>) {
@@ -77,6 +78,29 @@ impl Rivals for Connections<'_> {
             }
         }
         walk.rivals.begin(None);
+    }
+
+    /// A lower bound of the distance of the specular guess, which most calls fail by.
+    #[inline(always)]
+    fn bounds(&self, shape: &Shape, points: &VectorLanes) -> Option<Lanes> {
+        let AllCalls { guide, .. } = self.all_calls.as_ref()?;
+        Some(shape.clearances_within(points, &guide.refracted))
+    }
+
+    /// Draws the numbers of [`Self::call`], and gives them back where one of its techniques may be called.
+    #[inline(always)]
+    fn passes(&mut self, vertex: &WalkVertex, bound: f64) -> bool {
+        let Some(AllCalls { guide, calls }) = &self.all_calls else { return false };
+        let mut stream = self.stream.clone();
+        for call in calls.iter().flatten() {
+            if !call.fails_by_far(self.setup.sigma, stream.draw(), bound) {
+                self.foreseen = Some((guide.light, bound));
+                return false;
+            }
+        }
+        self.stream = stream;
+        self.arrive(*vertex);
+        true
     }
 
     fn scored(&mut self, value: f64) {

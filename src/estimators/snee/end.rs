@@ -53,16 +53,21 @@ impl Call {
         if self.decay == 0.0 {
             return Some(f64::INFINITY);
         }
-        // Most calls fail by far, which needs no logarithm: e^x is above its series. The margin covers rounding, so that the
-        // logarithm decides what is close.
         let least = least();
-        let x = self.decay * sigma * least;
-        let below = 1.0 + x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 6.0 + x * (1.0 / 24.0))));
-        if x > 0.0 && u * below > self.most * (1.0 + 1e-9) {
+        if self.fails_by_far(sigma, u, least) {
             return None;
         }
         let reach = -ln(u / self.most) / (self.decay * sigma);
         (least < reach).then_some(reach)
+    }
+
+    /// Whether [`Self::reach`] is surely no more than `least`. Most calls fail by far, which needs no logarithm: e^x is above
+    /// its series. The margin covers rounding, so that the logarithm decides what is close.
+    #[inline(always)]
+    pub(super) fn fails_by_far(&self, sigma: f64, u: f64, least: f64) -> bool {
+        let x = self.decay * sigma * least;
+        let below = 1.0 + x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 6.0 + x * (1.0 / 24.0))));
+        x > 0.0 && u * below > self.most * (1.0 + 1e-9)
     }
 }
 

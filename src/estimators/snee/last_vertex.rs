@@ -73,7 +73,7 @@ const NARROWEST: f64 = 1e-4;
 
 impl LastVertex {
     /// How often it is called.
-    fn call(&self) -> Call {
+    pub(super) fn call(&self) -> Call {
         Call { most: self.most, decay: self.decay }
     }
 

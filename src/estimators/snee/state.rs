@@ -3,6 +3,8 @@
 use std::cell::RefCell;
 
 use super::BandSetup;
+use super::LastVertex;
+use super::end::Call;
 use super::guess::Guess;
 use super::guide::Guide;
 use super::learned_calls::{CallNotes, CalledTechnique};
@@ -12,6 +14,7 @@ use crate::estimators::field::Path;
 use crate::estimators::vertices::{WalkExit, WalkVertex};
 use crate::estimators::walk::CameraWalk;
 use crate::math::DVec3;
+use crate::optics::boundary::Boundary;
 use crate::sampling::discrete::choose_share;
 use crate::sampling::stream::{Purpose, Stream};
 
@@ -36,12 +39,23 @@ struct Held {
     least: Option<(usize, f64)>,
 }
 
+/// All calls at a vertex, where there is one guide and no connection.
+pub(super) struct AllCalls<'a> {
+    pub guide: &'a Guide,
+    /// In the order of their draws: of the light-guided last vertex and of subdivision.
+    pub calls: [Option<Call>; 2],
+}
+
 /// State that a walk carries for connections.
 pub(super) struct Connections<'a> {
     pub setup: &'a BandSetup,
     pub stream: Stream,
+    /// What can be passed; `None` where every vertex is called one by one.
+    pub all_calls: Option<AllCalls<'a>>,
     /// Vertices held.
     held: [Held; 3],
+    /// The bound of the next vertex, where it is known before.
+    pub foreseen: Option<(usize, f64)>,
     /// Index of the latest vertex, 0 or 1; the other is that of the one before, and the last that of the drawn one. So the
     /// walk's vertices are not copied from slot to slot.
     latest: usize,
@@ -59,10 +73,22 @@ pub(super) struct Connections<'a> {
     pub notes: Option<&'a RefCell<CallNotes>>,
 }
 
+impl<'a> AllCalls<'a> {
+    fn of(setup: &'a BandSetup, boundary: &Boundary) -> Option<AllCalls<'a>> {
+        let ([guide], None) = (&setup.guides[..], &setup.specular) else { return None };
+        let options = &setup.options;
+        let last_vertex = options.last_vertex.as_ref().map(LastVertex::call);
+        let subdivision = options.strategies.subdivides().then(|| options.call_for(boundary, guide));
+        Some(AllCalls { guide, calls: [last_vertex, subdivision] })
+    }
+}
+
 impl<'a> Connections<'a> {
     /// Of a path, with its own stream.
     pub(super) fn of_path(setup: &'a BandSetup, path: &Path) -> Connections<'a> {
-        Connections::new(setup, path.key.stream(path.index as u64, Purpose::Connection))
+        let stream = path.key.stream(path.index as u64, Purpose::Connection);
+        let boundary = &path.field.scene.boundary[path.band];
+        Connections { all_calls: AllCalls::of(setup, boundary), ..Connections::new(setup, stream) }
     }
 
     pub(super) fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
@@ -71,7 +97,9 @@ impl<'a> Connections<'a> {
         Connections {
             setup,
             stream,
+            all_calls: None,
             held,
+            foreseen: None,
             latest: 0,
             count: 0,
             is_edge_alone: false,
@@ -98,9 +126,10 @@ impl<'a> Connections<'a> {
     }
 
     /// The walk has come to a new medium vertex.
+    #[inline]
     pub(super) fn arrive(&mut self, vertex: WalkVertex) {
         self.latest = 1 - self.latest;
-        self.hold(Slot::Latest, vertex);
+        self.held[self.latest] = Held { vertex, guess: None, least: self.foreseen.take() };
         self.count += 1;
     }
 
@@ -114,6 +143,7 @@ impl<'a> Connections<'a> {
     }
 
     /// Puts a new vertex into a slot.
+    #[inline]
     pub(super) fn hold(&mut self, slot: Slot, vertex: WalkVertex) {
         self.held[self.index(slot)] = Held { vertex, guess: None, least: None };
     }

@@ -141,6 +141,12 @@ impl StepLanes {
         [vector(&self.origins, lane), vector(&self.dirs, lane)]
     }
 
+    /// Where flights begin.
+    #[inline(always)]
+    pub fn origins(&self) -> &VectorLanes {
+        &self.origins
+    }
+
     /// How far flights go if no boundary ends them.
     #[inline(always)]
     pub fn lengths(&self) -> &Lanes {

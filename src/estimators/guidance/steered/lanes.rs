@@ -3,19 +3,39 @@
 use super::{GuidedBand, importance};
 use crate::estimators::guidance::{FoundLanes, Guidance};
 use crate::estimators::steps::{StepRule, Weights};
-use crate::geometry::Ray;
+use crate::geometry::{Flights, Ray};
 use crate::math::DVec3;
-use crate::optics::guided::{DrawLanes, GuideLanes, LANES, Lanes, StepLanes, vector};
+use crate::optics::guided::{DrawLanes, GuideLanes, LANES, Lanes, StepLanes, VectorLanes, vector};
 use crate::sampling::stream::Stream;
 
-/// A medium vertex of a walk that has survived roulette.
+/// A medium vertex of a walk that has survived roulette, before its direction is drawn. Each number is read where it is used:
+/// a copy of them that is written and read at once would stall.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::estimators) struct LaneVertex {
+pub(in crate::estimators) struct LaneVertex<'a> {
+    steps: &'a StepLanes,
+    weights: &'a Weights,
+    ratio: f64,
+    lane: usize,
+}
+
+impl LaneVertex<'_> {
     /// The vertex and the direction of arrival.
-    pub ray: Ray,
-    pub weights: Weights,
-    /// As in [`GuidedBand`].
-    pub ratio: f64,
+    #[inline(always)]
+    pub(in crate::estimators) fn ray(&self) -> Ray {
+        let [origin, dir] = self.steps.flight(self.lane);
+        Ray { origin, dir }
+    }
+
+    #[inline(always)]
+    pub(in crate::estimators) fn weights(&self) -> Weights {
+        *self.weights
+    }
+
+    /// Density of the walk up to here over that of a plain one.
+    #[inline(always)]
+    pub(in crate::estimators) fn ratio(&self) -> f64 {
+        self.ratio
+    }
 }
 
 /// Walks inside the body, each of which has begun a flight. An empty lane takes part in what is computed together, with numbers
@@ -96,9 +116,22 @@ impl<'a> GuidedLanes<'a> {
         (Ray { origin, dir }, self.steps.lengths()[lane], vector(self.steps.ends(), lane))
     }
 
+    /// All flights, if no boundary ends them.
+    #[inline(always)]
+    pub(in crate::estimators) fn flights(&self) -> Flights<'_, LANES> {
+        let (origins, ends) = (self.steps.origins(), self.steps.ends());
+        Flights { origins, ends, lengths: self.steps.lengths() }
+    }
+
+    /// Where flights end, if no boundary ends them.
+    #[inline(always)]
+    pub(in crate::estimators) fn ends(&self) -> &VectorLanes {
+        self.steps.ends()
+    }
+
     /// How many flights a walk has begun since it was put in.
     #[inline]
-    pub(in crate::estimators) fn flights(&self, lane: usize) -> u64 {
+    pub(in crate::estimators) fn begun(&self, lane: usize) -> u64 {
         self.flights[lane]
     }
 
@@ -107,7 +140,7 @@ impl<'a> GuidedLanes<'a> {
     #[inline(always)]
     pub(in crate::estimators) fn scatter(
         &mut self,
-        mut arrive: impl FnMut(usize, &LaneVertex),
+        mut arrive: impl FnMut(usize, LaneVertex<'_>),
     ) -> [bool; LANES] {
         let Guidance { turns, share, .. } = self.guidance;
         let StepRule { roulette, survival, .. } = self.rule;
@@ -126,10 +159,8 @@ impl<'a> GuidedLanes<'a> {
             goes_on[lane] = !self.is_empty[lane]
                 && roulette.survive([throughput, seen], survival, importance, stream).is_some();
             if goes_on[lane] {
-                // At the vertex, with the direction of arrival still.
-                let [origin, dir] = self.steps.flight(lane);
-                let (weights, ratio) = (self.weights[lane], ratios[lane]);
-                arrive(lane, &LaneVertex { ray: Ray { origin, dir }, weights, ratio });
+                let (weights, ratio) = (&self.weights[lane], ratios[lane]);
+                arrive(lane, LaneVertex { steps: &self.steps, weights, ratio, lane });
                 self.draws.draw(lane, turns, *share, &self.guides, || stream.draw());
             } else {
                 self.draws.end(lane);
