@@ -138,21 +138,27 @@ impl Clearance {
         if i < nx && j < ny && k < nz { self.bounds[i + nx * (j + ny * k)].into() } else { 0.0 }
     }
 
-    /// Whether both points, units of the frame, are in a ball without surface inside: that of the first point's voxel.
+    /// The centre and the radius of the ball of a point's voxel, units of the frame; `None` outside the grid.
     #[inline]
-    pub(super) fn has_ball_around(&self, start: DVec3, end: DVec3) -> bool {
+    pub(super) fn ball(&self, point: DVec3) -> Option<(DVec3, f64)> {
         /// A sum with this is rounded to a whole number, whose bits are the last ones: the nearest voxel, in fewer
         /// instructions than a conversion.
         const WHOLE: f64 = (3u64 << 51) as f64;
-        let voxel = (start - self.first) * (1.0 / VOXEL) + WHOLE;
+        let voxel = (point - self.first) * (1.0 / VOXEL) + WHOLE;
         let whole = |x: f64| x.to_bits() as u32 as usize;
         let (i, j, k) = (whole(voxel.x), whole(voxel.y), whole(voxel.z));
         let [nx, ny, nz] = self.voxels;
         if i >= nx || j >= ny || k >= nz {
-            return false;
+            return None;
         }
         let EmptyBall { center: [x, y, z], radius } = self.balls[i + nx * (j + ny * k)];
-        let (center, radius) = (DVec3::new(x.into(), y.into(), z.into()), f64::from(radius));
+        Some((DVec3::new(x.into(), y.into(), z.into()), radius.into()))
+    }
+
+    /// Whether both points, units of the frame, are in a ball without surface inside: that of the first point's voxel.
+    #[inline]
+    pub(super) fn has_ball_around(&self, start: DVec3, end: DVec3) -> bool {
+        let Some((center, radius)) = self.ball(start) else { return false };
         // Without an end, `end` is infinite or NaN, and in no ball.
         let (from2, to2) = (start.distance_squared(center), end.distance_squared(center));
         from2 < radius * radius && to2 < radius * radius

@@ -4,7 +4,7 @@ use super::clearance::Clearance;
 use super::normals::Normals;
 use super::tree::{BoxTree, MeshFrame, Visit};
 use super::triangle::{self, Crossing, Sheared};
-use super::{BoundingSphere, FaceId, Hit, Ray, Side, topology};
+use super::{BoundingSphere, Cone, FaceId, Hit, Ray, Side, cone, topology};
 use crate::error::Result;
 use crate::math::DVec3;
 
@@ -230,6 +230,19 @@ impl Mesh {
     pub(super) fn clearance(&self, point: DVec3) -> f64 {
         let frame = &self.tree.frame;
         self.clearance.at(frame.place(point)) / frame.scale
+    }
+
+    /// See [`super::Shape::clearance_within`]: the distance to the surface itself, or to that of a ball that has none inside.
+    pub(super) fn clearance_within(&self, point: DVec3, cone: &Cone) -> f64 {
+        let frame = &self.tree.frame;
+        let place = frame.place(point);
+        let along = match self.clearance.ball(place) {
+            Some((center, radius)) if place.distance_squared(center) < radius * radius => {
+                cone.through_sphere(radius, place - center) * cone::LESS
+            }
+            _ => 0.0,
+        };
+        along.max(self.clearance.at(place)) / frame.scale
     }
 
     /// [`Mesh::intersect`] by the tree alone.

@@ -253,7 +253,8 @@ impl Shape {
 
     /// A lower bound of the distance from a point of the body to its surface along any direction of a cone, mm, and cheap;
     /// infinite where no direction of the cone leads out. For analytic shapes it is the least distance, but for a part of 1e-9
-    /// that covers rounding; of a mesh it is [`Self::clearance`].
+    /// that covers rounding; of a mesh the larger one of [`Self::clearance`] and of the distance to the surface of a ball that has
+    /// no triangles inside.
     #[inline]
     pub fn clearance_within(&self, point: DVec3, cone: &Cone) -> f64 {
         let bound = match *self {
@@ -261,7 +262,7 @@ impl Shape {
             Shape::Slab { thickness } => cone.through_slab(thickness, point),
             Shape::Box { half } => cone.through_cuboid(half, point),
             Shape::Sphere { radius } => cone.through_sphere(radius, point),
-            Shape::Mesh(ref mesh) => return mesh.clearance(point),
+            Shape::Mesh(ref mesh) => return mesh.clearance_within(point, cone),
         };
         bound * cone::LESS
     }

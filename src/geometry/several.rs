@@ -59,7 +59,7 @@ impl<const N: usize> Vectorized for ClearancesWithin<'_, N> {
             Shape::Slab { thickness } => each(|i| cone.through_slab(thickness, point(i)) * LESS),
             Shape::Box { half } => each(|i| cone.through_cuboid(half, point(i)) * LESS),
             Shape::Sphere { radius } => each(|i| cone.through_sphere(radius, point(i)) * LESS),
-            Shape::Mesh(ref mesh) => each(|i| mesh.clearance(point(i))),
+            Shape::Mesh(ref mesh) => each(|i| mesh.clearance_within(point(i), cone)),
         }
     }
 }
