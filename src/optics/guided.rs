@@ -23,12 +23,27 @@
 //! pull p = s m,
 //!   (1 - p) e^{p sigma_t t} where it ends in the medium, e^{p sigma_t t} where it reaches the boundary.
 //!
+//! # Bends
+//!
+//! In a finite body phi is no exponential: it solves lap(phi) = kappa^2 phi, with a growth s below the asymptotic one kappa (both
+//! per mean free path here), and grows to all sides of a point beside its gradient; in the middle of a sphere it has no
+//! gradient at all. To second order about x, phi(x + t w) / phi(x) = e^{p t} cosh(c t), and the sum of the second derivatives
+//! of ln phi, 3 c^2, is kappa^2 - s^2. A photon that is carried on by forward scattering finds phi + l dphi/dt at the end of a
+//! flight, l = g / (1 - a g) mean free paths (3 D g of the P1 approximation), which of e^{p t} cosh(c t) is, up to a factor,
+//!   (1 + w)/2 e^{(p + c) t} + (1 - w)/2 e^{(p - c) t},   w = l c / (1 + l p).
+//! So a flight has one of two rates, 1 - p - c or 1 - p + c, with the density and the probability of more than t
+//!   e^{-t} ((1 + w)/2 e^{(p + c) t} + (1 - w)/2 e^{(p - c) t}) / Z,   Z = (1 - p + w c) / ((1 - p)^2 - c^2),
+//!   e^{-t} (S e^{(p + c) t} + (1 - S) e^{(p - c) t}),   S = (1 + w)/2 (1 - p + c) / (1 - p + w c),
+//! S being the share of the smaller rate. Without c these are the flights above. A step of such a walk has the weight phi / phi'
+//! that it should have, where the flight along an exponential loses the factor a at every step in the middle of a body. c is
+//! at most 0.7 (1 - s) and w at most 0.95, so that all rates and densities are positive.
+//!
 //! Near a boundary a guided step is an *escape* with probability c: its direction is uniform in the cone, of solid angle W,
 //! of directions that are refracted out, and it reaches the boundary; no distance is drawn. Relative to a plain step its
 //! density is e^{sigma_t t} c / (W HG).
 //!
-//! Against the growth, where p < 0, importance does not fall forever: behind the middle of a body it grows again, and a plain
-//! flight across has a density that e^{p sigma_t t} puts near 0. So beyond FALL mean free paths such a flight goes on with the
+//! Against the growth, where p < -c, importance does not fall forever: behind the middle of a body it grows again, and a plain
+//! flight across has a density that e^{p sigma_t t} puts near 0. So such a flight has no c, and beyond FALL mean free paths it goes on with the
 //! plain rate: t in e^{p sigma_t t} stops there, and 1 - p becomes 1.
 //!
 //! The guide alone is not safe: where it is wrong, weights are unbounded. If a share q of steps is guided, turn and flight
@@ -40,7 +55,9 @@
 
 mod lanes;
 
-pub use lanes::{DrawLanes, GuideLanes, LANES, Lanes, StepLanes, VectorLanes, set_vector, vector};
+pub use lanes::{
+    DrawLanes, GuideLanes, LANES, Lanes, StepLanes, VectorLanes, set_vector, strengths, vector,
+};
 
 use std::f64::consts::TAU;
 
@@ -145,16 +162,30 @@ pub struct StepGuide {
     pub pull: Pull,
     /// The way out.
     pub escape: Escape,
+    /// c, by which importance grows to all sides, per mean free path: [`bend`], or 0.
+    pub bend: f64,
 }
 
 impl StepGuide {
     /// None.
-    pub const NONE: StepGuide = StepGuide { pull: Pull::NONE, escape: Escape::NONE };
+    pub const NONE: StepGuide = StepGuide { pull: Pull::NONE, escape: Escape::NONE, bend: 0.0 };
 
-    /// Without a way out.
+    /// Without a way out, for importance that is an exponential.
     pub fn inner(pull: Pull) -> StepGuide {
-        StepGuide { pull, escape: Escape::NONE }
+        StepGuide { pull, escape: Escape::NONE, bend: 0.0 }
     }
+}
+
+/// The largest c, over 1 - s: every rate is positive, with a margin.
+const MOST_BENT: f64 = 0.7;
+
+/// c of a solution of the Helmholtz equation whose asymptotic growth per mean free path is this, where it grows by s.
+#[inline(always)]
+pub fn bend(asymptotic: f64, s: f64) -> f64 {
+    let squared = (asymptotic - s) * (asymptotic + s) * (1.0 / 3.0);
+    let bend = if squared > 0.0 { squared } else { 0.0 }.sqrt();
+    let most = MOST_BENT * (1.0 - s);
+    if bend < most { bend } else { most }
 }
 
 /// How a step is drawn.
@@ -198,6 +229,8 @@ struct Level {
 pub struct GuidedTurns {
     phase: HenyeyGreenstein,
     levels: Levels,
+    /// g / (1 - a g): the mean free paths by which light is carried on.
+    carry: f64,
 }
 
 /// Every level; the first is not asked for.
@@ -219,7 +252,7 @@ impl GuidedTurns {
                 IsotropicLevel { s, spread, reach, norm: 0.5 * spread / s }
             };
             let levels = Levels::Isotropic(levels.map(strength).map(level).collect());
-            return GuidedTurns { phase, levels };
+            return GuidedTurns { phase, levels, carry: 0.0 };
         }
         let b = albedo * phase.g / (1.0 - albedo * phase.g);
         let mut all: Vec<Level> = Vec::with_capacity(LEVELS);
@@ -231,7 +264,8 @@ impl GuidedTurns {
             };
             all.push(level);
         }
-        GuidedTurns { phase, levels: Levels::Product(all) }
+        let carry = phase.g / (1.0 - albedo * phase.g);
+        GuidedTurns { phase, levels: Levels::Product(all), carry }
     }
 
     /// Density of a turn from `from` to `to`, over that of the phase function.
@@ -262,7 +296,7 @@ impl GuidedTurns {
         from: DVec3,
         mut draw: impl FnMut() -> f64,
     ) -> (DVec3, StepDraw) {
-        let StepGuide { pull, escape } = guide;
+        let StepGuide { pull, escape, .. } = guide;
         if draw() >= share {
             return (self.phase.sample(from, [draw(), draw()]), StepDraw::Plain);
         }
@@ -275,12 +309,12 @@ impl GuidedTurns {
     /// What [`Self::sample_mixed`] says of the step that goes on along `to`.
     #[inline(always)]
     pub fn heading(&self, share: f64, guide: &StepGuide, from: DVec3, to: DVec3) -> Heading {
-        let StepGuide { pull, escape } = guide;
+        let StepGuide { pull, escape, .. } = guide;
         let mut heading = Heading {
             plain: 1.0 - share,
             guided: share * self.ratio(pull, from, to),
             escape: 0.0,
-            pull: pull.along(to),
+            growth: self.growth(guide, to),
         };
         if escape.chance > 0.0 {
             heading.guided *= 1.0 - escape.chance;
@@ -290,6 +324,12 @@ impl GuidedTurns {
             }
         }
         heading
+    }
+
+    /// How importance grows along a direction.
+    #[inline(always)]
+    pub fn growth(&self, guide: &StepGuide, dir: DVec3) -> Growth {
+        Growth::new(guide.pull.along(dir), guide.bend, self.carry)
     }
 
     /// A direction after light that travelled along `from`. Isotropic: with L = ln((1 + s) / (1 - s)), the distribution
@@ -358,18 +398,82 @@ pub struct Heading {
     pub guided: f64,
     /// Of escapes.
     pub escape: f64,
+    /// Along the direction.
+    pub growth: Growth,
+}
+
+/// How importance grows along a direction, per mean free path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Growth {
     /// p = s m; below 1.
     pub pull: f64,
+    /// c; below 1 - p.
+    pub bend: f64,
+    /// S, the share of flights with the smaller rate; 1 without c.
+    pub share: f64,
+}
+
+/// The largest w.
+const MOST_SKEW: f64 = 0.95;
+
+impl Growth {
+    /// None.
+    pub const NONE: Growth = Growth { pull: 0.0, bend: 0.0, share: 1.0 };
+
+    /// In a direction with this pull, from c and the distance l by which light is carried on.
+    #[inline(always)]
+    pub fn new(pull: f64, bend: f64, carry: f64) -> Growth {
+        // Where importance only falls, it has no bend.
+        let bend = if pull < -bend { 0.0 } else { bend };
+        // w = carried / ahead; both are multiplied by it, which saves a division.
+        let (carried, ahead) = (carry * bend, 1.0 + carry * pull);
+        let is_most = carried > MOST_SKEW * ahead;
+        let (carried, ahead) =
+            (if is_most { MOST_SKEW } else { carried }, if is_most { 1.0 } else { ahead });
+        let mean = 1.0 - pull;
+        let share = 0.5 * (ahead + carried) * (mean + bend) / (mean * ahead + carried * bend);
+        Growth { pull, bend, share: if bend > 0.0 { share } else { 1.0 } }
+    }
+
+    /// Whether a flight has the plain rate from [`FALL`] on.
+    #[inline(always)]
+    fn falls(&self) -> bool {
+        self.pull < 0.0 && self.bend == 0.0
+    }
+
+    /// The smaller and the larger rate, over that of a plain flight.
+    #[inline(always)]
+    fn rates(&self) -> [f64; 2] {
+        let mean = 1.0 - self.pull;
+        [mean - self.bend, mean + self.bend]
+    }
+
+    /// One of the two rates, and a number that is uniform again, from a uniform one.
+    #[inline(always)]
+    fn choose_rate(&self, u: f64) -> (f64, f64) {
+        let ([small, large], share) = (self.rates(), self.share);
+        let is_small = u < share;
+        let part = if is_small { u } else { u - share };
+        let of = if is_small { share } else { 1.0 - share };
+        (if is_small { small } else { large }, part / of)
+    }
+
+    /// Density of flights over that of plain ones, out of e^{(p + c) t} and e^{(p - c) t}.
+    #[inline(always)]
+    fn density(&self, up: f64, down: f64) -> f64 {
+        let [small, large] = self.rates();
+        self.share * small * up + (1.0 - self.share) * large * down
+    }
 }
 
 impl Heading {
     /// No step: the density is that of what has been drawn.
-    pub const NONE: Heading = Heading { plain: 1.0, guided: 0.0, escape: 0.0, pull: 0.0 };
+    pub const NONE: Heading = Heading { plain: 1.0, guided: 0.0, escape: 0.0, growth: Growth::NONE };
 
     /// Of a direction that is given: the flight alone is guided, with probability `share`.
     #[inline]
-    pub fn given(share: f64, pull: f64) -> Heading {
-        Heading { plain: 1.0 - share, guided: share, escape: 0.0, pull }
+    pub fn given(share: f64, growth: Growth) -> Heading {
+        Heading { plain: 1.0 - share, guided: share, escape: 0.0, growth }
     }
 
     /// Density of the direction over the plain one.
@@ -391,10 +495,11 @@ impl Heading {
         match drawn {
             StepDraw::Plain => sample_exponential(sigma_t, u),
             StepDraw::Guided => {
-                let t = sample_exponential(sigma_t * (1.0 - self.pull), u);
+                let (rate, u) = self.growth.choose_rate(u);
+                let t = sample_exponential(sigma_t * rate, u);
                 let beyond = t - FALL / sigma_t;
                 // With the plain rate the rest of the optical distance takes longer, by 1 - p.
-                if self.pull < 0.0 && beyond > 0.0 { t - self.pull * beyond } else { t }
+                if self.growth.falls() && beyond > 0.0 { t - self.growth.pull * beyond } else { t }
             }
             StepDraw::Escape => f64::INFINITY,
         }
@@ -403,21 +508,28 @@ impl Heading {
     /// Density of direction and flight over the plain one, for a flight that ends in the medium at distance `t`.
     #[inline]
     pub fn flight_ratio(&self, sigma_t: f64, t: f64) -> f64 {
-        let rate = if self.pull < 0.0 && sigma_t * t > FALL { 1.0 } else { 1.0 - self.pull };
-        self.plain + self.guided * (rate * self.growth(sigma_t * t))
+        let depth = sigma_t * t;
+        let [up, down] = self.growths(depth);
+        let is_far = self.growth.falls() && depth > FALL;
+        let flown = if is_far { up } else { self.growth.density(up, down) };
+        self.plain + self.guided * flown
     }
 
     /// The same for a flight longer than `t`, with its probability.
     #[inline]
     pub fn passage_ratio(&self, sigma_t: f64, t: f64) -> f64 {
         let escape = if self.escape > 0.0 { self.escape * growth(1.0, sigma_t * t) } else { 0.0 };
-        self.plain + self.guided * self.growth(sigma_t * t) + escape
+        let [up, down] = self.growths(sigma_t * t);
+        let Growth { share, .. } = self.growth;
+        self.plain + self.guided * (share * up + (1.0 - share) * down) + escape
     }
 
-    /// Probability that a guided flight is longer than so many mean free paths, over that of a plain one.
+    /// e^{(p + c) depth} and e^{(p - c) depth}.
     #[inline]
-    fn growth(&self, depth: f64) -> f64 {
-        growth(self.pull, if self.pull < 0.0 { depth.min(FALL) } else { depth })
+    fn growths(&self, depth: f64) -> [f64; 2] {
+        let Growth { pull, bend, .. } = self.growth;
+        let depth = if self.growth.falls() { depth.min(FALL) } else { depth };
+        [growth(pull + bend, depth), growth(pull - bend, depth)]
     }
 }
 

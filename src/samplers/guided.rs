@@ -8,8 +8,9 @@ use serde::Deserialize;
 use super::chart::{AXIS, Charted, Directions, EvenAngle, Grade, Measure, Technique, Unbounded};
 use super::kind::{SamplerKind, sampler_kind};
 use super::sampler::{Contrast, Coordinate, Draw, Piece, Sampler};
+use crate::error::Error;
 use crate::math::{DVec3, Frame, cos, exp, exp_m1, ln_1p, sin, sin_cos_turns};
-use crate::optics::guided::{Escape, GuidedTurns, Pull, StepGuide};
+use crate::optics::guided::{Escape, Growth, GuidedTurns, Heading, Pull, StepGuide};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::Stream;
 
@@ -25,7 +26,7 @@ pub const TURN: SamplerKind = sampler_kind!(
         let angle = o.exit_deg.to_radians();
         let normal = frame.n * cos(angle) - frame.t * sin(angle);
         let escape = Escape { normal, least_cosine: cos(o.cone_deg.to_radians()), chance: o.escapes };
-        let guide = StepGuide { pull: Pull::new(axis * o.growth), escape };
+        let guide = StepGuide { pull: Pull::new(axis * o.growth), escape, bend: 0.0 };
         let turn = GuidedTurn { phase, turns: GuidedTurns::new(phase, o.albedo), share: o.share, guide };
         let scale = (1.0 - o.g.abs()) * (1.0 - o.g.abs());
         let grade = PeakGrade { scale, length: ln_1p(2.0 / scale), is_backward: o.g < 0.0 };
@@ -135,10 +136,14 @@ pub const STEP: SamplerKind = sampler_kind!(
     "guided_step",
     "direction and distance of a step in a guided walk, isotropic scattering",
     StepOptions => |o| {
+        if o.growth + o.bend >= 1.0 {
+            let sum = o.growth + o.bend;
+            return Err(Error::input(format!("guided_step: `growth` and `bend` are {sum} together, and have to be below 1")));
+        }
         let phase = HenyeyGreenstein { g: 0.0 };
         let turns = GuidedTurns::new(phase, o.albedo);
-        let guide = StepGuide::inner(Pull::new(AXIS * o.growth));
-        Ok(Step { turns, share: o.share, guide, sigma_t: o.sigma_t_per_mm })
+        let guide = StepGuide { bend: o.bend, ..StepGuide::inner(Pull::new(AXIS * o.growth)) };
+        Ok(Step { turns, share: o.share, guide, carry: o.carry, sigma_t: o.sigma_t_per_mm })
     }
 );
 
@@ -158,6 +163,14 @@ struct StepOptions {
     /// Share of guided steps.
     #[schemars(range(min = 0.0, max = 1.0))]
     share: f64,
+    /// Growth of the importance to all sides, per mean free path; with `growth` below 1.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 0.96))]
+    bend: f64,
+    /// Mean free paths by which light is carried on at the end of a flight.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    carry: f64,
 }
 
 /// Angle to the growth over pi, all azimuths together (2 pi^2 sin(theta) per unit), and the distance.
@@ -165,16 +178,22 @@ struct Step {
     turns: GuidedTurns,
     share: f64,
     guide: StepGuide,
+    carry: f64,
     sigma_t: f64,
 }
 
 impl Step {
+    fn heading(&self, dir: DVec3) -> Heading {
+        let growth = Growth::new(self.guide.pull.along(dir), self.guide.bend, self.carry);
+        Heading { growth, ..self.turns.heading(self.share, &self.guide, DVec3::X, dir) }
+    }
+
     fn distances(&self) -> Unbounded {
         Unbounded(1.0 / self.sigma_t)
     }
 
     fn joint(&self, dir: DVec3, theta: f64, t: f64, slope: f64) -> f64 {
-        let heading = self.turns.heading(self.share, &self.guide, DVec3::X, dir);
+        let heading = self.heading(dir);
         let plain = self.sigma_t * exp(-self.sigma_t * t) / (4.0 * PI);
         plain * heading.flight_ratio(self.sigma_t, t) * EvenAngle::solid_angle(theta) * slope
     }
@@ -183,7 +202,7 @@ impl Step {
 impl Sampler for Step {
     fn draw(&self, stream: &mut Stream) -> Draw {
         let (dir, drawn) = self.turns.sample_mixed(self.share, &self.guide, DVec3::X, || stream.draw());
-        let heading = self.turns.heading(self.share, &self.guide, DVec3::X, dir);
+        let heading = self.heading(dir);
         let t = heading.sample_distance(self.sigma_t, drawn, stream.draw());
         let theta = EvenAngle::theta(AXIS, dir);
         let x = t / (t + 1.0 / self.sigma_t);

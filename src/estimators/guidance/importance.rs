@@ -24,7 +24,7 @@ use super::incidence::{LetIn, TransmittedLight};
 use crate::geometry::{self, Ray, Shape, Side};
 use crate::math::{DVec3, Vec3, cos, exp, ln, ln_1p};
 use crate::optics::boundary::Boundary;
-use crate::optics::guided::{Escape, Pull, StepGuide};
+use crate::optics::guided::{Escape, Pull, StepGuide, bend};
 use crate::optics::medium::Medium;
 use crate::scene::Scene;
 
@@ -54,6 +54,7 @@ pub(super) struct ImportanceGrid {
     low: DVec3,
     per_spacing: f64,
     counts: [usize; 3],
+    asymptotic: f64, // growth per mean free path
     nodes: Vec<Node>,
     rule: ExitRule,
     exits: Vec<ExitPlane>,
@@ -211,7 +212,7 @@ impl Importance {
         };
         match self {
             Importance::HalfSpace { kappa, pull, rule, exit } => {
-                *guide = StepGuide { pull: *pull, escape: escape(rule, exit) };
+                *guide = StepGuide { pull: *pull, escape: escape(rule, exit), bend: 0.0 };
                 exp(kappa * x.z)
             }
             Importance::Slab { kappa, mean_free_path, thickness, a, b, rule, exits } => {
@@ -225,8 +226,9 @@ impl Importance {
                     *guide = StepGuide::NONE;
                     return 0.0;
                 }
-                let exit = &exits[usize::from(x.z < -0.5 * thickness)];
-                *guide = StepGuide { pull: Pull::new(DVec3::Z * growth), escape: escape(rule, exit) };
+                let escape = escape(rule, &exits[usize::from(x.z < -0.5 * thickness)]);
+                let pull = Pull::new(DVec3::Z * growth);
+                *guide = StepGuide { pull, escape, bend: bend(asymptotic, pull.strength()) };
                 phi
             }
             Importance::Grid(grid) => grid.at(x, guide),
@@ -291,6 +293,7 @@ impl ImportanceGrid {
             Some(exit) => guide.escape = self.rule.escape(exit, x),
             None => guide.escape.chance = 0.0,
         }
+        guide.bend = if node.phi > 0.0 { bend(self.asymptotic, guide.pull.strength()) } else { 0.0 };
         f64::from(node.phi)
     }
 }
@@ -324,8 +327,7 @@ struct Border {
     at: DVec3,
     /// |cosine| between the normal and the axis.
     lean: f64,
-    /// From the middle, along the axis.
-    distance: f64,
+    distance: f64, // from the middle, along the axis
     /// What goes in there, per band.
     let_in: Vec<LetIn>,
 }
@@ -626,7 +628,8 @@ impl Cells {
         let nodes = (0..self.numbers.len()).map(node).collect();
         let Lattice { first, spacing, counts } = self.lattice;
         let (low, per_spacing) = (first - 0.5 * spacing, 1.0 / spacing);
-        ImportanceGrid { low, per_spacing, counts, nodes, rule, exits: Vec::new() }
+        let (asymptotic, exits) = (diffusion.kappa * mean_free_path, Vec::new());
+        ImportanceGrid { low, per_spacing, counts, asymptotic, nodes, rule, exits }
     }
 }
 

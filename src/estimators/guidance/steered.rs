@@ -82,7 +82,8 @@ impl WalkBands for GuidedBand<'_> {
     fn enter(&mut self, at: DVec3, normal: DVec3, dir: DVec3) {
         self.normal = normal;
         self.last.0 = DVec3::NAN;
-        self.heading = Heading::given(self.guidance.share, self.at(at).pull.along(dir));
+        let Guidance { turns, share, .. } = self.guidance;
+        self.heading = Heading::given(*share, turns.growth(self.at(at), dir));
         self.drawn = None;
         if self.per_entry == 0.0 && self.last.2 > 0.0 {
             self.per_entry = 1.0 / self.last.2;

@@ -10,8 +10,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Escape, FALL, GuidedTurns, Heading, IsotropicLevel, LEVELS, Level, Levels, MOST, MOST_EXPONENT,
-    Polynomial, Pull, StepGuide, TERMS, side,
+    Escape, FALL, Growth, GuidedTurns, Heading, IsotropicLevel, LEVELS, Level, Levels, MOST,
+    MOST_EXPONENT, Polynomial, Pull, StepGuide, TERMS, side,
 };
 use crate::math::{
     DVec3, Frame, Vectorized, exp_near, ln_of_normal, renormalized, sin_cos_turns, vectorized,
@@ -54,12 +54,16 @@ pub fn set_vector([x, y, z]: &mut VectorLanes, lane: usize, to: DVec3) {
 pub struct StepLanes {
     sigma_t: f64,
     share: f64,
+    /// Mean free paths by which light is carried on.
+    carry: f64,
     origins: VectorLanes,
     dirs: VectorLanes,
     /// [`Heading`], of which `plain` is the same everywhere.
     guided: Lanes,
     escape: Lanes,
     pull: Lanes,
+    bend: Lanes,
+    small: Lanes,
     /// Lengths, if no boundary ends the flights, and where they end then.
     lengths: Lanes,
     ends: VectorLanes,
@@ -80,6 +84,8 @@ pub struct GuideLanes {
     pub least_cosines: Lanes,
     /// Probabilities that guided steps are escapes.
     pub chances: Lanes,
+    /// By which importance grows to all sides.
+    pub bends: Lanes,
 }
 
 /// How steps are drawn, and the numbers that they are drawn from.
@@ -94,15 +100,18 @@ pub struct DrawLanes {
 
 impl StepLanes {
     /// Without walks, in a medium of extinction `sigma_t` > 0 (1/mm) and with a share of guided steps.
-    pub fn new(sigma_t: f64, share: f64) -> StepLanes {
+    pub fn new(sigma_t: f64, share: f64, turns: &GuidedTurns) -> StepLanes {
         StepLanes {
             sigma_t,
             share,
+            carry: turns.carry,
             origins: NONE,
             dirs: NONE,
             guided: ZERO,
             escape: ZERO,
             pull: ZERO,
+            bend: ZERO,
+            small: ZERO,
             lengths: ZERO,
             ends: NONE,
             ratios: [1.0; LANES],
@@ -120,8 +129,9 @@ impl StepLanes {
     ) {
         set_vector(&mut self.origins, lane, origin);
         set_vector(&mut self.dirs, lane, dir);
-        let Heading { guided, escape, pull, .. } = *heading;
-        (self.guided[lane], self.escape[lane], self.pull[lane]) = (guided, escape, pull);
+        let Heading { guided, escape, growth: Growth { pull, bend, share }, .. } = *heading;
+        (self.guided[lane], self.escape[lane]) = (guided, escape);
+        (self.pull[lane], self.bend[lane], self.small[lane]) = (pull, bend, share);
         self.ratios[lane] = ratio;
         let (drawn, u) = heading.choose(u);
         let length = heading.sample_distance(self.sigma_t, drawn, u);
@@ -131,8 +141,9 @@ impl StepLanes {
 
     /// Density of a walk up to the begin of its flight, over that of a plain one; and the step that it has begun.
     pub fn state(&self, lane: usize) -> (f64, Heading) {
-        let (guided, escape, pull) = (self.guided[lane], self.escape[lane], self.pull[lane]);
-        (self.ratios[lane], Heading { plain: 1.0 - self.share, guided, escape, pull })
+        let (guided, escape) = (self.guided[lane], self.escape[lane]);
+        let growth = Growth { pull: self.pull[lane], bend: self.bend[lane], share: self.small[lane] };
+        (self.ratios[lane], Heading { plain: 1.0 - self.share, guided, escape, growth })
     }
 
     /// Where a walk's flight begins, and its direction.
@@ -228,16 +239,17 @@ impl GuideLanes {
     /// None.
     pub fn none() -> GuideLanes {
         let levels = [0; LANES];
-        GuideLanes { axes: NONE, levels, normals: NONE, least_cosines: ZERO, chances: ZERO }
+        GuideLanes { axes: NONE, levels, normals: NONE, least_cosines: ZERO, chances: ZERO, bends: ZERO }
     }
 
     /// Sets that of one walk.
-    pub fn set(&mut self, lane: usize, StepGuide { pull, escape }: &StepGuide) {
+    pub fn set(&mut self, lane: usize, StepGuide { pull, escape, bend }: &StepGuide) {
         let Pull { axis, level } = *pull;
         set_vector(&mut self.axes, lane, axis);
         self.levels[lane] = level as i32;
         set_vector(&mut self.normals, lane, escape.normal);
         (self.least_cosines[lane], self.chances[lane]) = (escape.least_cosine, escape.chance);
+        self.bends[lane] = *bend;
     }
 
     fn escape(&self, lane: usize) -> Escape {
@@ -290,7 +302,7 @@ impl DrawLanes {
 
 /// s of each level.
 #[inline(always)]
-fn strengths(levels: [i32; LANES]) -> Lanes {
+pub fn strengths(levels: [i32; LANES]) -> Lanes {
     const STEP: f64 = 1.0 / (LEVELS - 1) as f64;
     let mut strengths = ZERO;
     for lane in 0..LANES {
@@ -380,16 +392,18 @@ impl Vectorized for Arrivals<'_> {
     fn call(self) {
         let Arrivals(steps) = self;
         // Copies: what a reference leads to might be among the results, which would keep the loop from vectors.
-        let StepLanes { sigma_t, share, guided, pull, lengths, mut ratios, .. } = *steps;
+        let StepLanes { sigma_t, share, guided, pull, bend, small, lengths, mut ratios, .. } = *steps;
         let plain = 1.0 - share;
         for lane in 0..LANES {
-            let pull = pull[lane];
+            let (pull, bend) = (pull[lane], bend[lane]);
+            let growth = Growth { pull, bend, share: small[lane] };
             let depth = sigma_t * lengths[lane];
-            let is_far = pull < 0.0 && depth > FALL;
-            let rate = if is_far { 1.0 } else { 1.0 - pull };
+            let is_far = growth.falls() && depth > FALL;
             let reach = if is_far { FALL } else { depth };
-            let growth = exp_near((pull * reach).min(MOST_EXPONENT));
-            ratios[lane] = (ratios[lane] * (plain + guided[lane] * (rate * growth))).min(f64::MAX);
+            let up = exp_near(((pull + bend) * reach).min(MOST_EXPONENT));
+            let down = exp_near(((pull - bend) * reach).min(MOST_EXPONENT));
+            let flown = if is_far { up } else { growth.density(up, down) };
+            ratios[lane] = (ratios[lane] * (plain + guided[lane] * flown)).min(f64::MAX);
         }
         steps.ratios = ratios;
         steps.origins = steps.ends;
@@ -572,12 +586,14 @@ impl StepLanes {
         turned: &Lanes,
         pdfs: &Lanes,
     ) {
-        let (sigma_t, share, [ox, oy, oz]) = (self.sigma_t, self.share, &self.origins);
-        let GuideLanes { axes: [ax, ay, az], normals: [nx, ny, nz], least_cosines, chances, .. } =
-            guides;
+        let StepLanes { sigma_t, share, carry, origins: [ox, oy, oz], .. } = *self;
+        let GuideLanes {
+            axes: [ax, ay, az], normals: [nx, ny, nz], least_cosines, chances, bends, ..
+        } = guides;
         let DrawLanes { kinds, flights, .. } = draws;
         let ([x, y, z], fall) = (dirs, FALL / sigma_t);
-        let ([mut guided, mut escape, mut pull, mut lengths], mut ends) = ([ZERO; 4], NONE);
+        let ([mut guided, mut escape, mut lengths], mut ends) = ([ZERO; 3], NONE);
+        let [mut pull, mut bend, mut small] = [ZERO; 3];
         let [ex, ey, ez] = &mut ends;
         for lane in 0..LANES {
             let to = DVec3::new(x[lane], y[lane], z[lane]);
@@ -586,22 +602,30 @@ impl StepLanes {
             let (chance, least_cosine) = (chances[lane], least_cosines[lane]);
             let along = strengths[lane] * axis.dot(to);
             guided[lane] = share * turned[lane] * (1.0 - chance);
-            pull[lane] = along;
+            let growth = Growth::new(along, bends[lane], carry);
+            (pull[lane], bend[lane], small[lane]) = (growth.pull, growth.bend, growth.share);
             let is_inside = normal.dot(to) > least_cosine;
             let of_cone = 1.0 / (TAU * (1.0 - least_cosine));
             let of_cone = if is_inside { of_cone } else { 0.0 };
             escape[lane] = share * chance * of_cone / pdfs[lane];
-            let steering = if kinds[lane] == GUIDED { along } else { 0.0 };
-            let t = -ln_of_normal(1.0 - flights[lane]) / (sigma_t * (1.0 - steering));
+            let is_guided = kinds[lane] == GUIDED;
+            let steering = Growth {
+                pull: if is_guided { growth.pull } else { 0.0 },
+                bend: if is_guided { growth.bend } else { 0.0 },
+                share: if is_guided { growth.share } else { 1.0 },
+            };
+            let (rate, u) = steering.choose_rate(flights[lane]);
+            let t = -ln_of_normal(1.0 - u) / (sigma_t * rate);
             let beyond = t - fall;
-            let slowed = t - steering * beyond;
-            let t = if steering < 0.0 && beyond > 0.0 { slowed } else { t };
+            let slowed = t - steering.pull * beyond;
+            let t = if steering.falls() && beyond > 0.0 { slowed } else { t };
             let t = if kinds[lane] == ESCAPE { f64::INFINITY } else { t };
             lengths[lane] = t;
             (ex[lane], ey[lane], ez[lane]) =
                 (ox[lane] + to.x * t, oy[lane] + to.y * t, oz[lane] + to.z * t);
         }
-        (self.dirs, self.guided, self.escape, self.pull) = (*dirs, guided, escape, pull);
+        (self.dirs, self.guided, self.escape) = (*dirs, guided, escape);
+        (self.pull, self.bend, self.small) = (pull, bend, small);
         (self.lengths, self.ends) = (lengths, ends);
     }
 }

@@ -140,14 +140,36 @@ fn growth_solves_its_equation() {
 #[test]
 fn flights_are_normalised() {
     let sigma_t = 3.0;
-    let steep = Heading { escape: 0.3, ..Heading::given(0.9, 0.7) };
-    for heading in [Heading::given(0.9, 0.7), Heading::given(0.5, -0.8), steep] {
+    let given = |share: f64, pull: f64, bend: f64, carry: f64| {
+        Heading::given(share, Growth::new(pull, bend, carry))
+    };
+    let steep = Heading { escape: 0.3, ..given(0.9, 0.7, 0.0, 0.0) };
+    let straight = [given(0.9, 0.7, 0.0, 0.0), given(0.5, -0.8, 0.0, 0.0), steep];
+    let mut bent = Vec::new();
+    for (pull, bend) in [(0.0, 0.1), (0.0, 0.7), (0.3, 0.4), (-0.2, 0.25), (-0.3, 0.25), (0.8, 0.14)] {
+        for carry in [0.0, 3.3, 50.0, -0.4] {
+            let heading = given(0.9, pull, bend, carry);
+            assert_eq!(heading.growth.bend > 0.0, pull >= -bend);
+            bent.push(heading);
+        }
+    }
+    for heading in straight.into_iter().chain(bent) {
         let reach = 2.0;
         let density = |t: f64| sigma_t * exp(-sigma_t * t) * heading.flight_ratio(sigma_t, t);
         let ended = integrate(density, 0.0, reach, 1e-13).value;
         let passed = exp(-sigma_t * reach) * heading.passage_ratio(sigma_t, reach);
-        assert!((ended + passed - heading.turned()).abs() < 1e-12);
+        assert!((ended + passed - heading.turned()).abs() < 1e-12, "{heading:?}");
+        // The share of drawn flights that end before is that of the density.
+        let draws = 10_000;
+        let guided = |i: u32| {
+            heading.sample_distance(sigma_t, StepDraw::Guided, (f64::from(i) + 0.5) / f64::from(draws))
+        };
+        let of_guided = Heading { plain: 0.0, guided: 1.0, escape: 0.0, ..heading };
+        let beyond = exp(-sigma_t * reach) * of_guided.passage_ratio(sigma_t, reach);
+        let drawn =
+            f64::from((0..draws).filter(|&i| guided(i) > reach).count() as u32) / f64::from(draws);
+        assert!((drawn - beyond).abs() < 2.1 / f64::from(draws), "{heading:?}: {drawn} and {beyond}");
     }
     // A depth that no double holds has a finite ratio.
-    assert!(Heading::given(0.9, 0.9).passage_ratio(1e6, 1.0).is_finite());
+    assert!(given(0.9, 0.9, 0.0, 0.0).passage_ratio(1e6, 1.0).is_finite());
 }

@@ -3,7 +3,7 @@
 use super::ImportanceGrid;
 use crate::estimators::guidance::exit::fading;
 use crate::math::{DVec3, Vec3, Vectorized, renormalized, vectorized};
-use crate::optics::guided::{GuideLanes, LANES, Lanes, VectorLanes, vector};
+use crate::optics::guided::{GuideLanes, LANES, Lanes, VectorLanes, bend, strengths, vector};
 
 /// Vectors in single precision.
 type Vec3Lanes = [[f32; LANES]; 3];
@@ -68,7 +68,8 @@ impl ImportanceGrid {
     ) -> Lanes {
         guides.levels = found.levels;
         guides.least_cosines = [self.rule.least_cosine; LANES];
-        vectorized(Guides { sigma_t: self.rule.sigma_t, points, found, guides })
+        let (sigma_t, asymptotic) = (self.rule.sigma_t, self.asymptotic);
+        vectorized(Guides { sigma_t, asymptotic, points, found, guides })
     }
 }
 
@@ -80,6 +81,7 @@ fn set([x, y, z]: &mut Vec3Lanes, lane: usize, to: Vec3) {
 /// [`ImportanceGrid::at`] behind the look-up.
 struct Guides<'a> {
     sigma_t: f64,
+    asymptotic: f64,
     points: &'a VectorLanes,
     found: &'a FoundLanes,
     guides: &'a mut GuideLanes,
@@ -90,10 +92,11 @@ impl Vectorized for Guides<'_> {
 
     #[inline(always)]
     fn call(self) -> Lanes {
-        let Guides { sigma_t, points: [px, py, pz], found, guides } = self;
+        let Guides { sigma_t, asymptotic, points: [px, py, pz], found, guides } = self;
         let FoundLanes { axes: [ax, ay, az], normals: [nx, ny, nz], offsets, chances, .. } = found;
         let [mut axes, mut normals] = [[[0.0; LANES]; 3]; 2];
-        let [mut chance, mut phi] = [[0.0; LANES]; 2];
+        let [mut chance, mut phi, mut bends] = [[0.0; LANES]; 3];
+        let strengths = strengths(found.levels);
         let ([x, y, z], [u, v, w]) = (&mut axes, &mut normals);
         for lane in 0..LANES {
             let wide = |a: f32, b: f32, c: f32| {
@@ -102,12 +105,15 @@ impl Vectorized for Guides<'_> {
             let axis = wide(ax[lane], ay[lane], az[lane]);
             (x[lane], y[lane], z[lane]) = (axis.x, axis.y, axis.z);
             phi[lane] = f64::from(found.phi[lane]);
+            let bend = bend(asymptotic, strengths[lane]);
+            bends[lane] = if phi[lane] > 0.0 { bend } else { 0.0 };
             let normal = wide(nx[lane], ny[lane], nz[lane]);
             (u[lane], v[lane], w[lane]) = (normal.x, normal.y, normal.z);
             let depth = f64::from(offsets[lane]) - normal.dot(DVec3::new(px[lane], py[lane], pz[lane]));
             chance[lane] = f64::from(chances[lane]) * fading(depth, sigma_t);
         }
         (guides.axes, guides.normals, guides.chances) = (axes, normals, chance);
+        guides.bends = bends;
         phi
     }
 }
