@@ -418,7 +418,13 @@ const MOST_SKEW: f64 = 0.95;
 
 impl Growth {
     /// None.
-    pub const NONE: Growth = Growth { pull: 0.0, bend: 0.0, share: 1.0 };
+    pub const NONE: Growth = Growth::straight(0.0);
+
+    /// Without c.
+    #[inline(always)]
+    const fn straight(pull: f64) -> Growth {
+        Growth { pull, bend: 0.0, share: 1.0 }
+    }
 
     /// In a direction with this pull, from c and the distance l by which light is carried on.
     #[inline(always)]

@@ -15,6 +15,7 @@
 //! thinner than one) or phi has underflowed, there is no gradient, and the walk is plain. The solution need not be exact, because it only guides.
 
 mod lanes;
+mod relax;
 
 pub(super) use lanes::FoundLanes;
 
@@ -22,11 +23,12 @@ use super::diffusion::{Diffusion, growth_of_flights};
 use super::exit::{ExitPlane, ExitRule, REACH, unit};
 use super::incidence::{LetIn, TransmittedLight};
 use crate::geometry::{self, Ray, Shape, Side};
-use crate::math::{DVec3, Vec3, cos, exp, ln, ln_1p};
+use crate::math::{DVec3, Vec3, exp, ln, ln_1p};
 use crate::optics::boundary::Boundary;
 use crate::optics::guided::{Escape, Pull, StepGuide, bend};
 use crate::optics::medium::Medium;
 use crate::scene::Scene;
+use relax::relax;
 
 /// Importance in a body, one band.
 #[derive(Clone, Debug)]
@@ -100,6 +102,10 @@ fn unit_of_depth(medium: &Medium) -> f64 {
     let after_similarity = 1.0 / (1.0 - medium.albedo * medium.phase.g);
     (2.0 + after_similarity) / (3.0 * medium.sigma_t)
 }
+
+/// Flights are straight where c stays small: growth per mean free path below which, and depth in lengths 1 / kappa above which.
+const LEAST_BENT: f64 = 0.1;
+const MOST_BENT: f64 = 3.0;
 
 /// phi where it is largest, as nodes keep it.
 const LARGEST: f64 = 1e30;
@@ -175,6 +181,9 @@ impl Importance {
                     let rule = ExitRule::of(scene, band, &diffusion);
                     let mut grid = cells.grid(&solved, 1.0 / sigma_t, diffusion, rule);
                     cells.place_exits(&mut grid, &solved, &shores, band, diffusion);
+                    if grid.asymptotic < LEAST_BENT && diffusion.kappa * depth > MOST_BENT {
+                        grid.asymptotic = 0.0;
+                    }
                     Some(Importance::Grid(grid))
                 };
                 bands.map(|band| is_deep(band).then(|| grid(band)).flatten()).collect()
@@ -245,6 +254,22 @@ impl Importance {
                 gain(rule, exits[usize::from(at.z < -0.5 * thickness)].as_ref())
             }
             Importance::Grid(grid) => gain(&grid.rule, grid.exit(grid.node(at))),
+        }
+    }
+
+    /// Whether flights are bent anywhere.
+    pub(super) fn is_bent(&self) -> bool {
+        match self {
+            Importance::HalfSpace { .. } => false,
+            Importance::Slab { .. } => true,
+            Importance::Grid(grid) => grid.asymptotic > 0.0,
+        }
+    }
+
+    /// Takes flights along the gradient alone, where the others do not pay.
+    pub(super) fn straighten(&mut self) {
+        if let Importance::Grid(grid) = self {
+            grid.asymptotic = 0.0;
         }
     }
 
@@ -631,45 +656,6 @@ impl Cells {
         let (asymptotic, exits) = (diffusion.kappa * mean_free_path, Vec::new());
         ImportanceGrid { low, per_spacing, counts, asymptotic, nodes, rule, exits }
     }
-}
-
-/// Solves  diagonal phi = source + sum of phi over the faces that lead inside.
-fn relax(
-    near: &[[u32; 6]],
-    source: &[f64],
-    diagonal: &[f64],
-    start: f64,
-    counts: [usize; 3],
-) -> Vec<f64> {
-    /// Relative change of a sweep below which nothing is gained.
-    const ENOUGH: f64 = 1e-4;
-    // Young's factor, for Jacobi's spectral radius cos(pi / n) on the longest side, which absorption lowers.
-    let longest = counts.into_iter().max().unwrap_or(1) as f64;
-    let mean = diagonal.iter().sum::<f64>() / diagonal.len() as f64;
-    let radius = cos(std::f64::consts::PI / longest) * 6.0 / mean.max(6.0);
-    let factor = 2.0 / (1.0 + (1.0 - radius * radius).sqrt());
-    let mut phi = vec![start; source.len()];
-    for _ in 0..20 * longest as usize {
-        let mut change = 0f64;
-        for (number, faces) in near.iter().enumerate() {
-            let mut sum = source[number];
-            for &next in faces {
-                if next != NONE {
-                    sum += phi[next as usize];
-                }
-            }
-            let old = phi[number];
-            let relaxed = old + factor * (sum / diagonal[number] - old);
-            // Over-relaxation may overshoot what is positive.
-            let new = if relaxed > 0.0 { relaxed } else { sum / diagonal[number] };
-            phi[number] = new;
-            change = change.max((new - old).abs() / new.max(f64::MIN_POSITIVE));
-        }
-        if change < ENOUGH {
-            break;
-        }
-    }
-    phi
 }
 
 /// The least box that holds a finite body.

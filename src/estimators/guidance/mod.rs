@@ -188,9 +188,23 @@ impl Guidance {
                 _ => FEW_FACETS,
             };
             let Medium { phase, albedo, .. } = scene.medium[band];
-            Some(Guidance { share, turns: GuidedTurns::new(phase, albedo), facets, aim: aim? })
+            let turns = GuidedTurns::new(phase, albedo);
+            let mut guidance = Guidance { share, turns, facets, aim: aim? };
+            // Walks towards a light behind the body spend few steps where importance has no clear direction.
+            let is_lit = guidance.is_lit_at_entry(scene);
+            if let Aim::Solution(importance) = &mut guidance.aim
+                && !is_lit
+            {
+                importance.straighten();
+            }
+            Some(guidance)
         };
         aims.into_iter().enumerate().map(of_band).collect()
+    }
+
+    /// Whether flights take into account that importance grows to all sides.
+    pub(super) fn is_bent(&self) -> bool {
+        matches!(&self.aim, Aim::Solution(importance) if importance.is_bent())
     }
 
     /// By what walks have learned.

@@ -56,6 +56,8 @@ pub struct StepLanes {
     share: f64,
     /// Mean free paths by which light is carried on.
     carry: f64,
+    /// Whether any flight has a bend.
+    is_bent: bool,
     origins: VectorLanes,
     dirs: VectorLanes,
     /// [`Heading`], of which `plain` is the same everywhere.
@@ -100,11 +102,12 @@ pub struct DrawLanes {
 
 impl StepLanes {
     /// Without walks, in a medium of extinction `sigma_t` > 0 (1/mm) and with a share of guided steps.
-    pub fn new(sigma_t: f64, share: f64, turns: &GuidedTurns) -> StepLanes {
+    pub fn new(sigma_t: f64, share: f64, turns: &GuidedTurns, is_bent: bool) -> StepLanes {
         StepLanes {
             sigma_t,
             share,
             carry: turns.carry,
+            is_bent,
             origins: NONE,
             dirs: NONE,
             guided: ZERO,
@@ -390,18 +393,27 @@ impl Vectorized for Arrivals<'_> {
 
     #[inline(always)]
     fn call(self) {
+        if self.0.is_bent { self.arrive::<true>() } else { self.arrive::<false>() }
+    }
+}
+
+impl Arrivals<'_> {
+    #[inline(always)]
+    fn arrive<const BENT: bool>(self) {
         let Arrivals(steps) = self;
         // Copies: what a reference leads to might be among the results, which would keep the loop from vectors.
         let StepLanes { sigma_t, share, guided, pull, bend, small, lengths, mut ratios, .. } = *steps;
         let plain = 1.0 - share;
         for lane in 0..LANES {
             let (pull, bend) = (pull[lane], bend[lane]);
-            let growth = Growth { pull, bend, share: small[lane] };
+            let growth =
+                if BENT { Growth { pull, bend, share: small[lane] } } else { Growth::straight(pull) };
             let depth = sigma_t * lengths[lane];
             let is_far = growth.falls() && depth > FALL;
             let reach = if is_far { FALL } else { depth };
-            let up = exp_near(((pull + bend) * reach).min(MOST_EXPONENT));
-            let down = exp_near(((pull - bend) * reach).min(MOST_EXPONENT));
+            let exponential = |rate: f64| exp_near((rate * reach).min(MOST_EXPONENT));
+            let up = exponential(if BENT { pull + bend } else { pull });
+            let down = if BENT { exponential(pull - bend) } else { up };
             let flown = if is_far { up } else { growth.density(up, down) };
             ratios[lane] = (ratios[lane] * (plain + guided[lane] * flown)).min(f64::MAX);
         }
@@ -586,6 +598,23 @@ impl StepLanes {
         turned: &Lanes,
         pdfs: &Lanes,
     ) {
+        if self.is_bent {
+            self.begin_as::<true>(guides, draws, strengths, dirs, turned, pdfs);
+        } else {
+            self.begin_as::<false>(guides, draws, strengths, dirs, turned, pdfs);
+        }
+    }
+
+    #[inline(always)]
+    fn begin_as<const BENT: bool>(
+        &mut self,
+        guides: &GuideLanes,
+        draws: &DrawLanes,
+        strengths: &Lanes,
+        dirs: &VectorLanes,
+        turned: &Lanes,
+        pdfs: &Lanes,
+    ) {
         let StepLanes { sigma_t, share, carry, origins: [ox, oy, oz], .. } = *self;
         let GuideLanes {
             axes: [ax, ay, az], normals: [nx, ny, nz], least_cosines, chances, bends, ..
@@ -602,7 +631,8 @@ impl StepLanes {
             let (chance, least_cosine) = (chances[lane], least_cosines[lane]);
             let along = strengths[lane] * axis.dot(to);
             guided[lane] = share * turned[lane] * (1.0 - chance);
-            let growth = Growth::new(along, bends[lane], carry);
+            let growth =
+                if BENT { Growth::new(along, bends[lane], carry) } else { Growth::straight(along) };
             (pull[lane], bend[lane], small[lane]) = (growth.pull, growth.bend, growth.share);
             let is_inside = normal.dot(to) > least_cosine;
             let of_cone = 1.0 / (TAU * (1.0 - least_cosine));

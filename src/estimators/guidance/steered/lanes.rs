@@ -66,7 +66,12 @@ impl<'a> GuidedLanes<'a> {
             rule,
             is_empty: [true; LANES],
             weights: [[0.0; 2]; LANES],
-            steps: StepLanes::new(rule.medium.sigma_t, guidance.share, &guidance.turns),
+            steps: StepLanes::new(
+                rule.medium.sigma_t,
+                guidance.share,
+                &guidance.turns,
+                guidance.is_bent(),
+            ),
             guides: GuideLanes::none(),
             found: FoundLanes::none(),
             draws: DrawLanes::plain(),
