@@ -38,19 +38,20 @@
 //! that it should have, where the flight along an exponential loses the factor a at every step in the middle of a body. c is
 //! at most 0.7 (1 - s) and w at most 0.95, so that all rates and densities are positive.
 //!
-//! Near a boundary a guided step is an *escape* with probability c: its direction is uniform in the cone, of solid angle W,
+//! Near a boundary a guided step is an *escape* with probability k: its direction is uniform in the cone, of solid angle W,
 //! of directions that are refracted out, and it reaches the boundary; no distance is drawn. Relative to a plain step its
-//! density is e^{sigma_t t} c / (W HG).
+//! density is e^{sigma_t t} k / (W HG).
 //!
 //! Against the growth, where p < -c, importance does not fall forever: behind the middle of a body it grows again, and a plain
-//! flight across has a density that e^{p sigma_t t} puts near 0. So such a flight has no c, and beyond FALL mean free paths it goes on with the
-//! plain rate: t in e^{p sigma_t t} stops there, and 1 - p becomes 1.
+//! flight across has a density that e^{p sigma_t t} puts near 0. So such a flight has no c, and beyond FALL mean free paths it
+//! goes on with the plain rate: t in e^{p sigma_t t} stops there, and 1 - p becomes 1.
 //!
 //! The guide alone is not safe: where it is wrong, weights are unbounded. If a share q of steps is guided, turn and flight
 //! together, and both are weighted by the balance heuristic, the weight of a step is at most 1 / (1 - q) times that of a plain
-//! one. A step that ends in the medium, and one that reaches the boundary, have the ratios
-//!   (1 - q) + q (1 - c) (f / N) (1 - p) e^{p sigma_t t},
-//!   (1 - q) + q (1 - c) (f / N) e^{p sigma_t t} + q c / (W HG) e^{sigma_t t},
+//! one. A step that ends in the medium, and one that reaches the boundary, have the ratios (here
+//! without bends)
+//!   (1 - q) + q (1 - k) (f / N) (1 - p) e^{p sigma_t t},
+//!   (1 - q) + q (1 - k) (f / N) e^{p sigma_t t} + q k / (W HG) e^{sigma_t t},
 //! whose parts `Heading` keeps while the direction is known and the flight is not.
 
 mod lanes;
@@ -535,7 +536,8 @@ impl Heading {
     fn growths(&self, depth: f64) -> [f64; 2] {
         let Growth { pull, bend, .. } = self.growth;
         let depth = if self.growth.falls() { depth.min(FALL) } else { depth };
-        [growth(pull + bend, depth), growth(pull - bend, depth)]
+        let up = growth(pull + bend, depth);
+        [up, if bend > 0.0 { growth(pull - bend, depth) } else { up }]
     }
 }
 

@@ -25,7 +25,7 @@ use serde::Deserialize;
 
 use crate::geometry::Side;
 use crate::math::DVec3;
-use crate::optics::boundary::FEW_FACETS;
+use crate::optics::boundary::{Boundary, FEW_FACETS};
 use crate::optics::guided::{
     GuideLanes, GuidedTurns, LANES, Lanes, Pull, StepGuide, VectorLanes, diffuse_growth, vector,
 };
@@ -190,10 +190,12 @@ impl Guidance {
             let Medium { phase, albedo, .. } = scene.medium[band];
             let turns = GuidedTurns::new(phase, albedo);
             let mut guidance = Guidance { share, turns, facets, aim: aim? };
-            // Walks towards a light behind the body spend few steps where importance has no clear direction.
-            let is_lit = guidance.is_lit_at_entry(scene);
+            // Walks towards a light behind the body spend few steps where importance has no clear direction; in matched bodies
+            // walks are traced one by one, where a bend costs more.
+            let is_straight =
+                scene.boundary[band] == Boundary::Matched || !guidance.is_lit_at_entry(scene);
             if let Aim::Solution(importance) = &mut guidance.aim
-                && !is_lit
+                && is_straight
             {
                 importance.straighten();
             }
