@@ -2,8 +2,8 @@
 
 use crate::math::DVec3;
 
-/// What is left of a bound for analytic shapes when a part of it covers rounding.
-pub(super) const LESS: f64 = 1.0 - 1e-9;
+/// What is left of a distance when a part of it covers rounding.
+const LESS: f64 = 1.0 - 1e-9;
 
 /// Directions about an axis.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +39,7 @@ impl Cone {
     #[inline(always)]
     fn reach_plane(&self, height: f64, along: f64) -> f64 {
         let most = self.most_along(1.0, along);
-        if most > 0.0 { height / most } else { f64::INFINITY }
+        if most > 0.0 { height / most * LESS } else { f64::INFINITY }
     }
 
     #[inline(always)]
@@ -67,14 +67,14 @@ impl Cone {
     pub(super) fn through_sphere(&self, radius: f64, point: DVec3) -> f64 {
         let squared = point.length_squared();
         let most = self.most_along(squared, point.dot(self.axis));
-        (radius * radius - squared + most * most).max(0.0).sqrt() - most
+        ((radius * radius - squared + most * most).max(0.0).sqrt() - most) * LESS
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{Uniform, direction};
-    use super::super::{Ray, Shape, Side, procedural};
+    use super::super::testing::{Uniform, direction, one_of_each};
+    use super::super::{Ray, Side};
     use super::*;
     use crate::math::Frame;
 
@@ -83,15 +83,7 @@ mod tests {
     #[test]
     fn clearance_within_a_cone_bounds_distances() {
         let mut u = Uniform::named("clearance_within_a_cone_bounds_distances");
-        let mesh = procedural::icosphere(1.0, 2, false).expect("closed");
-        let shapes = [
-            Shape::HalfSpace,
-            Shape::Slab { thickness: 0.7 },
-            Shape::Box { half: DVec3::new(0.5, 0.8, 0.4) },
-            Shape::Sphere { radius: 1.0 },
-            Shape::Mesh(mesh),
-        ];
-        for shape in shapes {
+        for shape in one_of_each() {
             // A mesh would be megabytes of text.
             let name = if shape.is_convex() { format!("{shape:?}") } else { "mesh".into() };
             let (mut bounded, mut exact) = (0, 0);

@@ -4,7 +4,7 @@ use super::clearance::Clearance;
 use super::normals::Normals;
 use super::tree::{BoxTree, MeshFrame, Visit};
 use super::triangle::{self, Crossing, Sheared};
-use super::{BoundingSphere, Cone, FaceId, Hit, Ray, Side, cone, topology};
+use super::{BoundingSphere, Cone, FaceId, Hit, Ray, Side, topology};
 use crate::error::Result;
 use crate::math::DVec3;
 
@@ -238,7 +238,7 @@ impl Mesh {
         let place = frame.place(point);
         let along = match self.clearance.ball(place) {
             Some((center, radius)) if place.distance_squared(center) < radius * radius => {
-                cone.through_sphere(radius, place - center) * cone::LESS
+                cone.through_sphere(radius, place - center)
             }
             _ => 0.0,
         };

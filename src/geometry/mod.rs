@@ -257,14 +257,13 @@ impl Shape {
     /// no triangles inside.
     #[inline]
     pub fn clearance_within(&self, point: DVec3, cone: &Cone) -> f64 {
-        let bound = match *self {
+        match *self {
             Shape::HalfSpace => cone.through_half_space(point),
             Shape::Slab { thickness } => cone.through_slab(thickness, point),
             Shape::Box { half } => cone.through_cuboid(half, point),
             Shape::Sphere { radius } => cone.through_sphere(radius, point),
-            Shape::Mesh(ref mesh) => return mesh.clearance_within(point, cone),
-        };
-        bound * cone::LESS
+            Shape::Mesh(ref mesh) => mesh.clearance_within(point, cone),
+        }
     }
 
     /// Whether the body is known to be convex: then all its points see each other.

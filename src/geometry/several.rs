@@ -1,6 +1,5 @@
 //! Questions about several points or flights at once, which vector instructions answer together, with the bits of one by one.
 
-use super::cone::LESS;
 use super::{Cone, Shape, analytic};
 use crate::math::{DVec3, Vectorized, vectorized};
 
@@ -55,10 +54,10 @@ impl<const N: usize> Vectorized for ClearancesWithin<'_, N> {
         let ClearancesWithin { shape, points, cone } = self;
         let point = |i: usize| point_of(points, i);
         match *shape {
-            Shape::HalfSpace => each(|i| cone.through_half_space(point(i)) * LESS),
-            Shape::Slab { thickness } => each(|i| cone.through_slab(thickness, point(i)) * LESS),
-            Shape::Box { half } => each(|i| cone.through_cuboid(half, point(i)) * LESS),
-            Shape::Sphere { radius } => each(|i| cone.through_sphere(radius, point(i)) * LESS),
+            Shape::HalfSpace => each(|i| cone.through_half_space(point(i))),
+            Shape::Slab { thickness } => each(|i| cone.through_slab(thickness, point(i))),
+            Shape::Box { half } => each(|i| cone.through_cuboid(half, point(i))),
+            Shape::Sphere { radius } => each(|i| cone.through_sphere(radius, point(i))),
             Shape::Mesh(ref mesh) => each(|i| mesh.clearance_within(point(i), cone)),
         }
     }
@@ -99,24 +98,15 @@ impl Shape {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{Uniform, direction};
-    use super::super::{Cone, Ray, Shape, procedural};
+    use super::super::testing::{Uniform, direction, one_of_each};
+    use super::super::{Cone, Ray};
     use super::{Flights, point_of};
-    use crate::math::DVec3;
 
     #[test]
     fn several_are_as_one_by_one() {
         const N: usize = 8;
-        let mesh = procedural::bumpy_sphere(1.0, 4, 0.2, 5.0, true).expect("closed");
-        let shapes = [
-            Shape::HalfSpace,
-            Shape::Slab { thickness: 0.7 },
-            Shape::Box { half: DVec3::new(0.5, 0.8, 0.4) },
-            Shape::Sphere { radius: 1.0 },
-            Shape::Mesh(mesh),
-        ];
         let mut u = Uniform::named("several_are_as_one_by_one");
-        for shape in &shapes {
+        for shape in &one_of_each() {
             let [mut clear, mut inside] = [0; 2];
             for _ in 0..2000 {
                 let mut origins = [[0.0; N]; 3];

@@ -33,6 +33,19 @@ pub(crate) fn inward(normal: DVec3, u: &mut Uniform) -> DVec3 {
     super::audit::inward(normal, &mut || u.next())
 }
 
+/// One shape of every kind.
+pub(crate) fn one_of_each() -> [Shape; 5] {
+    let mesh = procedural::bumpy_sphere(1.0, 4, 0.2, 5.0, true).expect("closed");
+    let half = DVec3::new(0.5, 0.8, 0.4);
+    [
+        Shape::HalfSpace,
+        Shape::Slab { thickness: 0.7 },
+        Shape::Box { half },
+        Shape::Sphere { radius: 1.0 },
+        Shape::Mesh(mesh),
+    ]
+}
+
 /// The bodies of the watertightness tests, by name.
 pub(crate) fn bodies() -> Vec<(&'static str, Shape)> {
     let bodies = [

@@ -330,7 +330,8 @@ impl GuidedTurns {
     /// How importance grows along a direction.
     #[inline(always)]
     pub fn growth(&self, guide: &StepGuide, dir: DVec3) -> Growth {
-        Growth::new(guide.pull.along(dir), guide.bend, self.carry)
+        let (pull, bend) = (guide.pull.along(dir), guide.bend);
+        if bend > 0.0 { Growth::new(pull, bend, self.carry) } else { Growth::straight(pull) }
     }
 
     /// A direction after light that travelled along `from`. Isotropic: with L = ln((1 + s) / (1 - s)), the distribution
@@ -465,6 +466,29 @@ impl Growth {
         (if is_small { small } else { large }, part / of)
     }
 
+    /// e^{(p + c) depth} and e^{(p - c) depth}.
+    #[inline]
+    fn both(&self, depth: f64) -> [f64; 2] {
+        [self.pull + self.bend, self.pull - self.bend].map(|rate| growth(rate, depth))
+    }
+
+    /// Probability that a flight is longer than so many mean free paths, over that of a plain one.
+    #[inline]
+    fn passage(&self, depth: f64) -> f64 {
+        if self.bend > 0.0 {
+            let [up, down] = self.both(depth);
+            self.share * up + (1.0 - self.share) * down
+        } else {
+            self.straight_passage(depth)
+        }
+    }
+
+    /// The same without c.
+    #[inline]
+    fn straight_passage(&self, depth: f64) -> f64 {
+        growth(self.pull, if self.falls() { depth.min(FALL) } else { depth })
+    }
+
     /// Density of flights over that of plain ones, out of e^{(p + c) t} and e^{(p - c) t}.
     #[inline(always)]
     fn density(&self, up: f64, down: f64) -> f64 {
@@ -502,11 +526,12 @@ impl Heading {
         match drawn {
             StepDraw::Plain => sample_exponential(sigma_t, u),
             StepDraw::Guided => {
-                let (rate, u) = self.growth.choose_rate(u);
+                let Growth { pull, bend, .. } = self.growth;
+                let (rate, u) = if bend > 0.0 { self.growth.choose_rate(u) } else { (1.0 - pull, u) };
                 let t = sample_exponential(sigma_t * rate, u);
                 let beyond = t - FALL / sigma_t;
                 // With the plain rate the rest of the optical distance takes longer, by 1 - p.
-                if self.growth.falls() && beyond > 0.0 { t - self.growth.pull * beyond } else { t }
+                if self.growth.falls() && beyond > 0.0 { t - pull * beyond } else { t }
             }
             StepDraw::Escape => f64::INFINITY,
         }
@@ -515,10 +540,14 @@ impl Heading {
     /// Density of direction and flight over the plain one, for a flight that ends in the medium at distance `t`.
     #[inline]
     pub fn flight_ratio(&self, sigma_t: f64, t: f64) -> f64 {
-        let depth = sigma_t * t;
-        let [up, down] = self.growths(depth);
-        let is_far = self.growth.falls() && depth > FALL;
-        let flown = if is_far { up } else { self.growth.density(up, down) };
+        let (growth, depth) = (self.growth, sigma_t * t);
+        let flown = if growth.bend > 0.0 {
+            let [up, down] = growth.both(depth);
+            growth.density(up, down)
+        } else {
+            let rate = if growth.falls() && depth > FALL { 1.0 } else { 1.0 - growth.pull };
+            rate * growth.straight_passage(depth)
+        };
         self.plain + self.guided * flown
     }
 
@@ -526,18 +555,7 @@ impl Heading {
     #[inline]
     pub fn passage_ratio(&self, sigma_t: f64, t: f64) -> f64 {
         let escape = if self.escape > 0.0 { self.escape * growth(1.0, sigma_t * t) } else { 0.0 };
-        let [up, down] = self.growths(sigma_t * t);
-        let Growth { share, .. } = self.growth;
-        self.plain + self.guided * (share * up + (1.0 - share) * down) + escape
-    }
-
-    /// e^{(p + c) depth} and e^{(p - c) depth}.
-    #[inline]
-    fn growths(&self, depth: f64) -> [f64; 2] {
-        let Growth { pull, bend, .. } = self.growth;
-        let depth = if self.growth.falls() { depth.min(FALL) } else { depth };
-        let up = growth(pull + bend, depth);
-        [up, if bend > 0.0 { growth(pull - bend, depth) } else { up }]
+        self.plain + self.guided * self.growth.passage(sigma_t * t) + escape
     }
 }
 

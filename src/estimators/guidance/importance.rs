@@ -37,6 +37,7 @@ pub(super) enum Importance {
     HalfSpace { kappa: f64, pull: Pull, rule: ExitRule, exit: Option<ExitPlane> },
     /// a e^{kappa z} + b e^{-kappa (z + thickness)}; exits above and below.
     Slab {
+        is_bent: bool,
         kappa: f64,
         mean_free_path: f64,
         thickness: f64,
@@ -212,7 +213,7 @@ impl Importance {
             rule.exit(DVec3::ZERO, DVec3::Z, let_in[0].wide, a + b * e),
             rule.exit(-DVec3::Z * thickness, -DVec3::Z, let_in[1].wide, a * e + b),
         ];
-        Some(Importance::Slab { kappa, mean_free_path, thickness, a, b, rule, exits })
+        Some(Importance::Slab { is_bent: true, kappa, mean_free_path, thickness, a, b, rule, exits })
     }
 
     /// What guides a step from a point of the body, and phi; 0 where nothing is known.
@@ -226,7 +227,7 @@ impl Importance {
                 *guide = StepGuide { pull: *pull, escape: escape(rule, exit), bend: 0.0 };
                 exp(kappa * x.z)
             }
-            Importance::Slab { kappa, mean_free_path, thickness, a, b, rule, exits } => {
+            Importance::Slab { is_bent, kappa, mean_free_path, thickness, a, b, rule, exits } => {
                 let up = a * exp(kappa * x.z);
                 let down = b * exp(-kappa * (x.z + thickness));
                 let phi = up + down;
@@ -239,7 +240,8 @@ impl Importance {
                 }
                 let escape = escape(rule, &exits[usize::from(x.z < -0.5 * thickness)]);
                 let pull = Pull::new(DVec3::Z * growth);
-                *guide = StepGuide { pull, escape, bend: bend(asymptotic, pull.strength()) };
+                let bend = if *is_bent { bend(asymptotic, pull.strength()) } else { 0.0 };
+                *guide = StepGuide { pull, escape, bend };
                 phi
             }
             Importance::Grid(grid) => grid.at(x, guide),
@@ -263,15 +265,17 @@ impl Importance {
     pub(super) fn is_bent(&self) -> bool {
         match self {
             Importance::HalfSpace { .. } => false,
-            Importance::Slab { .. } => true,
+            Importance::Slab { is_bent, .. } => *is_bent,
             Importance::Grid(grid) => grid.asymptotic > 0.0,
         }
     }
 
     /// Takes flights along the gradient alone, where the others do not pay.
     pub(super) fn straighten(&mut self) {
-        if let Importance::Grid(grid) = self {
-            grid.asymptotic = 0.0;
+        match self {
+            Importance::HalfSpace { .. } => {}
+            Importance::Slab { is_bent, .. } => *is_bent = false,
+            Importance::Grid(grid) => grid.asymptotic = 0.0,
         }
     }
 
@@ -320,7 +324,8 @@ impl ImportanceGrid {
             Some(exit) => guide.escape = self.rule.escape(exit, x),
             None => guide.escape.chance = 0.0,
         }
-        guide.bend = if node.phi > 0.0 { bend(self.asymptotic, guide.pull.strength()) } else { 0.0 };
+        let is_bent = self.asymptotic > 0.0 && node.phi > 0.0;
+        guide.bend = if is_bent { bend(self.asymptotic, guide.pull.strength()) } else { 0.0 };
         f64::from(node.phi)
     }
 }
@@ -354,7 +359,8 @@ struct Border {
     at: DVec3,
     /// |cosine| between the normal and the axis.
     lean: f64,
-    distance: f64, // from the middle, along the axis
+    /// From the middle, along the axis.
+    distance: f64,
     /// What goes in there, per band.
     let_in: Vec<LetIn>,
 }

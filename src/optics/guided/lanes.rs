@@ -470,7 +470,7 @@ impl Vectorized for IsotropicDepartures<'_> {
             turned[lane] = 1.0 / ((1.0 - s * axis.dot(to)) * norm[lane]);
             pdfs[lane] = pdf;
         }
-        steps.begin(guides, draws, &strengths, &dirs, &turned, &pdfs);
+        steps.begin(guides, draws, &Turned { strengths, dirs, ratios: turned, pdfs });
     }
 }
 
@@ -581,40 +581,35 @@ impl Vectorized for ProductDepartures<'_> {
             turned[lane] = if strengths[lane] > 0.0 { factor / norm } else { 1.0 };
             pdfs[lane] = phase.pdf(from.dot(to));
         }
-        steps.begin(guides, draws, &strengths, dirs, &turned, &pdfs);
+        steps.begin(guides, draws, &Turned { strengths, dirs: *dirs, ratios: turned, pdfs });
     }
 }
 
+/// Directions of the next flights.
+struct Turned {
+    /// s of the pulls by which they were drawn.
+    strengths: Lanes,
+    dirs: VectorLanes,
+    /// Their densities over those of the phase function, and these.
+    ratios: Lanes,
+    pdfs: Lanes,
+}
+
 impl StepLanes {
-    /// Begins flights in these directions, of which the densities over those of the phase function are `turned`, and these are
-    /// `pdfs`.
+    /// Begins flights.
     #[inline(always)]
-    fn begin(
-        &mut self,
-        guides: &GuideLanes,
-        draws: &DrawLanes,
-        strengths: &Lanes,
-        dirs: &VectorLanes,
-        turned: &Lanes,
-        pdfs: &Lanes,
-    ) {
+    fn begin(&mut self, guides: &GuideLanes, draws: &DrawLanes, turned: &Turned) {
         if self.is_bent {
-            self.begin_as::<true>(guides, draws, strengths, dirs, turned, pdfs);
+            self.fly::<true>(guides, draws, turned);
         } else {
-            self.begin_as::<false>(guides, draws, strengths, dirs, turned, pdfs);
+            self.fly::<false>(guides, draws, turned);
         }
     }
 
+    /// The same for flights that all are straight, or are not: the compiler leaves out what these do not need.
     #[inline(always)]
-    fn begin_as<const BENT: bool>(
-        &mut self,
-        guides: &GuideLanes,
-        draws: &DrawLanes,
-        strengths: &Lanes,
-        dirs: &VectorLanes,
-        turned: &Lanes,
-        pdfs: &Lanes,
-    ) {
+    fn fly<const BENT: bool>(&mut self, guides: &GuideLanes, draws: &DrawLanes, turned: &Turned) {
+        let Turned { strengths, dirs, ratios: turned, pdfs } = turned;
         let StepLanes { sigma_t, share, carry, origins: [ox, oy, oz], .. } = *self;
         let GuideLanes {
             axes: [ax, ay, az], normals: [nx, ny, nz], least_cosines, chances, bends, ..
