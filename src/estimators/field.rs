@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::choice::{light_shares, shares_of_uneven};
-use super::guidance::{Guidance, WalkDraw};
+use super::guidance::{Finder, Guidance, WalkDraw};
 use super::roulette::Roulette;
 use crate::geometry::BoundingSphere;
 use crate::optics::boundary::Boundary;
@@ -39,8 +39,13 @@ impl Field {
     }
 
     /// The same with walks that are drawn in this way.
-    pub(super) fn with_walks(scene: Arc<Scene>, roulette: Roulette, draw: WalkDraw) -> Field {
-        Field { guidance: Guidance::of_bands(&scene, draw), ..Field::new(scene, roulette) }
+    pub(super) fn with_walks(
+        scene: Arc<Scene>,
+        roulette: Roulette,
+        draw: WalkDraw,
+        finder: Finder,
+    ) -> Field {
+        Field { guidance: Guidance::of_bands(&scene, draw, finder), ..Field::new(scene, roulette) }
     }
 
     /// The same without light sampling of lights that are even.
@@ -48,15 +53,14 @@ impl Field {
         Field { choice: shares_of_uneven(&self.scene), ..self }
     }
 
-    /// The same in bands where it pays: where walks are guided; at matched boundaries, where light samples at every vertex are
-    /// most of the noise whatever the walk; and at rough ones where the reduced albedo is [`FINDS_EVEN`] or more.
+    /// The same in bands where it pays: where walks are guided, and at matched boundaries, where light samples at every vertex
+    /// are most of the noise, and rough ones where the reduced albedo is [`FINDS_EVEN`] or more.
     pub(super) fn finding_even_lights_where_it_pays(self) -> Field {
         let uneven = shares_of_uneven(&self.scene);
         let finds = |band: usize| {
             self.guidance(band).is_some()
                 || match self.scene.boundary[band] {
-                    Boundary::Matched => true,
-                    Boundary::Rough { .. } => {
+                    Boundary::Matched | Boundary::Rough { .. } => {
                         let medium = &self.scene.medium[band];
                         medium.sigma_t > 0.0 && Reduced::of(medium).albedo >= FINDS_EVEN
                     }
@@ -66,16 +70,6 @@ impl Field {
         let choose = |(band, uneven)| if finds(band) { uneven } else { self.choice[band].clone() };
         let choice = uneven.into_iter().enumerate().map(choose).collect();
         Field { choice, ..self }
-    }
-
-    /// Per band, the share of even lights in all light, by strength.
-    pub(super) fn shares_of_even(&self) -> Vec<f64> {
-        let uneven = shares_of_uneven(&self.scene);
-        let of_band = |(all, uneven): (&Vec<f64>, Vec<f64>)| {
-            let even = |(share, uneven): (&f64, f64)| if uneven == 0.0 { *share } else { 0.0 };
-            all.iter().zip(uneven).map(even).sum()
-        };
-        self.choice.iter().zip(uneven).map(of_band).collect()
     }
 
     /// What guides the walks of a band; `None` where they are plain.

@@ -22,24 +22,20 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::guidance::WalkDraw;
+use super::choice::shares_of_even;
+use super::guidance::{EVEN_ENOUGH, Finder, WalkDraw};
 use super::illumination::unscattered_notes;
 use super::walk::trace_alone;
 use super::warm_up::TaughtField;
 use super::{Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::Result;
+use crate::geometry::Shape;
 use crate::optics::boundary::Boundary;
 use crate::optics::bssrdf::Reduced;
-use crate::optics::medium::Medium;
 use crate::sampling::stream::PassKey;
 use crate::scene::Scene;
 
 pub use super::Roulette;
-
-/// Share of even lights, by strength, from which on walks are guided whatever the other lights: boundaries and phase functions
-/// find an even light in any direction, so that what is left of the variance is that of the walk. Under parallel light and a
-/// sky that has a share of 0.27, guided walks are level with plain ones or better (experiments/compare/walks-small-lights.toml).
-const EVEN_ENOUGH: f64 = 0.25;
 
 /// Whether guided walks pay under lights that are sampled, where these illuminate the points at which walks enter, or do not.
 ///
@@ -47,9 +43,12 @@ const EVEN_ENOUGH: f64 = 0.25;
 /// causes most of the variance; guiding shortens walks, which pays where they absorb enough for that. Measured under parallel
 /// light and discs (experiments/compare/walks-small-lights.toml): at rough boundaries guiding gains up to a reduced albedo of
 /// 0.9, and loses at 0.95 (parallel light) and above; at smooth ones it gains at 0.95 and loses at 0.99. Matched bodies lose
-/// from the lit side; from behind they lose at an albedo of 0.9 and gain from 0.95 on.
-fn pays_under_small_lights(boundary: &Boundary, medium: &Medium, is_lit: bool) -> bool {
-    match boundary {
+/// from the lit side; from behind they lose at an albedo of 0.9 and gain from 0.95 on. Slabs lose from the lit side, 0.62 to 0.94 at
+/// smooth boundaries: light that is found at once is most of theirs.
+fn pays_under_small_lights(scene: &Scene, band: usize, is_lit: bool) -> bool {
+    let medium = &scene.medium[band];
+    match &scene.boundary[band] {
+        _ if is_lit && matches!(*scene.shape, Shape::Slab { .. } | Shape::HalfSpace) => false,
         Boundary::Matched => !is_lit && medium.albedo >= 0.94,
         Boundary::Rough { .. } => !is_lit || Reduced::of(medium).albedo <= 0.88,
         Boundary::Smooth { .. } => !is_lit || Reduced::of(medium).albedo <= 0.96,
@@ -101,13 +100,12 @@ impl PathTracer {
     /// A scene that it does not serve.
     pub fn with_options(scene: Arc<Scene>, options: &PathOptions) -> Result<PathTracer> {
         PathTracer::KIND.check(&scene)?;
-        let mut walks = TaughtField::new(scene.clone(), options.roulette, options.walk);
+        let mut walks = TaughtField::new(scene.clone(), options.roulette, options.walk, Finder::Walks);
         if options.walk.is_guided() && !options.walk.is_near_lights() {
-            let even = walks.shares_of_even();
+            let even = shares_of_even(&scene);
             walks = walks.plain_in(|band, guidance| {
-                let (boundary, medium) = (&scene.boundary[band], &scene.medium[band]);
                 even[band] < EVEN_ENOUGH
-                    && !pays_under_small_lights(boundary, medium, guidance.is_lit_at_entry(&scene))
+                    && !pays_under_small_lights(&scene, band, guidance.is_lit_at_entry(&scene))
             });
         }
         let walks = match options.sample_even_lights {

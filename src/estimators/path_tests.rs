@@ -339,7 +339,8 @@ fn flights_at_once_are_flights_one_by_one() {
         || Shape::HalfSpace,
     ];
     let shapes = shapes.into_iter().map(|shape| shape()).chain([mesh()]);
-    let by_solution = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0, near_lights: true };
+    let by_solution =
+        WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: Some(0.0), near_lights: true };
     let walks = [WalkDraw::Dwivedi { share: 0.5 }, by_solution];
     let [mut plain, mut guided, mut shared] = [0; 3];
     for shape in shapes {
@@ -354,7 +355,7 @@ fn flights_at_once_are_flights_one_by_one() {
                 plain += assert_the_same_one_by_one(&field, OneBand);
                 shared += assert_the_same_one_by_one(&field, SharedBands::new(&scene.medium, 0));
                 for walk in walks {
-                    let field = Field::with_walks(scene.clone(), roulette, walk);
+                    let field = Field::with_walks(scene.clone(), roulette, walk, Finder::Walks);
                     if let Some(guidance) = field.guidance(0) {
                         let bands = GuidedBand::new(guidance, &scene.medium[0]);
                         guided += assert_the_same_one_by_one(&field, bands);
@@ -414,7 +415,8 @@ fn paths_side_by_side_are_paths_one_by_one() {
         bumpy(false),
         bumpy(true),
     ];
-    let by_solution = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0, near_lights: true };
+    let by_solution =
+        WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: Some(0.0), near_lights: true };
     let learned = WalkDraw::Learned { share: 0.5, cells: 4, paths: 512 };
     let mut events = 0;
     for body in &bodies {
@@ -454,7 +456,7 @@ fn walks_are_guided_under_small_lights_where_it_pays() {
             let dense = medium(10.0 / (1.0 - albedo * g), albedo, g);
             let one = scene(shape.clone(), boundary, dense, lights, off_axis());
             let scene = Scene { boundary: vec![boundary; 2], medium: vec![dense; 2], ..one };
-            let walk = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0, near_lights };
+            let walk = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: Some(0.0), near_lights };
             let options = PathOptions { walk, ..PathOptions::default() };
             let tracer = PathTracer::with_options(Arc::new(scene), &options).expect("a scene");
             [0, 1].map(|band| tracer.walks.field().guidance(band).is_some())
@@ -481,5 +483,17 @@ fn walks_are_guided_under_small_lights_where_it_pays() {
         // By strength, radiance times solid angle, the sky has shares of 0.05 and 0.5.
         let lights = vec![lamp(side), cap(DVec3::Z, 2.0, [0.0005, 0.01])];
         assert_eq!(guided(rough, [0.95, 0.0], lights, false), [false, true]);
+    }
+    // From the lit side of a slab or a half-space they lose whatever is absorbed.
+    for shape in [Shape::Slab { thickness: 1.0 }, Shape::HalfSpace] {
+        for (toward, expected) in [(side, false), (behind, matches!(shape, Shape::Slab { .. }))] {
+            let dense = medium(10.0, 0.8, 0.0);
+            let scene = scene(shape.clone(), rough, dense, vec![lamp(toward)], off_axis());
+            let walk = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: None, near_lights: false };
+            let options = PathOptions { walk, ..PathOptions::default() };
+            let tracer = PathTracer::with_options(Arc::new(scene), &options).expect("a scene");
+            let found = tracer.walks.field().guidance(0).is_some();
+            assert_eq!(found, expected, "{shape:?} {toward}");
+        }
     }
 }

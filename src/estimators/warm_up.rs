@@ -16,7 +16,7 @@ use std::sync::{Arc, OnceLock};
 use super::bands::{ScorePlace, WalkBands};
 use super::field::{Field, Path};
 use super::guidance::{
-    FoundLight, Guidance, GuidedBand, LearnedPulls, LearningCells, Lessons, WalkDraw,
+    Finder, FoundLight, Guidance, GuidedBand, LearnedPulls, LearningCells, Lessons, WalkDraw,
 };
 use super::roulette::Roulette;
 use super::walk::{CameraWalk, Unrivalled};
@@ -37,8 +37,13 @@ pub(super) struct TaughtField {
 
 impl TaughtField {
     /// Prepares a scene for tracing.
-    pub(super) fn new(scene: Arc<Scene>, roulette: Roulette, draw: WalkDraw) -> TaughtField {
-        let untaught = Field::with_walks(scene, roulette, draw);
+    pub(super) fn new(
+        scene: Arc<Scene>,
+        roulette: Roulette,
+        draw: WalkDraw,
+        finder: Finder,
+    ) -> TaughtField {
+        let untaught = Field::with_walks(scene, roulette, draw, finder);
         TaughtField { untaught, lessons: draw.lessons(), taught: OnceLock::new() }
     }
 
@@ -55,11 +60,6 @@ impl TaughtField {
     /// The same with plain walks in some bands.
     pub(super) fn plain_in(self, is_plain: impl Fn(usize, &Guidance) -> bool) -> TaughtField {
         TaughtField { untaught: self.untaught.plain_in(is_plain), ..self }
-    }
-
-    /// Per band, the share of even lights in all light, by strength.
-    pub(super) fn shares_of_even(&self) -> Vec<f64> {
-        self.untaught.shares_of_even()
     }
 
     /// The scene.

@@ -30,7 +30,7 @@ const LEARNED: WalkDraw = WalkDraw::Learned { share: 0.9, cells: 8, paths: 8192 
 #[test]
 fn walks_learn_where_the_light_is() {
     let scene = scene(Shape::Sphere { radius: 1.0 }, Boundary::Smooth { eta: 1.3 }, 0.0, DVec3::Z, 2.0);
-    let taught = TaughtField::new(scene.clone(), Roulette::default(), LEARNED);
+    let taught = TaughtField::new(scene.clone(), Roulette::default(), LEARNED, Finder::Walks);
     let guidance = taught.field().guidance(0).expect("it scatters");
     let medium = &scene.medium[0];
     let mut stream =
@@ -75,7 +75,7 @@ fn training_rays_are_spread_over_the_image() {
 fn lessons_are_reproducible() {
     let scene = scene(Shape::Sphere { radius: 1.0 }, Boundary::Smooth { eta: 1.3 }, 0.5, DVec3::Z, 2.0);
     let heading = |_: u32| {
-        let taught = TaughtField::new(scene.clone(), Roulette::default(), LEARNED);
+        let taught = TaughtField::new(scene.clone(), Roulette::default(), LEARNED, Finder::Walks);
         let mut walk =
             GuidedBand::new(taught.field().guidance(1).expect("it scatters"), &scene.medium[1]);
         walk.turn(&scene.medium, DVec3::new(0.3, -0.4, 0.6), DVec3::X, DVec3::Z);

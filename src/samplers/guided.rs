@@ -10,7 +10,7 @@ use super::kind::{SamplerKind, sampler_kind};
 use super::sampler::{Contrast, Coordinate, Draw, Piece, Sampler};
 use crate::error::Error;
 use crate::math::{DVec3, Frame, cos, exp, exp_m1, ln_1p, sin, sin_cos_turns};
-use crate::optics::guided::{Escape, Growth, GuidedTurns, Heading, Pull, StepGuide};
+use crate::optics::guided::{Escape, GuidedTurns, Heading, Pull, StepGuide};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::Stream;
 
@@ -141,9 +141,11 @@ pub const STEP: SamplerKind = sampler_kind!(
             return Err(Error::input(format!("guided_step: `growth` and `bend` are {sum} together, and have to be below 1")));
         }
         let phase = HenyeyGreenstein { g: 0.0 };
-        let turns = GuidedTurns::new(phase, o.albedo);
+        let turns = GuidedTurns::new(phase, o.albedo)
+            .carrying(o.carry)
+            .in_body(o.depth.unwrap_or(f64::INFINITY));
         let guide = StepGuide { bend: o.bend, ..StepGuide::inner(Pull::new(AXIS * o.growth)) };
-        Ok(Step { turns, share: o.share, guide, carry: o.carry, sigma_t: o.sigma_t_per_mm })
+        Ok(Step { turns, share: o.share, guide, sigma_t: o.sigma_t_per_mm })
     }
 );
 
@@ -171,6 +173,10 @@ struct StepOptions {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     carry: f64,
+    /// Mean free paths from the middle of the body to its surface, by default so many that the depth does not matter: flights against
+    /// the growth have the plain rate beyond half of the depth less 1, and beyond 4.
+    #[schemars(range(min = 0.0))]
+    depth: Option<f64>,
 }
 
 /// Angle to the growth over pi, all azimuths together (2 pi^2 sin(theta) per unit), and the distance.
@@ -178,14 +184,12 @@ struct Step {
     turns: GuidedTurns,
     share: f64,
     guide: StepGuide,
-    carry: f64,
     sigma_t: f64,
 }
 
 impl Step {
     fn heading(&self, dir: DVec3) -> Heading {
-        let growth = Growth::new(self.guide.pull.along(dir), self.guide.bend, self.carry);
-        Heading { growth, ..self.turns.heading(self.share, &self.guide, DVec3::X, dir) }
+        self.turns.heading(self.share, &self.guide, DVec3::X, dir)
     }
 
     fn distances(&self) -> Unbounded {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::latlong::LatLong;
 use crate::math::{DVec3, Frame};
+use crate::optics::boundary::Boundary;
 use crate::sampling::warp::{pdf_cap, square_to_cap};
 
 /// A light, with its radiance (or irradiance) per band.
@@ -139,6 +140,11 @@ impl Light {
     /// True for parallel light.
     pub fn is_directional(&self) -> bool {
         matches!(self.emission, Emission::Directional { .. })
+    }
+
+    /// Whether no walk that leaves the body through this boundary finds the light: parallel light behind a smooth boundary.
+    pub fn is_hidden_by(&self, boundary: &Boundary) -> bool {
+        self.is_directional() && matches!(boundary, Boundary::Smooth { .. })
     }
 }
 

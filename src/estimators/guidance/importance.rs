@@ -22,6 +22,7 @@ pub(super) use lanes::FoundLanes;
 use super::diffusion::{Diffusion, growth_of_flights};
 use super::exit::{ExitPlane, ExitRule, REACH, unit};
 use super::incidence::{LetIn, TransmittedLight};
+use super::rule::GuideRule;
 use crate::geometry::{self, Ray, Shape, Side};
 use crate::math::{DVec3, Vec3, exp, ln, ln_1p};
 use crate::optics::boundary::Boundary;
@@ -59,6 +60,8 @@ pub(super) struct ImportanceGrid {
     counts: [usize; 3],
     /// Growth per mean free path; 0 where flights are straight.
     asymptotic: f64,
+    /// Mean free paths.
+    depth: f64,
     nodes: Vec<Node>,
     rule: ExitRule,
     exits: Vec<ExitPlane>,
@@ -95,16 +98,6 @@ const UNKNOWN: Node = Node { axis: Vec3::Z, phi: 0.0, level_and_exit: NO_EXIT <<
 /// 0.999, where they gained, in spheres of 6.3 mean free paths after similarity, with g from 0 to 0.95.
 const LEAST_CONTRAST: f64 = 0.016;
 
-/// What the depth of a body is measured in, mm: two thirds of a mean free path and one third of that after similarity. How
-/// often a walk scatters before it leaves grows with the latter; what its first and last flight cost does not. Under a sky and
-/// behind a smooth boundary guided walks have 0.98 to 1.2 of the efficiency of plain ones in spheres of 3.8 to 4.84 of these
-/// units, for g from -0.5 to 0.95 (experiments/compare/walks-depth.toml; 1.15 to 1.35 on another machine); the default of
-/// `least_depth` is just above.
-fn unit_of_depth(medium: &Medium) -> f64 {
-    let after_similarity = 1.0 / (1.0 - medium.albedo * medium.phase.g);
-    (2.0 + after_similarity) / (3.0 * medium.sigma_t)
-}
-
 /// Flights stay straight in bodies that are deep (in lengths 1 / kappa) and where importance grows slowly (per mean free path): there
 /// bends gained 5 % of the variance (kappa = 0.08, depth 4) or nothing, for 4 to 7 % of the time.
 const STRAIGHT_DEPTH: f64 = 3.0;
@@ -115,14 +108,10 @@ const LARGEST: f64 = 1e30;
 
 impl Importance {
     /// Per band, with `nodes` cells along the longest side of a finite body; `None` where nothing scatters, no light comes
-    /// in, or a finite body or a slab is nowhere as deep as `least_depth` times [`unit_of_depth`].
-    pub(super) fn of_bands(scene: &Scene, nodes: u32, least_depth: f64) -> Vec<Option<Importance>> {
-        let incidence = TransmittedLight::new(scene);
+    /// in, or walks are plain by the rule.
+    pub(super) fn of_bands(scene: &Scene, nodes: u32, rule: GuideRule) -> Vec<Option<Importance>> {
+        let incidence = TransmittedLight::new(scene, rule.finder);
         let bands = 0..scene.bands();
-        let scatters = |band: usize| scene.medium[band].sigma_t > 0.0 && scene.medium[band].albedo > 0.0;
-        let is_deep = |depth: f64, band: usize| {
-            scatters(band) && depth >= least_depth * unit_of_depth(&scene.medium[band])
-        };
         let let_in = |origin: DVec3, dir: DVec3| {
             let hit = scene.shape.intersect(&Ray { origin, dir }, Side::Inside, None, f64::INFINITY)?;
             Some(incidence.irradiance(&hit))
@@ -142,11 +131,12 @@ impl Importance {
                     let exit = rule.exit(DVec3::ZERO, DVec3::Z, wide, phi);
                     Importance::HalfSpace { kappa, pull, rule, exit }
                 };
-                bands.map(|band| scatters(band).then(|| half_space(band))).collect()
+                let is_deep = rule.guides(scene, f64::INFINITY);
+                bands.map(|band| is_deep[band].then(|| half_space(band))).collect()
             }
             Shape::Slab { thickness } => {
-                let is_deep = |band: usize| is_deep(0.5 * thickness, band);
-                if !bands.clone().any(is_deep) {
+                let is_deep = rule.guides(scene, 0.5 * thickness);
+                if !is_deep.contains(&true) {
                     return vec![None; scene.bands()];
                 }
                 let middle = DVec3::new(0.0, 0.0, -0.5 * thickness);
@@ -156,15 +146,15 @@ impl Importance {
                 };
                 let slab =
                     |band: usize| Importance::slab(scene, band, thickness, [top[band], bottom[band]]);
-                bands.map(|band| is_deep(band).then(|| slab(band)).flatten()).collect()
+                bands.map(|band| is_deep[band].then(|| slab(band)).flatten()).collect()
             }
             _ => {
                 let Some(cells) = Cells::of(&scene.shape, nodes) else {
                     return vec![None; scene.bands()];
                 };
                 let depth = cells.depth(&scene.shape);
-                let is_deep = |band: usize| is_deep(depth, band);
-                if !bands.clone().any(is_deep) {
+                let is_deep = rule.guides(scene, depth);
+                if !is_deep.contains(&true) {
                     return vec![None; scene.bands()];
                 }
                 let borders = cells.borders(&scene.shape, &incidence);
@@ -184,12 +174,13 @@ impl Importance {
                     let rule = ExitRule::of(scene, band, &diffusion);
                     let mut grid = cells.grid(&solved, 1.0 / sigma_t, diffusion, rule);
                     cells.place_exits(&mut grid, &solved, &shores, band, diffusion);
+                    grid.depth = depth * sigma_t;
                     if grid.asymptotic < STRAIGHT_GROWTH && diffusion.kappa * depth > STRAIGHT_DEPTH {
                         grid.asymptotic = 0.0;
                     }
                     Some(Importance::Grid(grid))
                 };
-                bands.map(|band| is_deep(band).then(|| grid(band)).flatten()).collect()
+                bands.map(|band| is_deep[band].then(|| grid(band)).flatten()).collect()
             }
         }
     }
@@ -276,6 +267,15 @@ impl Importance {
             Importance::HalfSpace { .. } => {}
             Importance::Slab { is_bent, .. } => *is_bent = false,
             Importance::Grid(grid) => grid.asymptotic = 0.0,
+        }
+    }
+
+    /// Mean free paths to the surface, at most.
+    pub(super) fn depth(&self) -> f64 {
+        match self {
+            Importance::HalfSpace { .. } => f64::INFINITY,
+            Importance::Slab { thickness, mean_free_path, .. } => 0.5 * thickness / mean_free_path,
+            Importance::Grid(grid) => grid.depth,
         }
     }
 
@@ -593,7 +593,8 @@ impl Cells {
         if supplied <= 0.0 {
             return None;
         }
-        let lost: f64 = diagonal.iter().sum();
+        let couplings = near.iter().flatten().filter(|next| **next != NONE).count() as f64;
+        let lost: f64 = diagonal.iter().sum::<f64>() - couplings;
         let phi = relax(&near, &source, &diagonal, supplied / lost, self.lattice.counts);
         let cut = |(phi, borders): (&f64, &[Option<Border>; 6])| {
             [0, 1, 2, 3, 4, 5].map(|face: usize| {
@@ -662,7 +663,7 @@ impl Cells {
         let Lattice { first, spacing, counts } = self.lattice;
         let (low, per_spacing) = (first - 0.5 * spacing, 1.0 / spacing);
         let (asymptotic, exits) = (diffusion.kappa * mean_free_path, Vec::new());
-        ImportanceGrid { low, per_spacing, counts, asymptotic, nodes, rule, exits }
+        ImportanceGrid { low, per_spacing, counts, asymptotic, depth: 0.0, nodes, rule, exits }
     }
 }
 
@@ -682,7 +683,7 @@ pub(super) fn extent(shape: &Shape) -> Option<[DVec3; 2]> {
 impl Importance {
     /// What goes in near each cell of a finite body, first band: as borders know it, and computed anew.
     pub(super) fn let_in_near_cells(scene: &Scene, nodes: u32, reach: f64) -> [Vec<Option<LetIn>>; 2] {
-        let incidence = TransmittedLight::new(scene);
+        let incidence = TransmittedLight::new(scene, GuideRule::EVERYWHERE.finder);
         let cells = Cells::of(&scene.shape, nodes).expect("cells");
         let borders = cells.borders(&scene.shape, &incidence);
         let none: Vec<_> = borders.iter().map(|_| [const { None }; 6]).collect();

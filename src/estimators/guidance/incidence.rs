@@ -1,5 +1,6 @@
 //! Light that enters through the boundary, which is the light that a walk finds that leaves the body there.
 
+use super::rule::Finder;
 use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, GOLDEN};
 use crate::optics::boundary::Boundary;
@@ -33,11 +34,12 @@ pub(super) struct LetIn {
 pub(super) struct TransmittedLight<'a> {
     scene: &'a Scene,
     directions: Vec<LightDirection>,
+    finder: Finder,
 }
 
 impl TransmittedLight<'_> {
     /// Directions are drawn from the lights as they are in the first band.
-    pub(super) fn new(scene: &Scene) -> TransmittedLight<'_> {
+    pub(super) fn new(scene: &Scene, finder: Finder) -> TransmittedLight<'_> {
         let mut directions = Vec::new();
         for (light, source) in scene.lights.iter().enumerate() {
             let count = if source.is_directional() { 1 } else { DIRECTIONS };
@@ -53,13 +55,13 @@ impl TransmittedLight<'_> {
                 directions.push(LightDirection { light, wi: sample.wi, solid_angle });
             }
         }
-        TransmittedLight { scene, directions }
+        TransmittedLight { scene, directions, finder }
     }
 
     /// Irradiance that goes in at a point of the boundary, per band: the integral of radiance times cosine times smooth
     /// transmittance, the body's own shadow included. A quadrature: it guides walks and is no part of a result.
     pub(super) fn irradiance(&self, at: &Hit) -> Vec<LetIn> {
-        let TransmittedLight { scene, directions } = self;
+        let TransmittedLight { scene, directions, finder } = self;
         let mut sums = vec![LetIn::default(); scene.bands()];
         for LightDirection { light, wi, solid_angle } in directions {
             let cosine = wi.dot(at.normal);
@@ -67,15 +69,19 @@ impl TransmittedLight<'_> {
             if cosine <= 0.0 || *solid_angle == 0.0 || scene.shape.occluded(&shadow, Some(at.face)) {
                 continue;
             }
+            let light = &scene.lights[*light];
             for (band, sum) in sums.iter_mut().enumerate() {
+                if *finder == Finder::Walks && light.is_hidden_by(&scene.boundary[band]) {
+                    continue;
+                }
                 let through = match scene.boundary[band] {
                     Boundary::Matched => 1.0,
                     boundary => 1.0 - fresnel(cosine, boundary.eta()).reflectance,
                 };
-                let radiance = scene.lights[*light].sampled_radiance(band, *wi);
+                let radiance = light.sampled_radiance(band, *wi);
                 let let_in = radiance * solid_angle * cosine * through;
                 sum.all += let_in;
-                if scene.lights[*light].concentration() <= WIDE {
+                if light.concentration() <= WIDE {
                     sum.wide += let_in;
                 }
             }

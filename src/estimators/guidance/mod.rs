@@ -17,6 +17,7 @@ mod exit;
 mod importance;
 mod incidence;
 mod learned;
+mod rule;
 mod slice;
 mod steered;
 
@@ -35,6 +36,7 @@ use crate::scene::Scene;
 use importance::{FoundLanes, Importance};
 
 pub(super) use learned::{FoundLight, LearnedPulls, LearningCells, Lessons};
+pub(super) use rule::{EVEN_ENOUGH, Finder, GuideRule};
 pub use slice::GuideSlice;
 pub(super) use steered::{GuidedBand, GuidedLanes, LaneVertex};
 
@@ -66,10 +68,12 @@ pub enum WalkDraw {
         /// guide to pay.
         ///
         /// In units of (2 + 1 / (1 - albedo g)) / (3 sigma_t), two thirds of a mean free path and one third of that after
-        /// similarity.
-        #[serde(default = "least_depth")]
+        /// similarity. By default 3, and 0 for a finite body behind a rough boundary if its reduced albedo,
+        /// a (1 - g) / (1 - a g), is 0.75 or more and even lights have a quarter of the strength of all. By default walks stay plain in
+        /// matched bodies of reduced albedo below 0.45, too.
+        #[serde(default)]
         #[schemars(range(min = 0.0))]
-        least_depth: f64,
+        least_depth: Option<f64>,
         /// Whether walks are guided even where other techniques find the light whatever the walk, so that a plain step costs
         /// less: in `snee` where subdivision connects to every light and the lights illuminate the points at which walks
         /// enter; in `path` where small lights do and little is absorbed, and in matched bodies under small lights.
@@ -120,10 +124,6 @@ fn most() -> f64 {
     0.95
 }
 
-fn least_depth() -> f64 {
-    4.85
-}
-
 fn nodes() -> u32 {
     24
 }
@@ -167,7 +167,7 @@ pub(super) struct Guidance {
 
 impl Guidance {
     /// Per band; `None` where walks are plain: nothing scatters, no light enters, or nothing has been learned yet.
-    pub(super) fn of_bands(scene: &Scene, draw: WalkDraw) -> Vec<Option<Guidance>> {
+    pub(super) fn of_bands(scene: &Scene, draw: WalkDraw, finder: Finder) -> Vec<Option<Guidance>> {
         let (share, aims) = match draw {
             WalkDraw::Plain {} | WalkDraw::Learned { .. } => return vec![None; scene.bands()],
             WalkDraw::Dwivedi { share } => {
@@ -178,7 +178,7 @@ impl Guidance {
                 (share, scene.medium.iter().map(aim).collect::<Vec<_>>())
             }
             WalkDraw::Guided { share, nodes, least_depth, .. } => {
-                let solutions = Importance::of_bands(scene, nodes, least_depth);
+                let solutions = Importance::of_bands(scene, nodes, GuideRule { least_depth, finder });
                 (share, solutions.into_iter().map(|solved| solved.map(Aim::Solution)).collect())
             }
         };
@@ -188,7 +188,12 @@ impl Guidance {
                 _ => FEW_FACETS,
             };
             let Medium { phase, albedo, .. } = scene.medium[band];
-            let turns = GuidedTurns::new(phase, albedo);
+            let turns = match &aim {
+                Some(Aim::Solution(importance)) => {
+                    GuidedTurns::new(phase, albedo).in_body(importance.depth())
+                }
+                _ => GuidedTurns::new(phase, albedo),
+            };
             let mut guidance = Guidance { share, turns, facets, aim: aim? };
             // Walks towards a light behind the body spend few steps where importance has no clear direction; in matched bodies
             // walks are traced one by one, where a bend costs more.

@@ -38,6 +38,13 @@ fn sky() -> Light {
     cap(DVec3::Z, 2.0, 1.0)
 }
 
+fn directional(toward: DVec3, irradiance: f64) -> Light {
+    Light {
+        name: "sun".into(),
+        emission: Emission::Directional { toward, irradiance: vec![irradiance] },
+    }
+}
+
 fn scene(shape: Shape, boundary: Boundary, medium: Medium, lights: Vec<Light>) -> Arc<Scene> {
     let ray = Ray { origin: DVec3::new(0.3, -0.4, 3.0), dir: -DVec3::Z };
     let sensor = Sensor::Probe(Probe { ray, paths: 64 });
@@ -57,7 +64,7 @@ fn first<T>(bands: Vec<Option<T>>) -> Option<T> {
 }
 
 fn solution(scene: &Scene, nodes: u32) -> Importance {
-    first(Importance::of_bands(scene, nodes, 0.0)).expect("light comes in")
+    first(Importance::of_bands(scene, nodes, GuideRule::EVERYWHERE)).expect("light comes in")
 }
 
 /// Per mean free path.
@@ -133,7 +140,9 @@ fn ways_out() {
         let scene = scene(SPHERE, boundary, medium(10.0, albedo, 0.0), vec![light]);
         let dir = DVec3::new(0.48, -0.6, 0.64);
         // Without a guide walks are plain and do not escape.
-        let Some(importance) = first(Importance::of_bands(&scene, 24, 0.0)) else { return 0.0 };
+        let Some(importance) = first(Importance::of_bands(&scene, 24, GuideRule::EVERYWHERE)) else {
+            return 0.0;
+        };
         let escape = guide(&importance, dir * r).escape;
         // A plane is that of another point of its cell, whose diagonal is 0.14.
         assert!(escape.chance == 0.0 || escape.normal.dot(dir) > 0.98, "{:?}", escape.normal);
@@ -252,20 +261,22 @@ fn flights_have_the_mean_of_the_solution() {
     assert_eq!(growth_of_flights(0.5, 0.3), 0.3);
 }
 
+const FROM_5: GuideRule = GuideRule { least_depth: Some(5.0), finder: Finder::Connections };
+
 /// No light, no field; in parts thinner than a cell there is none, either, and walks are plain.
 #[test]
 fn where_nothing_guides() {
     let dark = scene(SPHERE, SMOOTH, medium(5.0, 0.9, 0.0), vec![cap(DVec3::Z, 1e-3, 0.0)]);
-    assert!(first(Importance::of_bands(&dark, 16, 0.0)).is_none());
+    assert!(first(Importance::of_bands(&dark, 16, GuideRule::EVERYWHERE)).is_none());
     let still = scene(SPHERE, SMOOTH, medium(5.0, 0.0, 0.0), vec![sky()]);
-    let guided = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: 0.0, near_lights: true };
-    assert!(first(Guidance::of_bands(&still, guided)).is_none());
+    let guided = WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: Some(0.0), near_lights: true };
+    assert!(first(Guidance::of_bands(&still, guided, Finder::Walks)).is_none());
     for shape in [SPHERE, Shape::Slab { thickness: 2.0 }] {
         // By similarity a mean free path becomes 1 / (1 - 0.9 * 0.8) of it; a third of this counts.
         for (g, unit) in [(0.0, 1.0), (0.8, (2.0 + 1.0 / 0.28) / 3.0)] {
             for (depth, is_deep) in [(4.99, false), (5.01, true)] {
                 let scene = scene(shape.clone(), SMOOTH, medium(depth * unit, 0.9, g), vec![sky()]);
-                let found = first(Importance::of_bands(&scene, 16, 5.0));
+                let found = first(Importance::of_bands(&scene, 16, FROM_5));
                 assert_eq!(found.is_some(), is_deep, "{shape:?} {g} {depth}");
             }
         }
@@ -275,7 +286,7 @@ fn where_nothing_guides() {
     for (radius, is_deep) in [(0.06, false), (0.15, false), (0.2, false), (0.4, true)] {
         let scene = scene(ring(radius), SMOOTH, medium(20.0, 0.9, 0.0), vec![sky()]);
         for nodes in [4, 5, 8, 11, 16, 24] {
-            let found = first(Importance::of_bands(&scene, nodes, 5.0));
+            let found = first(Importance::of_bands(&scene, nodes, FROM_5));
             assert!(found.is_none() || is_deep, "{radius} {nodes}");
             assert!(found.is_some() || !is_deep || nodes < 8, "{radius} {nodes}");
         }
@@ -285,21 +296,82 @@ fn where_nothing_guides() {
         first(Importance::of_bands(
             &scene(SPHERE, boundary, medium(8.0, albedo, 0.0), vec![light]),
             16,
-            5.0,
+            FROM_5,
         ))
     };
     assert!(bright(0.9999, SMOOTH, sky()).is_none() && bright(0.999, SMOOTH, sky()).is_some());
     assert!(bright(0.9999, ROUGH, sky()).is_some());
+    // So it is in a body that is small beside the distance over which its boundary lets light in, where a relaxation that begins
+    // far from the solution does not reach it.
+    for (sigma_t, albedo) in [(0.25, 0.99), (0.1, 0.99), (0.1, 0.9999)] {
+        let small = scene(SPHERE, SMOOTH, medium(sigma_t, albedo, 0.0), vec![sky()]);
+        assert!(first(Importance::of_bands(&small, 16, GuideRule::EVERYWHERE)).is_none());
+    }
     assert!(bright(0.9999, SMOOTH, cap(DVec3::Z, 0.5, 1.0)).is_some());
     let ring = Shape::Mesh(procedural::torus(1.0, 0.01, [24, 6], false).expect("closed"));
     let thin = scene(ring, SMOOTH, medium(5.0, 0.9, 0.0), vec![sky()]);
-    let importance = first(Importance::of_bands(&thin, 4, 0.0));
+    let importance = first(Importance::of_bands(&thin, 4, GuideRule::EVERYWHERE));
     let is_lost = |i: u32| {
         let (s, c) = crate::math::sin_cos_turns(f64::from(i) / 100.0);
         let mut guide = StepGuide::NONE;
         importance.as_ref().is_none_or(|field| field.at(DVec3::new(c, s, 0.0), &mut guide) == 0.0)
     };
     assert!((0..100).any(is_lost), "a grid of 4 nodes resolves a ring of 0.01");
+}
+
+/// The rule of every kind of body, boundary, light, albedo and depth that it tells apart.
+#[test]
+fn where_walks_are_guided_by_default() {
+    let slab = Shape::Slab { thickness: 2.0 };
+    let small: fn() -> Light = || cap(DVec3::Z, 0.01, 50.0);
+    let sky: fn() -> Light = sky;
+    // Depth is in the rule's units.
+    for (shape, boundary, light, albedo, depth, expected) in [
+        (SPHERE, SMOOTH, sky, 0.5, 2.9, false),
+        (SPHERE, SMOOTH, sky, 0.5, 3.2, true),
+        (SPHERE, SMOOTH, sky, 0.95, 2.9, false),
+        (SPHERE, ROUGH, sky, 0.7, 2.9, false),
+        (SPHERE, ROUGH, sky, 0.8, 0.1, true),
+        (SPHERE, ROUGH, small, 0.8, 2.9, false),
+        (SPHERE, ROUGH, small, 0.8, 3.2, true),
+        (slab.clone(), ROUGH, sky, 0.8, 2.9, false),
+        (slab.clone(), ROUGH, sky, 0.8, 3.1, true),
+        (SPHERE, Boundary::Matched, sky, 0.4, 9.0, false),
+        (SPHERE, Boundary::Matched, sky, 0.5, 3.2, true),
+        (SPHERE, Boundary::Matched, sky, 0.8, 2.9, false),
+        (Shape::HalfSpace, Boundary::Matched, sky, 0.4, 1.0, false),
+        (Shape::HalfSpace, SMOOTH, sky, 0.4, 1.0, true),
+    ] {
+        for (finder, g) in [(Finder::Walks, 0.0), (Finder::Connections, 0.0), (Finder::Walks, 0.8)] {
+            // The albedo is that after similarity.
+            let all = albedo / (1.0 - g * (1.0 - albedo));
+            let unit = (2.0 + 1.0 / (1.0 - all * g)) / 3.0;
+            let scene = scene(shape.clone(), boundary, medium(depth * unit, all, g), vec![light()]);
+            let rule = GuideRule { least_depth: None, finder };
+            let found = first(Importance::of_bands(&scene, 24, rule));
+            assert_eq!(found.is_some(), expected, "{boundary:?} {albedo} {depth} {finder:?} {g}");
+        }
+    }
+}
+
+/// Walks through a smooth boundary do not find parallel light, and are not guided to it; connections do.
+#[test]
+fn walks_are_guided_to_what_they_find() {
+    let sun = || directional(DVec3::new(0.8, 0.0, 0.6), 5.0);
+    let at = |boundary, lights, finder| {
+        let scene = scene(SPHERE, boundary, medium(10.0, 0.9, 0.0), lights);
+        let rule = GuideRule { least_depth: None, finder };
+        let importance = first(Importance::of_bands(&scene, 16, rule))?;
+        Some([DVec3::X, DVec3::NEG_X].map(|x| importance.at(0.5 * x, &mut StepGuide::NONE.clone())))
+    };
+    let of_the_sky = at(SMOOTH, vec![sky()], Finder::Walks);
+    assert!(of_the_sky.is_some());
+    assert_eq!(at(SMOOTH, vec![sky(), sun()], Finder::Walks), of_the_sky);
+    assert!(at(SMOOTH, vec![sun()], Finder::Walks).is_none());
+    for (boundary, finder) in [(SMOOTH, Finder::Connections), (ROUGH, Finder::Walks)] {
+        let [lit, dark] = at(boundary, vec![sky(), sun()], finder).expect("light comes in");
+        assert!(lit > 1.3 * dark, "{boundary:?} {finder:?}: {lit} {dark}");
+    }
 }
 
 /// What would be right in a half-space, with a way out wherever z > -1.
@@ -388,25 +460,26 @@ fn wrong_guides_do_not_bias() {
     assert!(judged > 150, "{judged}");
 }
 
-/// Where walks are guided, in matched bodies, and at a rough boundary of a bright body light sampling leaves a sky to the walks and
-/// keeps a small light; plain walks through the rough boundary of a dark body sample both.
+/// Where walks are guided, and in bright matched and rough bodies, light sampling leaves a sky to the walks and keeps a small light;
+/// plain walks in dark ones sample both.
 #[test]
 fn even_lights_are_sampled_where_it_pays() {
     let lights = || vec![sky(), cap(DVec3::new(0.5, 0.1, 0.7), 0.01, 50.0)];
     let mesh = Shape::Mesh(procedural::icosphere(1.0, 2, false).expect("closed"));
-    let draw = WalkDraw::Guided { share: 0.95, nodes: 16, least_depth: 5.0, near_lights: true };
+    let draw = WalkDraw::Guided { share: 0.95, nodes: 16, least_depth: Some(5.0), near_lights: true };
     for shape in [SPHERE, mesh] {
         // An albedo of 0.9 is 0.64 after similarity, one of 0.95 is 0.79.
         for (boundary, albedo, depth, is_sampled) in [
             (ROUGH, 0.9, 2.0, true),
             (ROUGH, 0.95, 2.0, false),
             (ROUGH, 0.9, 10.0, false),
-            (Boundary::Matched, 0.9, 2.0, false),
+            (Boundary::Matched, 0.9, 2.0, true),
+            (Boundary::Matched, 0.95, 2.0, false),
         ] {
             // Depth is that after similarity.
             let medium = medium(depth / (1.0 - albedo * 0.8), albedo, 0.8);
             let scene = scene(shape.clone(), boundary, medium, lights());
-            let field = Field::with_walks(scene, Roulette::default(), draw);
+            let field = Field::with_walks(scene, Roulette::default(), draw, Finder::Walks);
             let field = field.finding_even_lights_where_it_pays();
             assert_eq!(field.guidance(0).is_some(), depth > 5.0);
             let [sky, small] = [0, 1].map(|light| field.choice[0][light]);

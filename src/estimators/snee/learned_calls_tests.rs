@@ -127,7 +127,7 @@ fn predicted_second_moments_are_those_of_runs() {
 #[test]
 fn means_stay() {
     let media = [medium(4.0, 0.95, 0.0), medium(2.0, 0.8, 0.7)];
-    let guided = WalkDraw::Guided { share: 0.8, nodes: 8, least_depth: 0.0, near_lights: true };
+    let guided = WalkDraw::Guided { share: 0.8, nodes: 8, least_depth: Some(0.0), near_lights: true };
     let plain = WalkDraw::Plain {};
     let lamps = [Lamp::WideDisc, Lamp::Sky];
     let mut count = 0;

@@ -35,7 +35,7 @@ use std::sync::{Arc, OnceLock};
 use super::bands::{MAX_SHARED, OneBand, SharedBands, WalkBands};
 use super::connection::{self, Conic};
 use super::field::Path;
-use super::guidance::GuidedBand;
+use super::guidance::{Finder, GuidedBand};
 use super::illumination::unscattered_notes;
 use super::walk::{CameraWalk, Unrivalled, may_fly_side_by_side, trace_alone, trace_side_by_side};
 use super::warm_up::TaughtField;
@@ -174,7 +174,8 @@ impl Snee {
         };
         let count = if options.share_bands { 1 } else { scene.bands() };
         let setups: Vec<BandSetup> = (0..count).map(setup).collect();
-        let mut walks = TaughtField::new(scene.clone(), options.roulette, options.walk);
+        let mut walks =
+            TaughtField::new(scene.clone(), options.roulette, options.walk, Finder::Connections);
         if !options.walk.is_near_lights() {
             walks = walks.plain_in(|band, guidance| {
                 setups[band].connects_to_all(&scene.lights, band) && guidance.is_lit_at_entry(&scene)

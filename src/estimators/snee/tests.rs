@@ -175,7 +175,7 @@ fn bodies_without_scattering_are_the_walks() {
 /// are the same, to the last bit. The sun is behind the body, a disc is not; under one light alone, walks pass most vertices.
 #[test]
 fn connections_side_by_side_are_connections_one_by_one() {
-    let walk = WalkDraw::Guided { share: 0.9, nodes: 12, least_depth: 0.0, near_lights: true };
+    let walk = WalkDraw::Guided { share: 0.9, nodes: 12, least_depth: Some(0.0), near_lights: true };
     let called = SneeOptions { walk, ..guided() };
     let connected = SneeOptions { connection: Some(ConnectionCall::default()), ..called.clone() };
     let mesh = procedural::bumpy_sphere(1.0, 3, 0.2, 5.0, true).expect("closed");

@@ -96,7 +96,7 @@ mod tests {
         scene.sensor = Sensor::Vertex(Vertex { ray, paths: 1 });
         let scene = Arc::new(scene);
         let plain = SneePreset::Guided.options();
-        let walk = WalkDraw::Guided { share: 0.9, nodes: 8, least_depth: 0.0, near_lights: true };
+        let walk = WalkDraw::Guided { share: 0.9, nodes: 8, least_depth: Some(0.0), near_lights: true };
         let guided = SneeOptions { walk, ..plain.clone() };
         let refusal = TwoBounce::new(Arc::clone(&scene), guided).expect_err("refused").to_string();
         assert!(refusal.contains("no walk to guide"), "{refusal}");

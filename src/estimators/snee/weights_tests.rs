@@ -382,7 +382,8 @@ fn weights_with_guided_walks_sum_to_one() {
         let media = [medium(4.0, 0.9, g)];
         for boundary in [ROUGH, SMOOTH] {
             let [.., (_, options), _] = presets();
-            let walk = WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: 0.0, near_lights: true };
+            let walk =
+                WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: Some(0.0), near_lights: true };
             let guided = SneeOptions { walk, ..options.clone() };
             for lamp in [Lamp::WideDisc, Lamp::Sun] {
                 let reference = one_end(&shape, boundary, &media, lamp, &options);
@@ -433,7 +434,7 @@ fn weights_at_a_matched_boundary_sum_to_one() {
     let lamps = [Lamp::Disc, Lamp::WideDisc, Lamp::Sky];
     let media = [medium(2.0, 0.9, 0.3)];
     let scene = body(&sphere(), Boundary::Matched, &media, &lamps);
-    let walk = WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: 0.0, near_lights: true };
+    let walk = WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: Some(0.0), near_lights: true };
     let options = SneeOptions { walk, ..SneePreset::Guided.options() };
     let snee = Snee::new(scene.clone(), options).expect("a scene for it");
     assert!(snee.setups[0].guides.is_empty());

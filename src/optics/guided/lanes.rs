@@ -10,8 +10,8 @@
 use std::f64::consts::TAU;
 
 use super::{
-    Escape, FALL, Growth, GuidedTurns, Heading, IsotropicLevel, LEVELS, Level, Levels, MOST,
-    MOST_EXPONENT, Polynomial, Pull, StepGuide, TERMS, side,
+    Escape, Growth, GuidedTurns, Heading, IsotropicLevel, LEVELS, Level, Levels, MOST, MOST_EXPONENT,
+    Polynomial, Pull, StepGuide, TERMS, side,
 };
 use crate::math::{
     DVec3, Frame, Vectorized, exp_near, ln_of_normal, renormalized, sin_cos_turns, vectorized,
@@ -56,6 +56,7 @@ pub struct StepLanes {
     share: f64,
     /// Mean free paths by which light is carried on.
     carry: f64,
+    fall: f64,
     /// Whether any flight has a bend.
     is_bent: bool,
     origins: VectorLanes,
@@ -107,6 +108,7 @@ impl StepLanes {
             sigma_t,
             share,
             carry: turns.carry,
+            fall: turns.fall,
             is_bent,
             origins: NONE,
             dirs: NONE,
@@ -132,7 +134,7 @@ impl StepLanes {
     ) {
         set_vector(&mut self.origins, lane, origin);
         set_vector(&mut self.dirs, lane, dir);
-        let Heading { guided, escape, growth: Growth { pull, bend, share }, .. } = *heading;
+        let Heading { guided, escape, growth: Growth { pull, bend, share, .. }, .. } = *heading;
         (self.guided[lane], self.escape[lane]) = (guided, escape);
         (self.pull[lane], self.bend[lane], self.small[lane]) = (pull, bend, share);
         self.ratios[lane] = ratio;
@@ -145,7 +147,12 @@ impl StepLanes {
     /// Density of a walk up to the begin of its flight, over that of a plain one; and the step that it has begun.
     pub fn state(&self, lane: usize) -> (f64, Heading) {
         let (guided, escape) = (self.guided[lane], self.escape[lane]);
-        let growth = Growth { pull: self.pull[lane], bend: self.bend[lane], share: self.small[lane] };
+        let growth = Growth {
+            pull: self.pull[lane],
+            bend: self.bend[lane],
+            share: self.small[lane],
+            fall: self.fall,
+        };
         (self.ratios[lane], Heading { plain: 1.0 - self.share, guided, escape, growth })
     }
 
@@ -402,15 +409,19 @@ impl Arrivals<'_> {
     fn arrive<const BENT: bool>(self) {
         let Arrivals(steps) = self;
         // Copies: what a reference leads to might be among the results, which would keep the loop from vectors.
-        let StepLanes { sigma_t, share, guided, pull, bend, small, lengths, mut ratios, .. } = *steps;
+        let StepLanes { sigma_t, share, fall, guided, pull, bend, small, lengths, mut ratios, .. } =
+            *steps;
         let plain = 1.0 - share;
         for lane in 0..LANES {
             let (pull, bend) = (pull[lane], bend[lane]);
-            let growth =
-                if BENT { Growth { pull, bend, share: small[lane] } } else { Growth::straight(pull) };
+            let growth = if BENT {
+                Growth { pull, bend, share: small[lane], fall }
+            } else {
+                Growth::straight(pull, fall)
+            };
             let depth = sigma_t * lengths[lane];
-            let is_far = growth.falls() && depth > FALL;
-            let reach = if is_far { FALL } else { depth };
+            let is_far = growth.falls() && depth > fall;
+            let reach = if is_far { fall } else { depth };
             let exponential = |rate: f64| exp_near((rate * reach).min(MOST_EXPONENT));
             let up = exponential(if BENT { pull + bend } else { pull });
             let down = if BENT { exponential(pull - bend) } else { up };
@@ -610,12 +621,12 @@ impl StepLanes {
     #[inline(always)]
     fn fly<const BENT: bool>(&mut self, guides: &GuideLanes, draws: &DrawLanes, turned: &Turned) {
         let Turned { strengths, dirs, ratios: turned, pdfs } = turned;
-        let StepLanes { sigma_t, share, carry, origins: [ox, oy, oz], .. } = *self;
+        let StepLanes { sigma_t, share, carry, fall: most, origins: [ox, oy, oz], .. } = *self;
         let GuideLanes {
             axes: [ax, ay, az], normals: [nx, ny, nz], least_cosines, chances, bends, ..
         } = guides;
         let DrawLanes { kinds, flights, .. } = draws;
-        let ([x, y, z], fall) = (dirs, FALL / sigma_t);
+        let ([x, y, z], fall) = (dirs, most / sigma_t);
         let ([mut guided, mut escape, mut lengths], mut ends) = ([ZERO; 3], NONE);
         let [mut pull, mut bend, mut small] = [ZERO; 3];
         let [ex, ey, ez] = &mut ends;
@@ -626,8 +637,11 @@ impl StepLanes {
             let (chance, least_cosine) = (chances[lane], least_cosines[lane]);
             let along = strengths[lane] * axis.dot(to);
             guided[lane] = share * turned[lane] * (1.0 - chance);
-            let growth =
-                if BENT { Growth::new(along, bends[lane], carry) } else { Growth::straight(along) };
+            let growth = if BENT {
+                Growth::new(along, bends[lane], carry, most)
+            } else {
+                Growth::straight(along, most)
+            };
             (pull[lane], bend[lane], small[lane]) = (growth.pull, growth.bend, growth.share);
             let is_inside = normal.dot(to) > least_cosine;
             let of_cone = 1.0 / (TAU * (1.0 - least_cosine));
@@ -638,6 +652,7 @@ impl StepLanes {
                 pull: if is_guided { growth.pull } else { 0.0 },
                 bend: if is_guided { growth.bend } else { 0.0 },
                 share: if is_guided { growth.share } else { 1.0 },
+                fall: most,
             };
             let (rate, u) = steering.choose_rate(flights[lane]);
             let t = -ln_of_normal(1.0 - u) / (sigma_t * rate);

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::*;
-use crate::math::{cos, integrate, sin};
+use crate::math::{cos, integrate, ln, sin};
 use crate::sampling::stream::{Purpose, StreamKey};
 
 const GS: [f64; 6] = [-0.5, 0.0, 0.3, 0.8, 0.95, 0.999];
@@ -141,10 +141,16 @@ fn growth_solves_its_equation() {
 fn flights_are_normalised() {
     let sigma_t = 3.0;
     let given = |share: f64, pull: f64, bend: f64, carry: f64| {
-        Heading::given(share, Growth::new(pull, bend, carry))
+        Heading::given(share, Growth::new(pull, bend, carry, MOST_FALL))
     };
     let steep = Heading { escape: 0.3, ..given(0.9, 0.7, 0.0, 0.0) };
-    let straight = [given(0.9, 0.7, 0.0, 0.0), given(0.5, -0.8, 0.0, 0.0), steep];
+    let shallow = |depth| Heading::given(0.9, Growth::straight(-0.8, fall(depth)));
+    let straight =
+        [given(0.9, 0.7, 0.0, 0.0), given(0.5, -0.8, 0.0, 0.0), steep, shallow(3.0), shallow(1.0)];
+    assert_eq!(
+        [shallow(1.0), shallow(3.0), shallow(20.0)].map(|h| h.growth.fall),
+        [0.0, 0.5, MOST_FALL]
+    );
     let mut bent = Vec::new();
     for (pull, bend) in [(0.0, 0.1), (0.0, 0.7), (0.3, 0.4), (-0.2, 0.25), (-0.3, 0.25), (0.8, 0.14)] {
         for carry in [0.0, 3.3, 50.0, -0.4] {
