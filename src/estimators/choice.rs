@@ -37,19 +37,15 @@ pub(super) fn shares_of_uneven(scene: &Scene) -> Vec<Vec<f64>> {
     (0..scene.bands()).map(of_band).collect()
 }
 
-/// Per band, the share of even lights in all light that leaves a body's boundary can find, by strength.
-pub(super) fn shares_of_even(scene: &Scene) -> Vec<f64> {
-    let of_band = |band: usize| {
-        let found = scene.lights.iter().filter(|light| !light.is_hidden_by(&scene.boundary[band]));
-        let (mut even, mut all) = (0.0, 0.0);
-        for light in found {
-            let strength = light.strength(band);
-            all += strength;
-            even += if light.whole_concentration(band) < EVEN { strength } else { 0.0 };
-        }
-        if all > 0.0 { even / all } else { 0.0 }
-    };
-    (0..scene.bands()).map(of_band).collect()
+/// The share of even lights in all light that walks find that leave the body, by strength.
+pub(super) fn share_of_even(scene: &Scene, band: usize) -> f64 {
+    let (mut even, mut all) = (0.0, 0.0);
+    for light in scene.lights.iter().filter(|light| !light.is_hidden_by(&scene.boundary[band])) {
+        let strength = light.strength(band);
+        all += strength;
+        even += if light.whole_concentration(band) < EVEN { strength } else { 0.0 };
+    }
+    if all > 0.0 { even / all } else { 0.0 }
 }
 
 /// Each of the strengths over their sum; all 0 where they are.

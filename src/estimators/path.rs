@@ -22,38 +22,17 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::choice::shares_of_even;
-use super::guidance::{EVEN_ENOUGH, Finder, WalkDraw};
+use super::guidance::{Finder, WalkDraw, pays_beside_light_samples};
 use super::illumination::unscattered_notes;
 use super::walk::trace_alone;
 use super::warm_up::TaughtField;
 use super::{Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::Result;
-use crate::geometry::Shape;
 use crate::optics::boundary::Boundary;
-use crate::optics::bssrdf::Reduced;
 use crate::sampling::stream::PassKey;
 use crate::scene::Scene;
 
 pub use super::Roulette;
-
-/// Whether guided walks pay under lights that are sampled, where these illuminate the points at which walks enter, or do not.
-///
-/// Light samples find such lights from any vertex at the boundary (in a matched body, from any vertex), and the choice among them
-/// causes most of the variance; guiding shortens walks, which pays where they absorb enough for that. Measured under parallel
-/// light and discs (experiments/compare/walks-small-lights.toml): at rough boundaries guiding gains up to a reduced albedo of
-/// 0.9, and loses at 0.95 (parallel light) and above; at smooth ones it gains at 0.95 and loses at 0.99. Matched bodies lose
-/// from the lit side; from behind they lose at an albedo of 0.9 and gain from 0.95 on. Slabs lose from the lit side, 0.62 to 0.94 at
-/// smooth boundaries: light that is found at once is most of theirs.
-fn pays_under_small_lights(scene: &Scene, band: usize, is_lit: bool) -> bool {
-    let medium = &scene.medium[band];
-    match &scene.boundary[band] {
-        _ if is_lit && matches!(*scene.shape, Shape::Slab { .. } | Shape::HalfSpace) => false,
-        Boundary::Matched => !is_lit && medium.albedo >= 0.94,
-        Boundary::Rough { .. } => !is_lit || Reduced::of(medium).albedo <= 0.88,
-        Boundary::Smooth { .. } => !is_lit || Reduced::of(medium).albedo <= 0.96,
-    }
-}
 
 /// Options of `path`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
@@ -102,10 +81,8 @@ impl PathTracer {
         PathTracer::KIND.check(&scene)?;
         let mut walks = TaughtField::new(scene.clone(), options.roulette, options.walk, Finder::Walks);
         if options.walk.is_guided() && !options.walk.is_near_lights() {
-            let even = shares_of_even(&scene);
             walks = walks.plain_in(|band, guidance| {
-                even[band] < EVEN_ENOUGH
-                    && !pays_under_small_lights(&scene, band, guidance.is_lit_at_entry(&scene))
+                !pays_beside_light_samples(&scene, band, guidance.is_lit_at_entry(&scene))
             });
         }
         let walks = match options.sample_even_lights {

@@ -60,7 +60,7 @@ pub(super) struct ImportanceGrid {
     counts: [usize; 3],
     /// Growth per mean free path; 0 where flights are straight.
     asymptotic: f64,
-    /// Mean free paths.
+    /// Of the deepest point below the surface, mean free paths.
     depth: f64,
     nodes: Vec<Node>,
     rule: ExitRule,
@@ -131,12 +131,12 @@ impl Importance {
                     let exit = rule.exit(DVec3::ZERO, DVec3::Z, wide, phi);
                     Importance::HalfSpace { kappa, pull, rule, exit }
                 };
-                let is_deep = rule.guides(scene, f64::INFINITY);
-                bands.map(|band| is_deep[band].then(|| half_space(band))).collect()
+                let guided = rule.guides(scene, f64::INFINITY);
+                bands.map(|band| guided[band].then(|| half_space(band))).collect()
             }
             Shape::Slab { thickness } => {
-                let is_deep = rule.guides(scene, 0.5 * thickness);
-                if !is_deep.contains(&true) {
+                let guided = rule.guides(scene, 0.5 * thickness);
+                if !guided.contains(&true) {
                     return vec![None; scene.bands()];
                 }
                 let middle = DVec3::new(0.0, 0.0, -0.5 * thickness);
@@ -146,15 +146,15 @@ impl Importance {
                 };
                 let slab =
                     |band: usize| Importance::slab(scene, band, thickness, [top[band], bottom[band]]);
-                bands.map(|band| is_deep[band].then(|| slab(band)).flatten()).collect()
+                bands.map(|band| guided[band].then(|| slab(band)).flatten()).collect()
             }
             _ => {
                 let Some(cells) = Cells::of(&scene.shape, nodes) else {
                     return vec![None; scene.bands()];
                 };
                 let depth = cells.depth(&scene.shape);
-                let is_deep = rule.guides(scene, depth);
-                if !is_deep.contains(&true) {
+                let guided = rule.guides(scene, depth);
+                if !guided.contains(&true) {
                     return vec![None; scene.bands()];
                 }
                 let borders = cells.borders(&scene.shape, &incidence);
@@ -172,15 +172,14 @@ impl Importance {
                         return None;
                     }
                     let rule = ExitRule::of(scene, band, &diffusion);
-                    let mut grid = cells.grid(&solved, 1.0 / sigma_t, diffusion, rule);
+                    let mut grid = cells.grid(&solved, 1.0 / sigma_t, depth * sigma_t, diffusion, rule);
                     cells.place_exits(&mut grid, &solved, &shores, band, diffusion);
-                    grid.depth = depth * sigma_t;
                     if grid.asymptotic < STRAIGHT_GROWTH && diffusion.kappa * depth > STRAIGHT_DEPTH {
                         grid.asymptotic = 0.0;
                     }
                     Some(Importance::Grid(grid))
                 };
-                bands.map(|band| is_deep[band].then(|| grid(band)).flatten()).collect()
+                bands.map(|band| guided[band].then(|| grid(band)).flatten()).collect()
             }
         }
     }
@@ -270,7 +269,7 @@ impl Importance {
         }
     }
 
-    /// Mean free paths to the surface, at most.
+    /// Of the deepest point below the surface, mean free paths.
     pub(super) fn depth(&self) -> f64 {
         match self {
             Importance::HalfSpace { .. } => f64::INFINITY,
@@ -562,7 +561,8 @@ impl Cells {
         }
     }
 
-    /// By successive over-relaxation in a fixed order, from the body's mean.
+    /// By successive over-relaxation in a fixed order, from the constant that loses what is supplied: a body that exchanges little
+    /// through its boundary would need very many sweeps to correct another mean.
     fn solve(
         &self,
         borders: &[[Option<Border>; 6]],
@@ -576,6 +576,7 @@ impl Cells {
         let mut near = vec![[NONE; 6]; count];
         let mut source = vec![0.0; count];
         let mut diagonal = vec![loss; count];
+        let mut lost = loss * count as f64;
         for (number, &index) in self.inside.iter().enumerate() {
             for (face, border) in borders[number].iter().enumerate() {
                 near[number][face] = self.across(index, FACES[face]);
@@ -585,6 +586,7 @@ impl Cells {
                 if let Some(Border { lean, distance, let_in, .. }) = border {
                     let conductance = lean * h / (diffusion.reach + lean * distance);
                     diagonal[number] += conductance;
+                    lost += conductance;
                     source[number] += conductance * diffusion.boundary.kept * let_in[band].all;
                 }
             }
@@ -593,8 +595,6 @@ impl Cells {
         if supplied <= 0.0 {
             return None;
         }
-        let couplings = near.iter().flatten().filter(|next| **next != NONE).count() as f64;
-        let lost: f64 = diagonal.iter().sum::<f64>() - couplings;
         let phi = relax(&near, &source, &diagonal, supplied / lost, self.lattice.counts);
         let cut = |(phi, borders): (&f64, &[Option<Border>; 6])| {
             [0, 1, 2, 3, 4, 5].map(|face: usize| {
@@ -613,6 +613,7 @@ impl Cells {
         &self,
         solved: &Solved,
         mean_free_path: f64,
+        depth: f64,
         diffusion: Diffusion,
         rule: ExitRule,
     ) -> ImportanceGrid {
@@ -663,7 +664,7 @@ impl Cells {
         let Lattice { first, spacing, counts } = self.lattice;
         let (low, per_spacing) = (first - 0.5 * spacing, 1.0 / spacing);
         let (asymptotic, exits) = (diffusion.kappa * mean_free_path, Vec::new());
-        ImportanceGrid { low, per_spacing, counts, asymptotic, depth: 0.0, nodes, rule, exits }
+        ImportanceGrid { low, per_spacing, counts, asymptotic, depth, nodes, rule, exits }
     }
 }
 

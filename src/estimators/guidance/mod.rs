@@ -36,7 +36,7 @@ use crate::scene::Scene;
 use importance::{FoundLanes, Importance};
 
 pub(super) use learned::{FoundLight, LearnedPulls, LearningCells, Lessons};
-pub(super) use rule::{EVEN_ENOUGH, Finder, GuideRule};
+pub(super) use rule::{Finder, GuideRule, pays_beside_light_samples};
 pub use slice::GuideSlice;
 pub(super) use steered::{GuidedBand, GuidedLanes, LaneVertex};
 
@@ -188,12 +188,11 @@ impl Guidance {
                 _ => FEW_FACETS,
             };
             let Medium { phase, albedo, .. } = scene.medium[band];
-            let turns = match &aim {
-                Some(Aim::Solution(importance)) => {
-                    GuidedTurns::new(phase, albedo).in_body(importance.depth())
-                }
-                _ => GuidedTurns::new(phase, albedo),
+            let depth = match &aim {
+                Some(Aim::Solution(importance)) => importance.depth(),
+                _ => f64::INFINITY,
             };
+            let turns = GuidedTurns::new(phase, albedo).in_body(depth);
             let mut guidance = Guidance { share, turns, facets, aim: aim? };
             // Walks towards a light behind the body spend few steps where importance has no clear direction; in matched bodies
             // walks are traced one by one, where a bend costs more.

@@ -323,6 +323,7 @@ fn where_nothing_guides() {
 #[test]
 fn where_walks_are_guided_by_default() {
     let slab = Shape::Slab { thickness: 2.0 };
+    let mesh = Shape::Mesh(procedural::icosphere(1.0, 3, true).expect("closed"));
     let small: fn() -> Light = || cap(DVec3::Z, 0.01, 50.0);
     let sky: fn() -> Light = sky;
     // Depth is in the rule's units.
@@ -334,6 +335,10 @@ fn where_walks_are_guided_by_default() {
         (SPHERE, ROUGH, sky, 0.8, 0.1, true),
         (SPHERE, ROUGH, small, 0.8, 2.9, false),
         (SPHERE, ROUGH, small, 0.8, 3.2, true),
+        (mesh.clone(), ROUGH, sky, 0.8, 0.1, true),
+        (mesh.clone(), SMOOTH, sky, 0.8, 2.9, false),
+        // What a mesh knows of its depth is a lower bound.
+        (mesh, SMOOTH, sky, 0.8, 4.0, true),
         (slab.clone(), ROUGH, sky, 0.8, 2.9, false),
         (slab.clone(), ROUGH, sky, 0.8, 3.1, true),
         (SPHERE, Boundary::Matched, sky, 0.4, 9.0, false),
@@ -460,8 +465,8 @@ fn wrong_guides_do_not_bias() {
     assert!(judged > 150, "{judged}");
 }
 
-/// Where walks are guided, and in bright matched and rough bodies, light sampling leaves a sky to the walks and keeps a small light;
-/// plain walks in dark ones sample both.
+/// Where walks are guided, and in bright matched and rough bodies, light sampling leaves a sky to the walks and keeps a
+/// small light; plain walks in dark ones sample both.
 #[test]
 fn even_lights_are_sampled_where_it_pays() {
     let lights = || vec![sky(), cap(DVec3::new(0.5, 0.1, 0.7), 0.01, 50.0)];
