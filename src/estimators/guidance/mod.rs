@@ -65,18 +65,19 @@ pub enum WalkDraw {
         #[schemars(range(min = 4, max = 256))]
         nodes: u32,
         /// Walks stay plain in a finite body or a slab that is nowhere as deep as this: light leaves such a body too soon for a
-        /// guide to pay.
+        /// guide to pay. By default 3, or 0 where guiding pays at any depth.
         ///
         /// In units of (2 + 1 / (1 - albedo g)) / (3 sigma_t), two thirds of a mean free path and one third of that after
-        /// similarity. By default 3, and 0 for a finite body behind a rough boundary if its reduced albedo,
-        /// a (1 - g) / (1 - a g), is 0.75 or more and even lights have a quarter of the strength of all. By default walks stay plain in
-        /// matched bodies of reduced albedo below 0.45, too.
+        /// similarity. The default is 0 for a finite body behind a rough boundary if its reduced albedo, a (1 - g) / (1 - a g), is
+        /// 0.75 or more and even lights have a quarter of the strength of all. Without this key walks also stay plain in matched
+        /// bodies of reduced albedo below 0.45.
         #[serde(default)]
         #[schemars(range(min = 0.0))]
         least_depth: Option<f64>,
         /// Whether walks are guided even where other techniques find the light whatever the walk, so that a plain step costs
         /// less: in `snee` where subdivision connects to every light and the lights illuminate the points at which walks
-        /// enter; in `path` where small lights do and little is absorbed, and in matched bodies under small lights.
+        /// enter; in `path` where small lights do and little is absorbed or the body is a slab, and in matched bodies under small
+        /// lights.
         #[serde(default)]
         near_lights: bool,
     },
