@@ -33,6 +33,7 @@ const PAGES: &[&str] = &[
     "docs/python.md",
     "docs/record-layout.md",
     "docs/reliability.md",
+    "docs/speed.md",
     "docs/subdivision.md",
     "docs/verification.md",
     "docs/walks.md",

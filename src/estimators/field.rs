@@ -13,7 +13,7 @@ use crate::scene::Scene;
 
 /// Reduced albedo from which on plain walks at a rough boundary find an even light better without light samples. A dark body
 /// needs them: most of its light is reflected at the surface, and a plain walk rarely follows that lobe. Measured under a sky
-/// in bodies up to the depth from which on walks are guided: 1.09 to 3.8 times the efficiency from here on, 0.63 to 1.4 below
+/// in bodies up to the depth from which on walks are guided: 1.08 to 3.8 times the efficiency from here on, 0.63 to 1.4 below
 /// (experiments/compare/walks-even.toml).
 const FINDS_EVEN: f64 = 0.75;
 
