@@ -15,7 +15,6 @@
 use std::fmt::Write as _;
 use std::hint::black_box;
 use std::sync::Arc;
-use std::time::Duration;
 
 use scatterproof::estimators::path::{PathTracer, Roulette};
 use scatterproof::estimators::{Cost, Estimator, Layout, Scores};
@@ -28,6 +27,10 @@ use scatterproof::optics::phase::HenyeyGreenstein;
 use scatterproof::sampling::stream::{PassKey, Purpose, StreamKey};
 use scatterproof::scene::sensor::Probe;
 use scatterproof::scene::{Emission, Light, Scene, Sensor};
+
+mod timing;
+
+use timing::{spread, thread_cpu_time};
 
 const ROUNDS: usize = 9;
 const PATHS: usize = 20_000;
@@ -48,11 +51,6 @@ struct Block {
 
 /// Something that is timed: traces `PATHS` paths of the pass.
 type Row<'a> = (String, Box<dyn FnMut(&PassKey) -> Block + 'a>);
-
-fn thread_cpu_time() -> Duration {
-    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    Duration::new(now.tv_sec.unsigned_abs(), now.tv_nsec as u32)
-}
 
 fn sensor_ray() -> Ray {
     Ray { origin: DVec3::new(0.3, -0.5, 3.0), dir: -DVec3::Z }
@@ -154,12 +152,6 @@ fn lumpy(subdivisions: u32) -> (String, Shape) {
     let triangles = 20 * 4usize.pow(subdivisions);
     let mesh = procedural::lumpy_sphere(1.0, subdivisions, 0.25, false).expect("a closed mesh");
     (format!("path, {triangles} triangles"), Shape::Mesh(mesh))
-}
-
-/// Median, smallest and largest.
-fn spread(mut values: Vec<f64>) -> [f64; 3] {
-    values.sort_by(f64::total_cmp);
-    [values[values.len() / 2], values[0], values[values.len() - 1]]
 }
 
 /// Mean and its standard error.

@@ -18,13 +18,16 @@ use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::time::Duration;
 
 use scatterproof::geometry::{Placement, Ray, Shape, Side, load_mesh, procedural};
 use scatterproof::math::DVec3;
 use scatterproof::sampling::distance::sample_exponential;
 use scatterproof::sampling::stream::{Purpose, Stream, StreamKey};
 use scatterproof::sampling::warp::square_to_cap;
+
+mod timing;
+
+use timing::{spread, thread_cpu_time};
 
 const ROUNDS: usize = 9;
 const RAYS: usize = 1 << 16;
@@ -34,11 +37,6 @@ type Cast = (Ray, Side, f64);
 
 /// Name and rays of a kind.
 type Kind = (&'static str, Vec<Cast>);
-
-fn thread_cpu_time() -> Duration {
-    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    Duration::new(now.tv_sec.unsigned_abs(), now.tv_nsec as u32)
-}
 
 fn direction(stream: &mut Stream) -> DVec3 {
     square_to_cap(2.0, stream.draw2())
@@ -134,14 +132,44 @@ impl Embree {
         let mut line = String::new();
         writeln!(self.input).expect("the program of --embree reads");
         self.output.read_line(&mut line).expect("the program of --embree answers");
-        let seconds = line.split(' ').next().and_then(|word| word.parse().ok());
-        seconds.expect("the program of --embree answers with seconds and hits")
+        line.trim().parse().expect("the program of --embree answers with seconds")
     }
 
     fn stop(mut self) {
         drop(self.input);
         self.child.wait().expect("the program of --embree ends");
     }
+}
+
+/// Nanoseconds per ray, round by round, and the lengths that are found here.
+struct Rounds {
+    ours: Vec<f64>,
+    theirs: Vec<f64>,
+    lengths: Vec<f64>,
+}
+
+fn rounds(shape: &Shape, rays: &[Cast], mut other: Option<&mut Embree>) -> Rounds {
+    let mut rounds = Rounds { ours: Vec::new(), theirs: Vec::new(), lengths: Vec::new() };
+    for round in 0..=ROUNDS {
+        let (mut here, mut of_embree) = (0.0, None);
+        let mut turns = [true, false];
+        turns.rotate_left(round % 2);
+        for is_here in turns {
+            if is_here {
+                let start = thread_cpu_time();
+                rounds.lengths = trace(shape, rays);
+                here = (thread_cpu_time() - start).as_secs_f64();
+            } else {
+                of_embree = other.as_deref_mut().map(Embree::pass);
+            }
+        }
+        if round > 0 {
+            let per_ray = 1e9 / rays.len() as f64;
+            rounds.ours.push(here * per_ray);
+            rounds.theirs.extend(of_embree.map(|seconds| seconds * per_ray));
+        }
+    }
+    rounds
 }
 
 fn write_rays(file: &Path, shape: &Shape, rays: &[Cast]) {
@@ -168,12 +196,6 @@ fn disagreements(file: &Path, lengths: &[f64]) -> usize {
     // Two infinities are equal, and have no difference.
     let agree = |(&ours, theirs): (&f64, f64)| ours == theirs || (ours - theirs).abs() < 1e-3;
     lengths.iter().zip(theirs).filter(|&pair| !agree(pair)).count()
-}
-
-/// Median, smallest and largest.
-fn spread(mut values: Vec<f64>) -> [f64; 3] {
-    values.sort_by(f64::total_cmp);
-    [values[values.len() / 2], values[0], values[values.len() - 1]]
 }
 
 fn bodies(files: &[PathBuf]) -> Vec<(String, Shape)> {
@@ -217,20 +239,7 @@ fn main() {
                 write_rays(&file, &shape, &rays);
                 Embree::start(program, &file)
             });
-            let (mut ours, mut theirs, mut lengths) = (Vec::new(), Vec::new(), Vec::new());
-            for round in 0..=ROUNDS {
-                let mut of_embree = if round % 2 == 1 { other.as_mut().map(Embree::pass) } else { None };
-                let start = thread_cpu_time();
-                lengths = trace(&shape, &rays);
-                let seconds = (thread_cpu_time() - start).as_secs_f64();
-                if round % 2 == 0 {
-                    of_embree = other.as_mut().map(Embree::pass);
-                }
-                if round > 0 {
-                    ours.push(seconds * 1e9 / RAYS as f64);
-                    theirs.extend(of_embree.map(|seconds| seconds * 1e9 / RAYS as f64));
-                }
-            }
+            let Rounds { ours, theirs, lengths } = rounds(&shape, &rays, other.as_mut());
             let [ns, ..] = spread(ours.clone());
             let mut row = format!("\"{name}\",{triangles},\"{kind}\",{ns:.1}");
             print!("  {kind:24} {ns:7.0} ns");

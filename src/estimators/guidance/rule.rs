@@ -17,11 +17,11 @@ const EVEN_ENOUGH: f64 = 0.25;
 const LEAST_DEPTH: f64 = 3.0;
 
 /// Reduced albedo from which on guided walks gain in finite bodies of any depth behind a rough boundary under an even light
-/// (ditto).
+/// (the same file).
 const BRIGHT: f64 = 0.75;
 
 /// Reduced albedo below which guided walks lose in matched bodies: light samples at every vertex find what little light there is
-/// (ditto).
+/// (the same file).
 const DARK: f64 = 0.45;
 
 /// What finds the light that walks are guided to.
