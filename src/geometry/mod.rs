@@ -166,6 +166,17 @@ impl Shape {
         }
     }
 
+    /// What [`Self::intersect`] finds for a ray from a point inside, however far the boundary is. A sphere is inlined: of several
+    /// rays from one point, the distance of that point to the boundary is computed once.
+    #[inline]
+    pub fn leave(&self, ray: &Ray) -> Option<Hit> {
+        let range = analytic::Range { side: Side::Inside, from: None, t_max: f64::INFINITY };
+        match *self {
+            Shape::Sphere { radius } => analytic::sphere(radius, ray, range),
+            _ => self.intersect(ray, range.side, range.from, range.t_max),
+        }
+    }
+
     /// What [`Self::intersect`] finds for a flight of length `t` inside the body.
     #[inline]
     pub fn end_of_flight(&self, ray: &Ray, from: Option<FaceId>, t: f64) -> Option<Hit> {

@@ -115,12 +115,13 @@ impl Boundary {
         if let Boundary::Rough { eta, facets } = *self {
             let mut lobes = [FacetLobe::none(count), FacetLobe::none(count)];
             Meeting { wo, relative: side_eta(eta, wo), facets }.fill(&mut lobes, [u[1], u[2]]);
-            let (lobe, weight, u) = choose_lobe(lobes.each_ref().map(FacetLobe::weight), gain, u[0])?;
+            let weights = [lobes[0].weight(), lobes[1].weight()];
+            let (lobe, weight, u) = choose_lobe(weights, gain, u[0])?;
             return Some(self.sample_of(wo, lobes[lobe].choose(u)?, EVENTS[lobe], weight));
         }
         let Some((h, relative)) = self.facet(wo, [u[1], u[2]]) else { return self.sample(wo, u) };
         let ways = ways(wo, h, relative);
-        let (way, weight, _) = choose_lobe(ways.each_ref().map(|way| way.share), gain, u[0])?;
+        let (way, weight, _) = choose_lobe([ways[0].share, ways[1].share], gain, u[0])?;
         Some(self.sample_of(wo, ways[way].wi, EVENTS[way], weight))
     }
 
@@ -130,19 +131,22 @@ impl Boundary {
         if let Boundary::Rough { eta, facets } = *self {
             let mut lobes = [FacetLobe::none(count), FacetLobe::none(count)];
             Meeting { wo, relative: side_eta(eta, wo), facets }.fill(&mut lobes, [u[1], u[2]]);
-            return [0, 1].map(|i| {
+            let lobe = |i: usize| {
                 let lobe = &lobes[i];
                 Some(self.sample_of(wo, lobe.choose(u[0])?, EVENTS[i], lobe.weight()))
-            });
+            };
+            // Not `map`, which is not inlined.
+            return [lobe(0), lobe(1)];
         }
         match self.facet(wo, [u[1], u[2]]) {
             None => [None, self.sample(wo, u)],
             Some((h, relative)) => {
                 let ways = ways(wo, h, relative);
-                [0, 1].map(|i| {
+                let way = |i: usize| {
                     let Way { wi, share } = ways[i];
                     (share > 0.0).then(|| self.sample_of(wo, wi, EVENTS[i], share))
-                })
+                };
+                [way(0), way(1)]
             }
         }
     }

@@ -497,7 +497,8 @@ impl Growth {
     /// e^{(p + c) depth} and e^{(p - c) depth}.
     #[inline]
     fn both(&self, depth: f64) -> [f64; 2] {
-        [self.pull + self.bend, self.pull - self.bend].map(|rate| growth(rate, depth))
+        // Not `map`, which is not inlined.
+        [growth(self.pull + self.bend, depth), growth(self.pull - self.bend, depth)]
     }
 
     /// Probability that a flight is longer than so many mean free paths, over that of a plain one.

@@ -7,7 +7,7 @@
 
 use crate::estimators::Cost;
 use crate::estimators::walk::CameraWalk;
-use crate::geometry::{Ray, Side};
+use crate::geometry::Ray;
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 
@@ -38,7 +38,7 @@ impl Guess {
         let CameraWalk { scene, boundary, scores, .. } = walk;
         let mut shoot = |dir| {
             scores.count(Cost::Rays);
-            scene.shape.intersect(&Ray { origin: point, dir }, Side::Inside, None, f64::INFINITY)
+            scene.shape.leave(&Ray { origin: point, dir })
         };
         let straight = shoot(toward)?;
         let mut guess = Guess { normal: straight.shading_normal, dir: toward, distance: straight.t };

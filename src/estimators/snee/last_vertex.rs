@@ -23,7 +23,7 @@ use crate::estimators::Cost;
 use crate::estimators::bands::WalkBands;
 use crate::estimators::vertices::WalkExit;
 use crate::estimators::walk::CameraWalk;
-use crate::geometry::{Ray, Side};
+use crate::geometry::Ray;
 use crate::math::{DVec3, Frame, tan};
 use crate::optics::boundary::Boundary;
 use crate::optics::microfacet::Microfacets;
@@ -211,7 +211,7 @@ fn draw_within<'a, B: WalkBands>(
     let dir = lobe.sample(technique.wide_share, w_l, walk.rivals.stream.draw2())?;
     walk.scores.count(Cost::Rays);
     let ray = Ray { origin: x_j.point, dir };
-    let hit = walk.scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY)?;
+    let hit = walk.scene.shape.leave(&ray)?;
     let exit = walk.exit_at(hit, dir)?;
     let w_l = match lobe {
         Lobe::Refraction { .. } => w_l,

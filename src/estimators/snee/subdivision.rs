@@ -175,7 +175,7 @@ pub(super) fn draw_edge<'a, B: WalkBands>(
     let dir = probe.sample(walk.rivals.stream.draw2());
     walk.scores.count(Cost::Rays);
     let ray = Ray { origin: x_i.point, dir };
-    let hit = walk.scene.shape.intersect(&ray, Side::Inside, None, f64::INFINITY)?;
+    let hit = walk.scene.shape.leave(&ray)?;
     Some(ProbedEdge { guide, hit })
 }
 

@@ -89,6 +89,8 @@ pub struct GuideLanes {
     pub chances: Lanes,
     /// By which importance grows to all sides.
     pub bends: Lanes,
+    /// What the levels mean under a product.
+    products: ProductLanes,
 }
 
 /// How steps are drawn, and the numbers that they are drawn from.
@@ -193,7 +195,7 @@ impl StepLanes {
     pub fn depart(
         &mut self,
         turns: &GuidedTurns,
-        guides: &GuideLanes,
+        guides: &mut GuideLanes,
         draws: &mut DrawLanes,
         draw: impl FnMut(usize) -> f64,
     ) {
@@ -203,24 +205,25 @@ impl StepLanes {
                 let pdf = turns.phase.pdf(0.0);
                 vectorized(IsotropicDepartures { steps: self, pdf, guides, levels: &levels, draws });
             }
-            Levels::Product(levels) => self.depart_by_product(&turns.phase, levels, guides, draws, draw),
+            Levels::Product(levels) => {
+                guides.products.set(levels, &guides.levels);
+                self.depart_by_product(&turns.phase, guides, draws, draw);
+            }
         }
     }
 
     fn depart_by_product(
         &mut self,
         phase: &HenyeyGreenstein,
-        levels: &[Level],
         guides: &GuideLanes,
         draws: &mut DrawLanes,
         mut draw: impl FnMut(usize) -> f64,
     ) {
-        let levels = ProductLanes::new(levels, guides);
         let dirs = &self.dirs;
-        let mut tried = vectorized(FirstTry { phase, dirs, guides, levels: &levels, draws });
+        let mut tried = vectorized(FirstTry { phase, dirs, guides, draws });
         for lane in 0..LANES {
             if tried.rejected[lane] > 0.0 {
-                let local = levels.try_again(phase, &tried, lane, || draw(lane));
+                let local = guides.products.try_again(phase, &tried, lane, || draw(lane));
                 set_vector(&mut tried.locals, lane, local);
             }
             if draws.kinds[lane] != ENDED {
@@ -234,22 +237,22 @@ impl StepLanes {
                 set_vector(&mut dirs, lane, guides.escape(lane).sample([u, v]));
             }
         }
-        vectorized(ProductDepartures {
-            steps: self,
-            phase,
-            guides,
-            levels: &levels,
-            draws,
-            dirs: &dirs,
-        });
+        vectorized(ProductDepartures { steps: self, phase, guides, draws, dirs: &dirs });
     }
 }
 
 impl GuideLanes {
     /// None.
     pub fn none() -> GuideLanes {
-        let levels = [0; LANES];
-        GuideLanes { axes: NONE, levels, normals: NONE, least_cosines: ZERO, chances: ZERO, bends: ZERO }
+        GuideLanes {
+            axes: NONE,
+            levels: [0; LANES],
+            normals: NONE,
+            least_cosines: ZERO,
+            chances: ZERO,
+            bends: ZERO,
+            products: ProductLanes::none(),
+        }
     }
 
     /// Sets that of one walk.
@@ -344,7 +347,10 @@ impl IsotropicLanes {
 }
 
 /// [`Level`], coefficient by coefficient.
+#[derive(Clone, Debug)]
 struct ProductLanes {
+    /// Which levels these are.
+    numbers: [i32; LANES],
     factor: [Lanes; TERMS],
     norm: [Lanes; TERMS],
     linear: Lanes,
@@ -352,19 +358,26 @@ struct ProductLanes {
 }
 
 impl ProductLanes {
-    #[inline(always)]
-    fn new(levels: &[Level], guides: &GuideLanes) -> ProductLanes {
+    fn none() -> ProductLanes {
         let none = [ZERO; TERMS];
-        let mut lanes = ProductLanes { factor: none, norm: none, linear: ZERO, even: ZERO };
-        for (lane, &level) in guides.levels.iter().enumerate() {
-            let Level { factor, norm, linear, even } = &levels[level as usize];
-            for term in 0..TERMS {
-                lanes.factor[term][lane] = factor.0[term];
-                lanes.norm[term][lane] = norm.0[term];
+        ProductLanes { numbers: [-1; LANES], factor: none, norm: none, linear: ZERO, even: ZERO }
+    }
+
+    /// Sets those of all walks. A walk often keeps its level from one step to the next.
+    #[inline(always)]
+    fn set(&mut self, levels: &[Level], numbers: &[i32; LANES]) {
+        for lane in 0..LANES {
+            if self.numbers[lane] == numbers[lane] {
+                continue;
             }
-            (lanes.linear[lane], lanes.even[lane]) = (*linear, *even);
+            self.numbers[lane] = numbers[lane];
+            let Level { factor, norm, linear, even } = &levels[numbers[lane] as usize];
+            for term in 0..TERMS {
+                self.factor[term][lane] = factor.0[term];
+                self.norm[term][lane] = norm.0[term];
+            }
+            (self.linear[lane], self.even[lane]) = (*linear, *even);
         }
-        lanes
     }
 
     #[inline(always)]
@@ -500,7 +513,6 @@ struct FirstTry<'a> {
     phase: &'a HenyeyGreenstein,
     dirs: &'a VectorLanes,
     guides: &'a GuideLanes,
-    levels: &'a ProductLanes,
     draws: &'a DrawLanes,
 }
 
@@ -509,10 +521,10 @@ impl Vectorized for FirstTry<'_> {
 
     #[inline(always)]
     fn call(self) -> Tried {
-        let FirstTry { phase, dirs: [fx, fy, fz], guides, levels, draws } = self;
+        let FirstTry { phase, dirs: [fx, fy, fz], guides, draws } = self;
         let phase = *phase;
         let GuideLanes { axes: [ax, ay, az], levels: numbers, .. } = guides;
-        let ProductLanes { factor, linear, even, .. } = levels;
+        let ProductLanes { factor, linear, even, .. } = &guides.products;
         let DrawLanes { kinds, turns: [u, v], levels, .. } = draws;
         let strengths = strengths(*numbers);
         let mut tried = Tried { axes: NONE, most: ZERO, rejected: ZERO, locals: NONE };
@@ -566,7 +578,6 @@ struct ProductDepartures<'a> {
     steps: &'a mut StepLanes,
     phase: &'a HenyeyGreenstein,
     guides: &'a GuideLanes,
-    levels: &'a ProductLanes,
     draws: &'a DrawLanes,
     dirs: &'a VectorLanes,
 }
@@ -576,11 +587,11 @@ impl Vectorized for ProductDepartures<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let ProductDepartures { steps, phase, guides, levels, draws, dirs } = self;
+        let ProductDepartures { steps, phase, guides, draws, dirs } = self;
         let phase = *phase;
         let ([fx, fy, fz], [x, y, z]) = (&steps.dirs, dirs);
         let GuideLanes { axes: [ax, ay, az], levels: numbers, .. } = guides;
-        let ProductLanes { factor, norm, .. } = levels;
+        let ProductLanes { factor, norm, .. } = &guides.products;
         let strengths = strengths(*numbers);
         let [mut turned, mut pdfs] = [ZERO; 2];
         for lane in 0..LANES {

@@ -172,7 +172,7 @@ impl<'a> GuidedLanes<'a> {
             }
         }
         let streams = &mut self.streams;
-        self.steps.depart(turns, &self.guides, &mut self.draws, |lane| streams[lane].draw());
+        self.steps.depart(turns, &mut self.guides, &mut self.draws, |lane| streams[lane].draw());
         self.guidance.find_all(self.steps.ends(), &mut self.found);
         self.flights.iter_mut().for_each(|flights| *flights += 1);
         goes_on
