@@ -13,6 +13,17 @@ pub trait Estimator: Send + Sync {
     /// zeroed scores.
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores);
 
+    /// Runs several passes, each with the scores of [`Estimator::pass`], to the last bit: keys and scores one for each.
+    fn passes(&self, bands: &[usize], keys: &[PassKey], scores: &mut [Scores]) {
+        keys.iter().zip(scores).for_each(|(key, scores)| self.pass(bands, key, scores));
+    }
+
+    /// How many passes of these bands cost less together than one by one.
+    fn passes_at_once(&self, bands: &[usize]) -> u64 {
+        let _ = bands;
+        1
+    }
+
     /// Whether one call traces each band alone or all of them on shared paths.
     fn band_use(&self) -> BandUse {
         BandUse::EachAlone

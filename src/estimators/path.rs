@@ -17,6 +17,7 @@
 //! probability, which depends on the albedo and roughness losses alone (never on the eta^2 of radiance,
 //! which cancels on the way out).
 
+use std::slice::{from_mut, from_ref};
 use std::sync::Arc;
 
 use schemars::JsonSchema;
@@ -24,7 +25,7 @@ use serde::Deserialize;
 
 use super::guidance::{Finder, WalkDraw, pays_beside_light_samples};
 use super::illumination::unscattered_notes;
-use super::walk::trace_alone;
+use super::walk::{passes_at_once, trace_alone};
 use super::warm_up::TaughtField;
 use super::{Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::Result;
@@ -101,10 +102,18 @@ impl Estimator for PathTracer {
     }
 
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        self.passes(bands, from_ref(key), from_mut(scores));
+    }
+
+    fn passes(&self, bands: &[usize], keys: &[PassKey], scores: &mut [Scores]) {
         let field = self.walks.field();
         for &band in bands {
-            trace_alone(field, band, key, scores);
+            trace_alone(field, band, keys, scores);
         }
+    }
+
+    fn passes_at_once(&self, bands: &[usize]) -> u64 {
+        passes_at_once(self.walks.field(), bands)
     }
 
     fn guides(&self) -> Vec<Option<GuideSlice>> {

@@ -238,10 +238,11 @@ impl Scores {
         }
     }
 
-    /// Adds the counts of other scores.
-    pub(super) fn add_counts(&mut self, others: &Scores) {
-        self.cost.iter_mut().zip(others.cost).for_each(|(sum, count)| *sum += count);
-        self.anomalies.iter_mut().zip(others.anomalies).for_each(|(sum, count)| *sum += count);
+    /// Adds the counts of other scores, and sets these to zero.
+    pub(super) fn take_counts(&mut self, others: &mut Scores) {
+        let counts = others.cost.iter_mut().chain(&mut others.anomalies);
+        let sums = self.cost.iter_mut().chain(&mut self.anomalies);
+        sums.zip(counts).for_each(|(sum, count)| *sum += std::mem::take(count));
     }
 
     /// Resets scores to zero for the next pass; counts continue.

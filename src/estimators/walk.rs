@@ -32,7 +32,7 @@ use crate::sampling::stream::{Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::sensor::PathMeasure;
 
-pub(super) use lanes::{may_fly_side_by_side, trace_alone, trace_side_by_side};
+pub(super) use lanes::{may_fly_side_by_side, passes_at_once, trace_alone, trace_side_by_side};
 pub(super) use rivals::{Rivals, Unrivalled};
 
 /// How the path's current direction was drawn, as light sampling sees it.
@@ -589,7 +589,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
 
     /// Whether a direction leads outside at an exit; counted where the normals disagree.
     pub(super) fn leads_outside(&mut self, exit: &WalkExit, dir: DVec3) -> bool {
-        let [geometric, shading] = [exit.hit.normal, exit.frame.n].map(|normal| dir.dot(normal) > 0.0);
+        let [geometric, shading] = [dir.dot(exit.hit.normal) > 0.0, dir.dot(exit.frame.n) > 0.0];
         if geometric != shading {
             self.scores.note(Anomaly::WrongSide);
         }

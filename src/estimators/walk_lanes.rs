@@ -1,6 +1,6 @@
-//! Guided walks side by side: several paths of a pass are inside the body at the same time, one in each lane, and fly and
-//! scatter together. A path that meets the boundary goes on alone until it is inside again, or ends; then its lane takes the
-//! next path.
+//! Guided walks side by side: several paths are inside the body at the same time, one in each lane, and fly and scatter
+//! together. A path that meets the boundary goes on alone until it is inside again, or ends; then its lane takes the next path,
+//! of the same pass or of the next one: only after the last path of the last pass do lanes run empty.
 //!
 //! ```text
 //! next path -> [ meets the body, is reflected, flies outside ] -> lane -> [ flights and turns of all lanes ] -> boundary
@@ -25,84 +25,114 @@ use crate::sampling::stream::PassKey;
 
 /// A path.
 struct LaneWalk<'a, R> {
-    index: usize,
+    /// Its number among those of all passes.
+    number: usize,
     walk: CameraWalk<'a, R, GuidedBand<'a>>,
-    later: Option<Later<GuidedBand<'a>>>,
     /// Medium vertices that the rivals have passed and the history of the path does not have yet.
     passed: u64,
 }
 
-/// The paths of a pass in one band.
+/// The paths of some passes in one band, pass after pass.
 struct Paths<'a, 's, N> {
     /// The rivals of a path.
     rivals: N,
     field: &'a Field,
     band: usize,
-    key: &'a PassKey,
+    keys: &'a [PassKey],
     guidance: &'a Guidance,
-    /// Index of the first that has not begun, and how many there are.
+    /// Number of the first that has not begun, and how many a pass has.
     next: usize,
-    count: usize,
-    scores: &'s mut Scores,
+    per_pass: usize,
+    /// Of each pass.
+    scores: &'s mut [Scores],
     /// Of the paths from this one on, what those that have ended have scored: sums are formed in the order of paths.
     first: usize,
     ended: VecDeque<Option<Vec<Contribution>>>,
+    /// The refracted ray of the first hit of each lane's path, until it is followed: apart from the walk, which moves.
+    later: [Option<Later<GuidedBand<'a>>>; LANES],
     /// Without contributions, to be filled again.
     empty: Vec<Vec<Contribution>>,
 }
 
-/// Traces the paths of a pass in one band, without techniques beside unidirectional sampling.
+/// Traces the paths of passes in one band, without techniques beside unidirectional sampling.
 pub(in crate::estimators) fn trace_alone(
     field: &Field,
     band: usize,
-    key: &PassKey,
-    scores: &mut Scores,
+    keys: &[PassKey],
+    scores: &mut [Scores],
 ) {
-    let guidance = field.guidance(band);
-    if let Some(guidance) = guidance.filter(|_| may_fly_side_by_side(field, band)) {
-        return trace_side_by_side(field, band, key, guidance, scores, |_| Unrivalled);
+    if let Some(guidance) = may_fly_side_by_side(field, band) {
+        return trace_side_by_side(field, band, keys, guidance, scores, |_| Unrivalled);
     }
-    for index in 0..field.scene.sensor.rays_per_pass() {
-        let path = Path { field, band, index, key };
-        match guidance {
-            Some(guidance) => {
-                let guided = GuidedBand::new(guidance, &field.scene.medium[band]);
-                CameraWalk::trace(path, scores, Unrivalled, guided)
-            }
-            None => CameraWalk::trace(path, scores, Unrivalled, OneBand),
-        };
+    for (key, scores) in keys.iter().zip(scores) {
+        for index in 0..field.scene.sensor.rays_per_pass() {
+            let path = Path { field, band, index, key };
+            match field.guidance(band) {
+                Some(guidance) => {
+                    let guided = GuidedBand::new(guidance, &field.scene.medium[band]);
+                    CameraWalk::trace(path, scores, Unrivalled, guided)
+                }
+                None => CameraWalk::trace(path, scores, Unrivalled, OneBand),
+            };
+        }
     }
 }
 
-/// Whether guided walks in this band may be traced side by side: inside they only fly, scatter and call rivals.
-pub(in crate::estimators) fn may_fly_side_by_side(field: &Field, band: usize) -> bool {
+/// What guides the walks in this band if they may be traced side by side: inside they only fly, scatter and call rivals.
+pub(in crate::estimators) fn may_fly_side_by_side(field: &Field, band: usize) -> Option<&Guidance> {
     let scene = &field.scene;
     let medium = &scene.medium[band];
     let is_matched = matches!(scene.boundary[band], super::Boundary::Matched);
-    medium.sigma_t > 0.0 && medium.emission == 0.0 && !is_matched && scene.sensor.measure().is_off()
+    let may =
+        medium.sigma_t > 0.0 && medium.emission == 0.0 && !is_matched && scene.sensor.measure().is_off();
+    field.guidance(band).filter(|_| may)
 }
 
-/// Traces the paths of a pass in a band of which [`may_fly_side_by_side`] holds, with the scores and counts of
+/// So many paths keep lanes full for nearly all of the time.
+const MANY_PATHS: usize = 2048;
+
+/// How many passes of these bands are traced together, so that walks that fly side by side fill their lanes.
+pub(in crate::estimators) fn passes_at_once(field: &Field, bands: &[usize]) -> u64 {
+    if bands.iter().any(|&band| may_fly_side_by_side(field, band).is_some()) {
+        MANY_PATHS.div_ceil(field.scene.sensor.rays_per_pass()) as u64
+    } else {
+        1
+    }
+}
+
+/// Traces the paths of passes in a band with the guidance by [`may_fly_side_by_side`], with the scores and counts of
 /// [`CameraWalk::trace`] of one after the other.
 pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
     field: &Field,
     band: usize,
-    key: &PassKey,
+    keys: &[PassKey],
     guidance: &Guidance,
-    scores: &mut Scores,
+    scores: &mut [Scores],
     rivals: impl Fn(&Path) -> R,
 ) {
-    let mut holding: [Scores; LANES] = std::array::from_fn(|_| scores.holding());
-    let count = field.scene.sensor.rays_per_pass();
-    let (ended, empty) = (VecDeque::new(), Vec::new());
-    let mut paths =
-        Paths { rivals, field, band, key, guidance, next: 0, count, scores, first: 0, ended, empty };
+    let Some(first) = scores.first() else { return };
+    let mut holding: [Scores; LANES] = std::array::from_fn(|_| first.holding());
+    let per_pass = field.scene.sensor.rays_per_pass();
+    let mut paths = Paths {
+        rivals,
+        field,
+        band,
+        keys,
+        guidance,
+        next: 0,
+        per_pass,
+        scores,
+        first: 0,
+        ended: VecDeque::new(),
+        later: [const { None }; LANES],
+        empty: Vec::new(),
+    };
     let medium = &field.scene.medium[band];
     let rule = StepRule { medium, roulette: field.roulette, survival: medium.albedo };
     let mut lanes = GuidedLanes::new(guidance, rule);
     let mut walks: [Option<LaneWalk<'_, R>>; LANES] = [const { None }; LANES];
     for (lane, holding) in holding.iter_mut().enumerate() {
-        let onward = paths.begin(&mut walks[lane], holding);
+        let onward = paths.begin(lane, &mut walks[lane], holding);
         paths.go_on(&mut lanes, lane, &mut walks[lane], onward);
     }
     while walks.iter().any(Option::is_some) {
@@ -135,8 +165,6 @@ pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
             paths.go_on(&mut lanes, lane, &mut walks[lane], onward);
         }
     }
-    let Paths { scores, .. } = paths;
-    holding.iter().for_each(|holding| scores.add_counts(holding));
 }
 
 impl<'a, R: Rivals> CameraWalk<'a, R, GuidedBand<'a>> {
@@ -154,19 +182,22 @@ impl<'a, R: Rivals> CameraWalk<'a, R, GuidedBand<'a>> {
 
 impl<'a, R: Rivals, N: Fn(&Path) -> R> Paths<'a, '_, N> {
     /// Begins the next path, whose scores are held back; leaves nothing where none is left.
-    fn begin(&mut self, slot: &mut Option<LaneWalk<'a, R>>, holding: &'a mut Scores) -> Option<Onward> {
+    fn begin(
+        &mut self,
+        lane: usize,
+        slot: &mut Option<LaneWalk<'a, R>>,
+        holding: &'a mut Scores,
+    ) -> Option<Onward> {
         *slot = None;
-        if self.next == self.count {
-            return None;
-        }
-        let Paths { field, band, key, guidance, next: index, .. } = *self;
+        let Paths { field, band, keys, guidance, next: number, per_pass, .. } = *self;
+        let key = keys.get(number / per_pass)?;
         self.next += 1;
         self.ended.push_back(None);
-        let path = Path { field, band, index, key };
+        let path = Path { field, band, index: number % per_pass, key };
         let guided = GuidedBand::new(guidance, &field.scene.medium[band]);
         let walk = CameraWalk::start(path, holding, (self.rivals)(&path), guided);
-        let LaneWalk { walk, later, .. } = slot.insert(LaneWalk { index, walk, later: None, passed: 0 });
-        walk.meet_body(path, later)
+        let LaneWalk { walk, .. } = slot.insert(LaneWalk { number, walk, passed: 0 });
+        walk.meet_body(path, &mut self.later[lane])
     }
 
     /// Follows the path of a lane until a flight inside ends in the medium, and the next ones if it ends before; leaves
@@ -180,7 +211,7 @@ impl<'a, R: Rivals, N: Fn(&Path) -> R> Paths<'a, '_, N> {
         mut onward: Option<Onward>,
     ) {
         while let Some(walk) = slot {
-            if walk.enter(lanes, lane, onward) {
+            if walk.enter(lanes, lane, &mut self.later[lane], onward) {
                 if self.is_clear(lanes, lane) {
                     return;
                 }
@@ -188,11 +219,11 @@ impl<'a, R: Rivals, N: Fn(&Path) -> R> Paths<'a, '_, N> {
                     FlightEnd::Medium => return,
                     FlightEnd::Elsewhere(next) => onward = next,
                 }
-            } else if let Some(LaneWalk { index, walk: CameraWalk { scores: holding, .. }, .. }) =
+            } else if let Some(LaneWalk { number, walk: CameraWalk { scores: holding, .. }, .. }) =
                 slot.take()
             {
-                self.end(index, holding);
-                onward = self.begin(slot, holding);
+                self.end(number, holding);
+                onward = self.begin(lane, slot, holding);
             }
         }
     }
@@ -205,19 +236,16 @@ impl<'a, R: Rivals, N: Fn(&Path) -> R> Paths<'a, '_, N> {
     }
 
     /// A path has ended.
-    fn end(&mut self, index: usize, holding: &mut Scores) {
+    fn end(&mut self, number: usize, holding: &mut Scores) {
         let empty = self.empty.pop().unwrap_or_default();
-        self.ended[index - self.first] = Some(holding.take_held(empty));
-        while let Some(held) = self.ended.front_mut().and_then(Option::take) {
+        self.scores[number / self.per_pass].take_counts(holding);
+        self.ended[number - self.first] = Some(holding.take_held(empty));
+        while let Some(mut held) = self.ended.front_mut().and_then(Option::take) {
             self.ended.pop_front();
+            self.scores[self.first / self.per_pass].add_held(&mut held);
             self.first += 1;
-            self.add(held);
+            self.empty.push(held);
         }
-    }
-
-    fn add(&mut self, mut held: Vec<Contribution>) {
-        self.scores.add_held(&mut held);
-        self.empty.push(held);
     }
 }
 
@@ -251,8 +279,14 @@ impl<'a, R: Rivals> LaneWalk<'a, R> {
     }
 
     /// Follows the path outside until it is inside, and puts it into its lane; false where it has ended.
-    fn enter(&mut self, lanes: &mut GuidedLanes<'a>, lane: usize, mut onward: Option<Onward>) -> bool {
-        let LaneWalk { walk, later, .. } = self;
+    fn enter(
+        &mut self,
+        lanes: &mut GuidedLanes<'a>,
+        lane: usize,
+        later: &mut Option<Later<GuidedBand<'a>>>,
+        mut onward: Option<Onward>,
+    ) -> bool {
+        let walk = &mut self.walk;
         while let Some(Onward { from, side }) = onward.or_else(|| walk.follow_refraction(later)) {
             if side == Side::Inside {
                 walk.bands.enter(from.point, from.normal, walk.ray.dir);

@@ -257,6 +257,12 @@ pub(crate) fn pair_level(keep_level: u32) -> u32 {
     keep_level.saturating_sub(1)
 }
 
+/// The pass after the last one of a batch.
+fn end_of_batch(pass: u64, keep_level: u32) -> u64 {
+    let is_of_all = 1_u64.checked_shl(keep_level).is_none();
+    if is_of_all { u64::MAX } else { ((pass >> keep_level) + 1) << keep_level }
+}
+
 impl Block {
     /// No passes yet, from pass `start` on.
     pub(crate) fn empty(start: u64, keep_level: u32) -> Block {
@@ -360,8 +366,9 @@ impl Passes {
         self.layout.image().filter(|_| self.stage == Stage::Main)
     }
 
-    /// Runs passes `start..end`; only the run itself keeps an image. `stop` is checked between passes; a
-    /// stopped block is discarded whole.
+    /// Runs passes `start..end`; only the run itself keeps an image. `stop` is checked between passes, or between those that
+    /// run together; a stopped block is discarded whole. Passes that run together have equal parts of their time. They are of
+    /// one batch, so that the times of batches are independent.
     pub(crate) fn run(
         &self,
         stage: Stage,
@@ -372,36 +379,52 @@ impl Passes {
     ) -> Option<Block> {
         self.set_up.prepare(&*self.estimator);
         let mut block = Block { bands: self.layout.bands(), ..Block::empty(start, keep_level) };
-        let mut scores = Scores::new(self.layout.clone());
+        let at_once = |group: &Group| self.estimator.passes_at_once(&group.bands);
+        let at_once = self.groups.iter().map(at_once).max().unwrap_or(1);
+        let mut all = vec![Scores::new(self.layout.clone())];
         let wall = Instant::now();
-        for pass in start..end {
+        let mut next = start;
+        while next < end {
             if stop() {
                 return None;
             }
-            scores.clear();
-            let counted = scores.cost;
+            let together = end.min(end_of_batch(next, keep_level)).min(next + at_once) - next;
+            if all.len() < together as usize {
+                all.resize_with(together as usize, || Scores::new(self.layout.clone()));
+            }
+            let all = &mut all[..together as usize];
+            all.iter_mut().for_each(Scores::clear);
+            let counted: Vec<_> = all.iter().map(|scores| scores.cost).collect();
             let before = thread_cpu_time();
             for group in &self.groups {
                 let key = match stage {
                     Stage::Pilot => group.pilot,
                     Stage::Main | Stage::Retest => group.main,
                 };
-                self.estimator.pass(&group.bands, &key.pass(pass), &mut scores);
+                let keys: Vec<_> = (next..next + together).map(|pass| key.pass(pass)).collect();
+                self.estimator.passes(&group.bands, &keys, all);
             }
-            let spent = thread_cpu_time().saturating_sub(before);
-            block.work.push(Work {
-                cost: std::array::from_fn(|i| scores.cost[i] - counted[i]),
-                cpu_seconds: spent.as_secs_f64(),
-                ..Work::default()
-            });
-            // Blocks are appended to each other, so that those without an image hold empty ones.
-            let image = if stage == Stage::Main { scores.pixels.clone() } else { Vec::new() };
-            block.pair_with(&image);
-            block.moments.push(scores.observables.iter().map(|&x| Moments::of(x)).collect());
-            block.pixels.push(ImageMoments::of(image));
+            let spent = thread_cpu_time().saturating_sub(before).as_secs_f64() / together as f64;
+            for (scores, counted) in all.iter().zip(counted) {
+                block.work.push(Work {
+                    cost: std::array::from_fn(|i| scores.cost[i] - counted[i]),
+                    cpu_seconds: spent,
+                    ..Work::default()
+                });
+                // Blocks are appended to each other, so that those without an image hold empty ones.
+                let image = if stage == Stage::Main { scores.pixels.clone() } else { Vec::new() };
+                block.pair_with(&image);
+                block.moments.push(scores.observables.iter().map(|&x| Moments::of(x)).collect());
+                block.pixels.push(ImageMoments::of(image));
+            }
+            next += together;
+        }
+        let mut anomalies = [0; Anomaly::ALL.len()];
+        for scores in &all {
+            anomalies.iter_mut().zip(scores.anomalies).for_each(|(sum, count)| *sum += count);
         }
         block.tally = Tally {
-            anomalies: scores.anomalies,
+            anomalies,
             wall_seconds: wall.elapsed().as_secs_f64(),
             processes: 0,
             set_up_seconds: self.set_up.seconds(),
@@ -412,13 +435,14 @@ impl Passes {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::{Arc, Mutex};
     use std::time::Duration;
 
     use super::*;
     use crate::experiment::registry::Registry;
     use crate::experiment::{self, LoadOptions};
     use crate::run::plan;
-    use crate::sampling::stream::PassKey;
+    use crate::sampling::stream::{PassKey, Purpose};
 
     fn image(pass: u64) -> Vec<f64> {
         (0..6).map(|i| ((pass * 6 + i) as f64 * 0.618_033_988_749_895).fract().powi(3)).collect()
@@ -464,6 +488,55 @@ mod tests {
         let each: Vec<f64> = block.work.nodes().iter().map(|node| node.value.cpu_seconds).collect();
         assert!(each.len() == 4 && each.iter().all(|seconds| *seconds >= 6e-3), "{each:?}");
         assert!(block.cpu_seconds() <= all, "{each:?} of {all} s");
+    }
+
+    /// Runs passes one by one or five together, and scores the first number of each. Notes how many it was given at once.
+    struct Counting {
+        at_once: u64,
+        given: Arc<Mutex<Vec<usize>>>,
+    }
+
+    impl Estimator for Counting {
+        fn pass(&self, _: &[usize], key: &PassKey, scores: &mut Scores) {
+            scores.count(Cost::Paths);
+            scores.observables[0] += key.stream(0, Purpose::Walk).draw();
+        }
+
+        fn passes(&self, bands: &[usize], keys: &[PassKey], scores: &mut [Scores]) {
+            self.given.lock().expect("one thread").push(keys.len());
+            keys.iter().zip(scores).for_each(|(key, scores)| self.pass(bands, key, scores));
+        }
+
+        fn passes_at_once(&self, _: &[usize]) -> u64 {
+            self.at_once
+        }
+    }
+
+    // Batches of 8 passes, of which the first has only the last 6 here and the last only the first: 5 + 1, 5 + 3, 5 + 3, 1.
+    #[test]
+    fn passes_that_run_together_are_of_one_batch() {
+        let run = |at_once: u64| {
+            let file = concat!(env!("CARGO_MANIFEST_DIR"), "/experiments/compare/nine-cells.toml");
+            let registry = Registry::builtin();
+            let options = LoadOptions { sets: Vec::new(), setting: None };
+            let experiment =
+                experiment::load(file.as_ref(), &options, &registry).expect("an experiment");
+            let mut plan = plan(&experiment, &registry).expect("a plan");
+            let Task::Estimate(passes) = &mut plan.jobs[0].task else { panic!("passes") };
+            let given = Arc::default();
+            passes.estimator = Box::new(Counting { at_once, given: Arc::clone(&given) });
+            passes.groups.truncate(1);
+            let block = passes.run(Stage::Main, 2, 25, 3, &|| false).expect("23 passes");
+            let given = given.lock().expect("one thread").clone();
+            (given, block)
+        };
+        let ((one_by_one, of_one), (together, of_five)) = (run(1), run(5));
+        assert_eq!((one_by_one, together), (vec![1; 23], vec![5, 1, 5, 3, 5, 3, 1]));
+        assert_eq!((&of_five.moments, &of_five.pixels), (&of_one.moments, &of_one.pixels));
+        let costs = |block: &Block| -> Vec<_> {
+            block.work.nodes().iter().map(|node| (node.level, node.value.cost)).collect()
+        };
+        assert_eq!(costs(&of_five), costs(&of_one));
     }
 
     // (1 - 3)^2 / 2 = 2 and (0 - 1)^2 / 2 in the first band of two pixels, 0 and 8 in the second.

@@ -30,6 +30,7 @@ mod subdivision;
 mod two_bounce;
 
 use std::cell::RefCell;
+use std::slice::{from_mut, from_ref};
 use std::sync::{Arc, OnceLock};
 
 use super::bands::{MAX_SHARED, OneBand, SharedBands, WalkBands};
@@ -37,7 +38,9 @@ use super::connection::{self, Conic};
 use super::field::Path;
 use super::guidance::{Finder, GuidedBand};
 use super::illumination::unscattered_notes;
-use super::walk::{CameraWalk, Unrivalled, may_fly_side_by_side, trace_alone, trace_side_by_side};
+use super::walk::{
+    CameraWalk, Unrivalled, may_fly_side_by_side, passes_at_once, trace_alone, trace_side_by_side,
+};
 use super::warm_up::TaughtField;
 use super::{BandUse, Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::{Error, Result};
@@ -222,33 +225,41 @@ impl Estimator for Snee {
     }
 
     fn pass(&self, bands: &[usize], key: &PassKey, scores: &mut Scores) {
+        self.passes(bands, from_ref(key), from_mut(scores));
+    }
+
+    fn passes(&self, bands: &[usize], keys: &[PassKey], scores: &mut [Scores]) {
         let field = self.walks.field();
         let setups = self.setups_in_use();
         let rays = field.scene.sensor.rays_per_pass();
         if self.options.share_bands {
-            for index in 0..rays {
-                let path = Path { field, band: self.hero(key, index), index, key };
-                self.trace(&setups[0], None, path, scores);
-            }
-        } else {
-            for &band in bands {
-                if setups[band].guides.is_empty() {
-                    trace_alone(field, band, key, scores);
-                    continue;
-                }
-                let setup = &setups[band];
-                if let Some(guidance) =
-                    field.guidance(band).filter(|_| may_fly_side_by_side(field, band))
-                {
-                    let connections = |path: &Path| Connections::of_path(setup, path);
-                    trace_side_by_side(field, band, key, guidance, scores, connections);
-                    continue;
-                }
+            for (key, scores) in keys.iter().zip(scores) {
                 for index in 0..rays {
-                    self.trace(setup, None, Path { field, band, index, key }, scores);
+                    let path = Path { field, band: self.hero(key, index), index, key };
+                    self.trace(&setups[0], None, path, scores);
+                }
+            }
+            return;
+        }
+        for &band in bands {
+            let setup = &setups[band];
+            if setup.guides.is_empty() {
+                trace_alone(field, band, keys, scores);
+            } else if let Some(guidance) = may_fly_side_by_side(field, band) {
+                let connections = |path: &Path| Connections::of_path(setup, path);
+                trace_side_by_side(field, band, keys, guidance, scores, connections);
+            } else {
+                for (key, scores) in keys.iter().zip(&mut *scores) {
+                    for index in 0..rays {
+                        self.trace(setup, None, Path { field, band, index, key }, scores);
+                    }
                 }
             }
         }
+    }
+
+    fn passes_at_once(&self, bands: &[usize]) -> u64 {
+        if self.options.share_bands { 1 } else { passes_at_once(self.walks.field(), bands) }
     }
 
     fn band_use(&self) -> BandUse {

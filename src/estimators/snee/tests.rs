@@ -201,21 +201,27 @@ fn connections_side_by_side_are_connections_one_by_one() {
         let scene = Arc::new(Scene { shape: Arc::new(body.clone()), lights, ..sphere });
         let snee = Snee::new(scene.clone(), options.clone()).expect("a scene that it serves");
         let field = snee.walks.field();
-        let key = StreamKey::named("connections_side_by_side_are_connections_one_by_one").pass(0);
-        let mut both = [Scores::new(Layout::new(&scene)), Scores::new(Layout::new(&scene))];
-        let [side_by_side, one_by_one] = &mut both;
-        snee.pass(&[0, 1], &key, side_by_side);
+        let key = StreamKey::named("connections_side_by_side_are_connections_one_by_one");
+        let keys = [0, 1].map(|pass| key.pass(pass));
+        let new = || keys.map(|_| Scores::new(Layout::new(&scene)));
+        let [mut side_by_side, mut one_by_one] = [new(), new()];
+        assert!(snee.passes_at_once(&[0, 1]) > 1);
+        snee.passes(&[0, 1], &keys, &mut side_by_side);
         for band in [0, 1] {
-            assert!(field.guidance(band).is_some() && may_fly_side_by_side(field, band));
-            for index in 0..scene.sensor.rays_per_pass() {
-                snee.trace(&snee.setups[band], None, Path { field, band, index, key: &key }, one_by_one);
+            assert!(may_fly_side_by_side(field, band).is_some());
+            for (key, one_by_one) in keys.iter().zip(&mut one_by_one) {
+                for index in 0..scene.sensor.rays_per_pass() {
+                    snee.trace(&snee.setups[band], None, Path { field, band, index, key }, one_by_one);
+                }
             }
         }
-        assert_eq!(bits(&side_by_side.observables), bits(&one_by_one.observables));
-        assert_eq!(side_by_side.cost, one_by_one.cost);
-        assert_eq!(side_by_side.anomalies, one_by_one.anomalies);
-        assert!(one_by_one.observables.iter().any(|&score| score > 0.0));
-        events += one_by_one.cost[Cost::MediumEvents as usize];
+        for (side_by_side, one_by_one) in side_by_side.iter().zip(&one_by_one) {
+            assert_eq!(bits(&side_by_side.observables), bits(&one_by_one.observables));
+            assert_eq!(side_by_side.cost, one_by_one.cost);
+            assert_eq!(side_by_side.anomalies, one_by_one.anomalies);
+            assert!(one_by_one.observables.iter().any(|&score| score > 0.0));
+            events += one_by_one.cost[Cost::MediumEvents as usize];
+        }
     }
     assert!(events > 30_000, "{events} events");
 }
