@@ -18,7 +18,8 @@ pub trait Estimator: Send + Sync {
         keys.iter().zip(scores).for_each(|(key, scores)| self.pass(bands, key, scores));
     }
 
-    /// How many passes of these bands cost less together than one by one.
+    /// How many passes of these bands are to run together, at least 1: as many as cost less so than one by one. Asked for after
+    /// [`Estimator::prepare`].
     fn passes_at_once(&self, bands: &[usize]) -> u64 {
         let _ = bands;
         1

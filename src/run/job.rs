@@ -380,7 +380,7 @@ impl Passes {
         self.set_up.prepare(&*self.estimator);
         let mut block = Block { bands: self.layout.bands(), ..Block::empty(start, keep_level) };
         let at_once = |group: &Group| self.estimator.passes_at_once(&group.bands);
-        let at_once = self.groups.iter().map(at_once).max().unwrap_or(1);
+        let at_once = self.groups.iter().map(at_once).max().unwrap_or(1).max(1);
         let mut all = vec![Scores::new(self.layout.clone())];
         let wall = Instant::now();
         let mut next = start;
