@@ -162,7 +162,7 @@ impl Gather for Shooting<'_> {
             let u_light = streams.lights.draw3();
             let ray = Ray { origin, dir: square_to_cap(2.0, u) };
             scores.count(Cost::Rays);
-            let Some(hit) = shape.intersect(&ray, Side::Inside, None, f64::INFINITY) else {
+            let Some(hit) = shape.leave(&ray) else {
                 if shape.bounds().is_some() {
                     scores.note(Anomaly::LostRay);
                 }

@@ -83,7 +83,7 @@ fn scattered(
     let arrival = bssrdf.illumination.draw(scene, band, u)?;
     let to_light = Ray { origin: vertex, dir: arrival.wi };
     scores.count(Cost::Rays);
-    let Some(hit) = scene.shape.intersect(&to_light, Side::Inside, None, f64::INFINITY) else {
+    let Some(hit) = scene.shape.leave(&to_light) else {
         if scene.shape.bounds().is_some() {
             scores.note(Anomaly::LostRay);
         }

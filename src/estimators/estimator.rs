@@ -20,8 +20,7 @@ pub trait Estimator: Send + Sync {
 
     /// How many passes of these bands are to run together, at least 1: as many as cost less so than one by one. Asked for after
     /// [`Estimator::prepare`].
-    fn passes_at_once(&self, bands: &[usize]) -> u64 {
-        let _ = bands;
+    fn passes_at_once(&self, _bands: &[usize]) -> u64 {
         1
     }
 

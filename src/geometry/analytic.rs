@@ -233,9 +233,9 @@ mod tests {
             for _ in 0..RAYS {
                 let origin = DVec3::new(0.0, 0.0, -0.1);
                 let ray = Ray { origin, dir: direction(&mut u) };
-                let Some(hit) = shape.intersect(&ray, Side::Inside, None, f64::INFINITY) else {
-                    continue;
-                };
+                let hit = shape.leave(&ray);
+                assert_eq!(hit, shape.intersect(&ray, Side::Inside, None, f64::INFINITY));
+                let Some(hit) = hit else { continue };
                 let away = Ray { origin: hit.point, dir: -inward(hit.normal, &mut u) };
                 assert!(!shape.occluded(&away, Some(hit.face)), "{shape:?} {away:?}");
             }

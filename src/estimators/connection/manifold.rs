@@ -17,7 +17,7 @@
 use super::facet::{SolverWork, TOLERANCE};
 use super::patch::SurfacePatch;
 use super::throughput::{Constraint, Judgement, Query, Root};
-use crate::geometry::{Hit, Ray, Shape, Side};
+use crate::geometry::{Hit, Ray, Shape};
 use crate::math::{DVec3, Frame};
 use crate::sampling::stream::Stream;
 use crate::sampling::warp::square_to_cap;
@@ -37,7 +37,7 @@ const LEAST_SHARE: f64 = 1.0 / 4096.0;
 const SAME: f64 = 1e-6;
 
 fn first_hit(shape: &Shape, x: DVec3, dir: DVec3) -> Option<Hit> {
-    shape.intersect(&Ray { origin: x, dir }, Side::Inside, None, f64::INFINITY)
+    shape.leave(&Ray { origin: x, dir })
 }
 
 fn patch_of(shape: &Shape, hit: &Hit) -> SurfacePatch {

@@ -7,7 +7,7 @@
 use super::facet::SolverWork;
 use super::patch::SurfacePatch;
 use super::throughput::{Query, Root, solid_angle_ratio};
-use crate::geometry::{Hit, Ray, Shape, Side};
+use crate::geometry::{Hit, Ray, Shape};
 use crate::optics::fresnel::fresnel;
 
 /// The first crossing of the straight ray; its focusing as if it were the whole truth, eta^2 / J = 1.
@@ -30,7 +30,7 @@ pub(super) fn root(shape: &Shape, query: &Query, work: &mut SolverWork) -> Optio
 
 fn first(shape: &Shape, query: &Query) -> Option<Hit> {
     let ray = Ray { origin: query.x, dir: query.w_l };
-    shape.intersect(&ray, Side::Inside, None, f64::INFINITY)
+    shape.leave(&ray)
 }
 
 /// The root without refraction, eta = 1, where w is w_L: all later crossings are hidden behind the

@@ -23,7 +23,7 @@ use super::diffusion::{Diffusion, growth_of_flights};
 use super::exit::{ExitPlane, ExitRule, REACH, unit};
 use super::incidence::{LetIn, TransmittedLight};
 use super::rule::GuideRule;
-use crate::geometry::{self, Ray, Shape, Side};
+use crate::geometry::{self, Ray, Shape};
 use crate::math::{DVec3, Vec3, exp, ln, ln_1p};
 use crate::optics::boundary::Boundary;
 use crate::optics::guided::{Escape, Pull, StepGuide, bend};
@@ -113,7 +113,7 @@ impl Importance {
         let incidence = TransmittedLight::new(scene, rule.finder);
         let bands = 0..scene.bands();
         let let_in = |origin: DVec3, dir: DVec3| {
-            let hit = scene.shape.intersect(&Ray { origin, dir }, Side::Inside, None, f64::INFINITY)?;
+            let hit = scene.shape.leave(&Ray { origin, dir })?;
             Some(incidence.irradiance(&hit))
         };
         match *scene.shape {
@@ -468,7 +468,7 @@ impl Cells {
             let mut dir = DVec3::ZERO;
             dir[axis] = sign;
             let ray = Ray { origin: self.lattice.middle(index), dir };
-            let hit = shape.intersect(&ray, Side::Inside, None, f64::INFINITY)?;
+            let hit = shape.leave(&ray)?;
             let lean = hit.normal.dot(dir).abs();
             let distance = hit.t.min(self.lattice.spacing);
             Some(Border { at: hit.point, lean, distance, let_in: incidence.irradiance(&hit) })
@@ -513,7 +513,7 @@ impl Cells {
                 let mut dir = DVec3::ZERO;
                 dir[axis] = sign;
                 let ray = Ray { origin: middle, dir };
-                let hit = shape.intersect(&ray, Side::Inside, None, f64::INFINITY)?;
+                let hit = shape.leave(&ray)?;
                 Some((hit.normal.dot(hit.point - middle), face, hit))
             };
             let nearest = (0..6).filter_map(ahead).min_by(|a, b| a.0.total_cmp(&b.0));
