@@ -69,6 +69,11 @@ pub(super) trait WalkBands: Clone {
         1.0
     }
 
+    /// The walk has arrived at a medium vertex by flights that it made in a lane, with this density up to there, over that of a
+    /// plain walk.
+    #[inline]
+    fn arrive(&mut self, _ratio: f64) {}
+
     /// The factor that roulette sees at a scattering event, for the medium of the walk's own band.
     #[inline]
     fn survival(&self, medium: &Medium) -> f64 {

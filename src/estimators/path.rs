@@ -25,7 +25,7 @@ use serde::Deserialize;
 
 use super::guidance::{Finder, WalkDraw, pays_beside_light_samples};
 use super::illumination::unscattered_notes;
-use super::walk::{passes_at_once, trace_alone};
+use super::walk::{Unrivalled, passes_at_once, trace_passes};
 use super::warm_up::TaughtField;
 use super::{Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::Result;
@@ -108,7 +108,7 @@ impl Estimator for PathTracer {
     fn passes(&self, bands: &[usize], keys: &[PassKey], scores: &mut [Scores]) {
         let field = self.walks.field();
         for &band in bands {
-            trace_alone(field, band, keys, scores);
+            trace_passes(field, band, keys, scores, |_| Unrivalled);
         }
     }
 

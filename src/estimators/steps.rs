@@ -81,6 +81,15 @@ const FIRST: usize = 4;
 /// Mean free paths in half a body's size from which it pays to draw steps ahead.
 const LEAST_SIZE: f64 = 2.0;
 
+/// Half the size of a body, mm.
+#[inline]
+pub(super) fn half_size(shape: &Shape, bounds: Option<BoundingSphere>) -> f64 {
+    match *shape {
+        Shape::Slab { thickness } => 0.5 * thickness,
+        _ => bounds.map_or(f64::INFINITY, |bounds| bounds.radius),
+    }
+}
+
 /// Steps of a plain walk that are drawn ahead.
 pub(super) struct StepsAhead<'a> {
     rule: StepRule<'a>,
@@ -105,11 +114,7 @@ impl<'a> StepsAhead<'a> {
     /// Whether a walk in this body makes enough flights between two meetings with the boundary.
     #[inline]
     pub(super) fn pay(shape: &Shape, bounds: Option<BoundingSphere>, sigma_t: f64) -> bool {
-        let size = match *shape {
-            Shape::Slab { thickness } => 0.5 * thickness,
-            _ => bounds.map_or(f64::INFINITY, |bounds| bounds.radius),
-        };
-        sigma_t > 0.0 && size * sigma_t > LEAST_SIZE
+        sigma_t > 0.0 && half_size(shape, bounds) * sigma_t > LEAST_SIZE
     }
 
     #[inline(always)]

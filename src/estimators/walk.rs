@@ -32,7 +32,9 @@ use crate::sampling::stream::{Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::sensor::PathMeasure;
 
-pub(super) use lanes::{may_fly_side_by_side, passes_at_once, trace_alone, trace_side_by_side};
+#[cfg(test)]
+pub(super) use lanes::may_fly_side_by_side;
+pub(super) use lanes::{passes_at_once, trace_passes};
 pub(super) use rivals::{Rivals, Unrivalled};
 
 /// How the path's current direction was drawn, as light sampling sees it.

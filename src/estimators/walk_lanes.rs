@@ -1,4 +1,4 @@
-//! Guided walks side by side: several paths are inside the body at the same time, one in each lane, and fly and scatter
+//! Walks side by side: several paths are inside the body at the same time, one in each lane, and fly and scatter
 //! together. A path that meets the boundary goes on alone until it is inside again, or ends; then its lane takes the next path,
 //! of the same pass or of the next one: only after the last path of the last pass do lanes run empty.
 //!
@@ -11,10 +11,12 @@
 
 use std::collections::VecDeque;
 
-use super::{CameraWalk, Later, Onward, Rivals, Unrivalled, Unscattered, flights};
+use super::{CameraWalk, Later, Onward, Rivals, Unscattered, flights};
 use crate::estimators::bands::{OneBand, WalkBands};
 use crate::estimators::field::{Field, Path};
-use crate::estimators::guidance::{Guidance, GuidedBand, GuidedLanes, LaneVertex};
+use crate::estimators::guidance::{GuidedBand, GuidedLanes};
+use crate::estimators::lanes::{LaneVertex, WalkLanes};
+use crate::estimators::plain_lanes::PlainLanes;
 use crate::estimators::scores::Contribution;
 use crate::estimators::steps::StepRule;
 use crate::estimators::vertices::WalkVertex;
@@ -24,22 +26,23 @@ use crate::optics::guided::LANES;
 use crate::sampling::stream::PassKey;
 
 /// A path.
-struct LaneWalk<'a, R> {
+struct LaneWalk<'a, R, B> {
     /// Its number among those of all passes.
     number: usize,
-    walk: CameraWalk<'a, R, GuidedBand<'a>>,
+    walk: CameraWalk<'a, R, B>,
     /// Medium vertices that the rivals have passed and the history of the path does not have yet.
     passed: u64,
 }
 
 /// The paths of some passes in one band, pass after pass.
-struct Paths<'a, 's, N> {
+struct Paths<'a, 's, N, B> {
     /// The rivals of a path.
     rivals: N,
     field: &'a Field,
     band: usize,
     keys: &'a [PassKey],
-    guidance: &'a Guidance,
+    /// Of a path at the sensor.
+    bands: B,
     /// Number of the first that has not begun, and how many a pass has.
     next: usize,
     per_pass: usize,
@@ -49,43 +52,56 @@ struct Paths<'a, 's, N> {
     first: usize,
     ended: VecDeque<Option<Vec<Contribution>>>,
     /// The refracted ray of the first hit of each lane's path, until it is followed: apart from the walk, which moves.
-    later: [Option<Later<GuidedBand<'a>>>; LANES],
+    later: [Option<Later<B>>; LANES],
     /// Without contributions, to be filled again.
     empty: Vec<Vec<Contribution>>,
 }
 
-/// Traces the paths of passes in one band, without techniques beside unidirectional sampling.
-pub(in crate::estimators) fn trace_alone(
+/// Traces the paths of passes in one band, each with the rivals that it is given.
+pub(in crate::estimators) fn trace_passes<R: Rivals>(
     field: &Field,
     band: usize,
     keys: &[PassKey],
     scores: &mut [Scores],
+    rivals: impl Fn(&Path) -> R,
 ) {
-    if let Some(guidance) = may_fly_side_by_side(field, band) {
-        return trace_side_by_side(field, band, keys, guidance, scores, |_| Unrivalled);
-    }
-    for (key, scores) in keys.iter().zip(scores) {
-        for index in 0..field.scene.sensor.rays_per_pass() {
-            let path = Path { field, band, index, key };
-            match field.guidance(band) {
-                Some(guidance) => {
-                    let guided = GuidedBand::new(guidance, &field.scene.medium[band]);
-                    CameraWalk::trace(path, scores, Unrivalled, guided)
+    let medium = &field.scene.medium[band];
+    let rule = StepRule { medium, roulette: field.roulette, survival: medium.albedo };
+    match (field.guidance(band), may_fly_side_by_side(field, band)) {
+        (Some(guidance), true) => {
+            let guided = (GuidedLanes::new(guidance, rule), GuidedBand::new(guidance, medium));
+            trace_side_by_side(field, band, keys, scores, rivals, guided);
+        }
+        (None, true) => {
+            let plain = (PlainLanes::new(rule), OneBand);
+            trace_side_by_side(field, band, keys, scores, rivals, plain);
+        }
+        (guidance, false) => {
+            for (key, scores) in keys.iter().zip(scores) {
+                for index in 0..field.scene.sensor.rays_per_pass() {
+                    let path = Path { field, band, index, key };
+                    match guidance {
+                        Some(guidance) => {
+                            let guided = GuidedBand::new(guidance, medium);
+                            CameraWalk::trace(path, scores, rivals(&path), guided)
+                        }
+                        None => CameraWalk::trace(path, scores, rivals(&path), OneBand),
+                    };
                 }
-                None => CameraWalk::trace(path, scores, Unrivalled, OneBand),
-            };
+            }
         }
     }
 }
 
-/// What guides the walks in this band if they may be traced side by side: inside they only fly, scatter and call rivals.
-pub(in crate::estimators) fn may_fly_side_by_side(field: &Field, band: usize) -> Option<&Guidance> {
+/// Whether walks in this band are traced side by side: where inside they only fly, scatter and call rivals, and where it pays.
+pub(in crate::estimators) fn may_fly_side_by_side(field: &Field, band: usize) -> bool {
     let scene = &field.scene;
     let medium = &scene.medium[band];
     let is_matched = matches!(scene.boundary[band], super::Boundary::Matched);
     let may =
         medium.sigma_t > 0.0 && medium.emission == 0.0 && !is_matched && scene.sensor.measure().is_off();
-    field.guidance(band).filter(|_| may)
+    may && (field.guidance(band).is_some()
+        || PlainLanes::pay(&scene.shape, field.bounds, medium.sigma_t))
 }
 
 /// So many paths keep lanes full for nearly all of the time.
@@ -93,22 +109,22 @@ const MANY_PATHS: usize = 2048;
 
 /// How many passes of these bands are traced together, so that walks that fly side by side fill their lanes.
 pub(in crate::estimators) fn passes_at_once(field: &Field, bands: &[usize]) -> u64 {
-    if bands.iter().any(|&band| may_fly_side_by_side(field, band).is_some()) {
+    if bands.iter().any(|&band| may_fly_side_by_side(field, band)) {
         MANY_PATHS.div_ceil(field.scene.sensor.rays_per_pass()) as u64
     } else {
         1
     }
 }
 
-/// Traces the paths of passes in a band with the guidance by [`may_fly_side_by_side`], with the scores and counts of
-/// [`CameraWalk::trace`] of one after the other.
-pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
+/// Traces the paths of passes in a band in lanes that are still empty, with the scores and counts of [`CameraWalk::trace`] of one after the
+/// other.
+fn trace_side_by_side<R: Rivals, L: WalkLanes>(
     field: &Field,
     band: usize,
     keys: &[PassKey],
-    guidance: &Guidance,
     scores: &mut [Scores],
     rivals: impl Fn(&Path) -> R,
+    (mut lanes, bands): (L, L::Bands),
 ) {
     let Some(first) = scores.first() else { return };
     let mut holding: [Scores; LANES] = std::array::from_fn(|_| first.holding());
@@ -118,7 +134,7 @@ pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
         field,
         band,
         keys,
-        guidance,
+        bands,
         next: 0,
         per_pass,
         scores,
@@ -127,10 +143,7 @@ pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
         later: [const { None }; LANES],
         empty: Vec::new(),
     };
-    let medium = &field.scene.medium[band];
-    let rule = StepRule { medium, roulette: field.roulette, survival: medium.albedo };
-    let mut lanes = GuidedLanes::new(guidance, rule);
-    let mut walks: [Option<LaneWalk<'_, R>>; LANES] = [const { None }; LANES];
+    let mut walks: [Option<LaneWalk<'_, R, L::Bands>>; LANES] = [const { None }; LANES];
     for (lane, holding) in holding.iter_mut().enumerate() {
         let onward = paths.begin(lane, &mut walks[lane], holding);
         paths.go_on(&mut lanes, lane, &mut walks[lane], onward);
@@ -138,7 +151,7 @@ pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
     while walks.iter().any(Option::is_some) {
         let shape = &field.scene.shape;
         let any = walks.iter().flatten().next().filter(|_| !R::IS_SILENT);
-        let bounds = any.and_then(|any| any.walk.rivals.bounds(shape, lanes.ends()));
+        let bounds = any.and_then(|any| any.walk.rivals.bounds(shape, lanes.flights().ends));
         let survives = lanes.scatter(|lane, vertex| {
             if !R::IS_SILENT
                 && let Some(walk) = &mut walks[lane]
@@ -147,10 +160,10 @@ pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
             }
         });
         let is_clear = shape.are_clear(lanes.flights());
-        for lane in 0..LANES {
-            if survives[lane] && is_clear[lane] {
-                continue;
-            }
+        let mut others = lanes_that(|lane| !(survives[lane] && is_clear[lane]));
+        while others != 0 {
+            let lane = others.trailing_zeros() as usize;
+            others &= others - 1;
             let Some(walk) = &mut walks[lane] else { continue };
             let onward = if survives[lane] {
                 match walk.end_flight(&mut lanes, lane) {
@@ -167,35 +180,40 @@ pub(in crate::estimators) fn trace_side_by_side<R: Rivals>(
     }
 }
 
-impl<'a, R: Rivals> CameraWalk<'a, R, GuidedBand<'a>> {
+/// A bit of each lane.
+#[inline(always)]
+fn lanes_that(is_one: impl Fn(usize) -> bool) -> u32 {
+    (0..LANES).fold(0, |all, lane| all | u32::from(is_one(lane)) << lane)
+}
+
+impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
     /// Has come to a medium vertex in a lane, and survived roulette.
     #[inline(never)]
     fn call_from_lane(&mut self, vertex: LaneVertex<'_>) {
         self.ray = vertex.ray();
-        [self.throughput, self.survival] = vertex.weights();
+        [self.throughput, self.survival] = *vertex.weights;
         (self.from, self.unscattered) = (None, Unscattered::No);
-        self.bands.arrive(vertex);
+        self.bands.arrive(vertex.ratio);
         self.history.scatter();
         R::call(self);
     }
 }
 
-impl<'a, R: Rivals, N: Fn(&Path) -> R> Paths<'a, '_, N> {
+impl<'a, R: Rivals, N: Fn(&Path) -> R, B: WalkBands> Paths<'a, '_, N, B> {
     /// Begins the next path, whose scores are held back; leaves nothing where none is left.
     fn begin(
         &mut self,
         lane: usize,
-        slot: &mut Option<LaneWalk<'a, R>>,
+        slot: &mut Option<LaneWalk<'a, R, B>>,
         holding: &'a mut Scores,
     ) -> Option<Onward> {
         *slot = None;
-        let Paths { field, band, keys, guidance, next: number, per_pass, .. } = *self;
+        let Paths { field, band, keys, next: number, per_pass, .. } = *self;
         let key = keys.get(number / per_pass)?;
         self.next += 1;
         self.ended.push_back(None);
         let path = Path { field, band, index: number % per_pass, key };
-        let guided = GuidedBand::new(guidance, &field.scene.medium[band]);
-        let walk = CameraWalk::start(path, holding, (self.rivals)(&path), guided);
+        let walk = CameraWalk::start(path, holding, (self.rivals)(&path), self.bands.clone());
         let LaneWalk { walk, .. } = slot.insert(LaneWalk { number, walk, passed: 0 });
         walk.meet_body(path, &mut self.later[lane])
     }
@@ -205,9 +223,9 @@ impl<'a, R: Rivals, N: Fn(&Path) -> R> Paths<'a, '_, N> {
     #[inline(never)]
     fn go_on(
         &mut self,
-        lanes: &mut GuidedLanes<'a>,
+        lanes: &mut impl WalkLanes<Bands = B>,
         lane: usize,
-        slot: &mut Option<LaneWalk<'a, R>>,
+        slot: &mut Option<LaneWalk<'a, R, B>>,
         mut onward: Option<Onward>,
     ) {
         while let Some(walk) = slot {
@@ -230,7 +248,7 @@ impl<'a, R: Rivals, N: Fn(&Path) -> R> Paths<'a, '_, N> {
 
     /// Whether the flight of a lane surely meets nothing.
     #[inline(always)]
-    fn is_clear(&self, lanes: &GuidedLanes<'a>, lane: usize) -> bool {
+    fn is_clear(&self, lanes: &impl WalkLanes<Bands = B>, lane: usize) -> bool {
         let (ray, t, end) = lanes.flight(lane);
         self.field.scene.shape.is_clear(&ray, end, t)
     }
@@ -256,14 +274,14 @@ enum FlightEnd {
     Elsewhere(Option<Onward>),
 }
 
-impl<'a, R: Rivals> LaneWalk<'a, R> {
+impl<R: Rivals, B: WalkBands> LaneWalk<'_, R, B> {
     /// Calls the rivals at a medium vertex that has survived roulette, with what they know of it. Where they pass it, the walk
     /// itself does not hear of it.
     #[inline(always)]
     fn call(&mut self, vertex: LaneVertex<'_>, bound: Option<f64>) {
         let Ray { origin: point, dir: arrival } = vertex.ray();
         if let Some(bound) = bound
-            && self.walk.rivals.passes(&WalkVertex { point, arrival, walks: vertex.ratio() }, bound)
+            && self.walk.rivals.passes(&WalkVertex { point, arrival, walks: vertex.ratio }, bound)
         {
             self.passed += 1;
         } else {
@@ -281,9 +299,9 @@ impl<'a, R: Rivals> LaneWalk<'a, R> {
     /// Follows the path outside until it is inside, and puts it into its lane; false where it has ended.
     fn enter(
         &mut self,
-        lanes: &mut GuidedLanes<'a>,
+        lanes: &mut impl WalkLanes<Bands = B>,
         lane: usize,
-        later: &mut Option<Later<GuidedBand<'a>>>,
+        later: &mut Option<Later<B>>,
         mut onward: Option<Onward>,
     ) -> bool {
         let walk = &mut self.walk;
@@ -302,7 +320,7 @@ impl<'a, R: Rivals> LaneWalk<'a, R> {
 
     /// Ends a flight that may have met the boundary. Where it has, the path leaves its lane, and meets the boundary.
     #[inline(never)]
-    fn end_flight(&mut self, lanes: &mut GuidedLanes<'a>, lane: usize) -> FlightEnd {
+    fn end_flight(&mut self, lanes: &mut impl WalkLanes<Bands = B>, lane: usize) -> FlightEnd {
         let walk = &mut self.walk;
         let (ray, t, _) = lanes.flight(lane);
         let from = walk.from.filter(|_| lanes.begun(lane) == 1);
@@ -328,7 +346,13 @@ impl<'a, R: Rivals> LaneWalk<'a, R> {
     }
 
     /// Takes the path out of its lane, where it has made so many flights, of which these have ended in the medium.
-    fn take_out(&mut self, lanes: &mut GuidedLanes<'a>, lane: usize, flights: u64, vertices: u64) {
+    fn take_out(
+        &mut self,
+        lanes: &mut impl WalkLanes<Bands = B>,
+        lane: usize,
+        flights: u64,
+        vertices: u64,
+    ) {
         let walk = &mut self.walk;
         walk.stream = lanes.take(lane);
         walk.scores.count_many(Cost::Rays, flights);

@@ -380,8 +380,10 @@ impl Passes {
         self.set_up.prepare(&*self.estimator);
         let mut block = Block { bands: self.layout.bands(), ..Block::empty(start, keep_level) };
         let at_once = |group: &Group| self.estimator.passes_at_once(&group.bands);
-        let at_once = self.groups.iter().map(at_once).max().unwrap_or(1).max(1);
+        let at_once = self.groups.iter().map(at_once).max().unwrap_or(1);
         let mut all = vec![Scores::new(self.layout.clone())];
+        let numbers = all[0].observables.len() + all[0].pixels.len();
+        let at_once = at_once.min(SCORES_AT_ONCE / numbers.max(1) as u64).max(1);
         let wall = Instant::now();
         let mut next = start;
         while next < end {
@@ -432,6 +434,9 @@ impl Passes {
         Some(block)
     }
 }
+
+/// The most numbers in the scores of passes that run together, 8 MB: they are to stay in the cache.
+const SCORES_AT_ONCE: u64 = 1 << 20;
 
 #[cfg(test)]
 mod tests {

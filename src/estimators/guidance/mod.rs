@@ -38,7 +38,7 @@ use importance::{FoundLanes, Importance};
 pub(super) use learned::{FoundLight, LearnedPulls, LearningCells, Lessons};
 pub(super) use rule::{Finder, GuideRule, pays_beside_light_samples};
 pub use slice::GuideSlice;
-pub(super) use steered::{GuidedBand, GuidedLanes, LaneVertex};
+pub(super) use steered::{GuidedBand, GuidedLanes};
 
 /// How walks are sampled inside the body; all choices are unbiased.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]

@@ -15,7 +15,7 @@
 
 mod lanes;
 
-pub(in crate::estimators) use lanes::{GuidedLanes, LaneVertex};
+pub(in crate::estimators) use lanes::GuidedLanes;
 
 use super::Guidance;
 use crate::estimators::bands::WalkBands;
@@ -57,12 +57,6 @@ impl<'a> GuidedBand<'a> {
             per_entry: 0.0,
             last: (DVec3::NAN, StepGuide::NONE, 0.0),
         }
-    }
-
-    /// The walk has arrived at a medium vertex, by flights that it made in a lane.
-    #[inline]
-    pub(in crate::estimators) fn arrive(&mut self, vertex: LaneVertex<'_>) {
-        (self.ratio, self.heading) = (vertex.ratio(), Heading::NONE);
     }
 
     #[inline(always)]
@@ -121,6 +115,11 @@ impl WalkBands for GuidedBand<'_> {
         // Finite, also where the plain walk's probability is 0 in double precision.
         self.ratio = (self.ratio * flown).min(f64::MAX);
         self.heading = Heading::NONE;
+    }
+
+    #[inline]
+    fn arrive(&mut self, ratio: f64) {
+        (self.ratio, self.heading) = (ratio, Heading::NONE);
     }
 
     #[inline]

@@ -38,9 +38,7 @@ use super::connection::{self, Conic};
 use super::field::Path;
 use super::guidance::{Finder, GuidedBand};
 use super::illumination::unscattered_notes;
-use super::walk::{
-    CameraWalk, Unrivalled, may_fly_side_by_side, passes_at_once, trace_alone, trace_side_by_side,
-};
+use super::walk::{CameraWalk, Unrivalled, passes_at_once, trace_passes};
 use super::warm_up::TaughtField;
 use super::{BandUse, Estimator, EstimatorKind, GuideSlice, Scores, Serves, read_options};
 use crate::error::{Error, Result};
@@ -244,16 +242,10 @@ impl Estimator for Snee {
         for &band in bands {
             let setup = &setups[band];
             if setup.guides.is_empty() {
-                trace_alone(field, band, keys, scores);
-            } else if let Some(guidance) = may_fly_side_by_side(field, band) {
-                let connections = |path: &Path| Connections::of_path(setup, path);
-                trace_side_by_side(field, band, keys, guidance, scores, connections);
+                trace_passes(field, band, keys, scores, |_| Unrivalled);
             } else {
-                for (key, scores) in keys.iter().zip(&mut *scores) {
-                    for index in 0..rays {
-                        self.trace(setup, None, Path { field, band, index, key }, scores);
-                    }
-                }
+                let connections = |path: &Path| Connections::of_path(setup, path);
+                trace_passes(field, band, keys, scores, connections);
             }
         }
     }

@@ -170,6 +170,12 @@ impl StepLanes {
         &self.origins
     }
 
+    /// Their directions.
+    #[inline(always)]
+    pub fn dirs(&self) -> &VectorLanes {
+        &self.dirs
+    }
+
     /// How far flights go if no boundary ends them.
     #[inline(always)]
     pub fn lengths(&self) -> &Lanes {

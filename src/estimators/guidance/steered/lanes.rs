@@ -2,41 +2,12 @@
 
 use super::{GuidedBand, importance};
 use crate::estimators::guidance::{FoundLanes, Guidance};
+use crate::estimators::lanes::{LaneVertex, WalkLanes};
 use crate::estimators::steps::{StepRule, Weights};
 use crate::geometry::{Flights, Ray};
 use crate::math::DVec3;
-use crate::optics::guided::{DrawLanes, GuideLanes, LANES, Lanes, StepLanes, VectorLanes, vector};
+use crate::optics::guided::{DrawLanes, GuideLanes, LANES, Lanes, StepLanes, vector};
 use crate::sampling::stream::Stream;
-
-/// A medium vertex of a walk that has survived roulette, before its direction is drawn. Each number is read where it is used:
-/// a copy of them that is written and read at once would stall.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::estimators) struct LaneVertex<'a> {
-    steps: &'a StepLanes,
-    weights: &'a Weights,
-    ratio: f64,
-    lane: usize,
-}
-
-impl LaneVertex<'_> {
-    /// The vertex and the direction of arrival.
-    #[inline(always)]
-    pub(in crate::estimators) fn ray(&self) -> Ray {
-        let [origin, dir] = self.steps.flight(self.lane);
-        Ray { origin, dir }
-    }
-
-    #[inline(always)]
-    pub(in crate::estimators) fn weights(&self) -> Weights {
-        *self.weights
-    }
-
-    /// Density of the walk up to here over that of a plain one.
-    #[inline(always)]
-    pub(in crate::estimators) fn ratio(&self) -> f64 {
-        self.ratio
-    }
-}
 
 /// Walks inside the body, each of which has begun a flight. An empty lane takes part in what is computed together, with numbers
 /// of no meaning, and draws none.
@@ -81,16 +52,12 @@ impl<'a> GuidedLanes<'a> {
             flights: [0; LANES],
         }
     }
+}
 
-    /// A walk that has come in goes on along its ray.
-    pub(in crate::estimators) fn put(
-        &mut self,
-        lane: usize,
-        band: &GuidedBand<'a>,
-        ray: &Ray,
-        weights: Weights,
-        stream: &Stream,
-    ) {
+impl<'a> WalkLanes for GuidedLanes<'a> {
+    type Bands = GuidedBand<'a>;
+
+    fn put(&mut self, lane: usize, band: &GuidedBand<'a>, ray: &Ray, weights: Weights, stream: &Stream) {
         self.is_empty[lane] = false;
         self.streams[lane] = stream.clone();
         let u = self.streams[lane].draw();
@@ -102,51 +69,35 @@ impl<'a> GuidedLanes<'a> {
         self.guidance.find(vector(self.steps.ends(), lane), lane, &mut self.found);
     }
 
-    /// Empties a lane; returns the stream of its walk, behind all numbers that it has drawn.
-    pub(in crate::estimators) fn take(&mut self, lane: usize) -> Stream {
+    fn take(&mut self, lane: usize) -> Stream {
         self.is_empty[lane] = true;
         self.streams[lane].clone()
     }
 
-    /// The state of a walk at the begin of its flight.
-    pub(in crate::estimators) fn state(&self, lane: usize, band: &mut GuidedBand<'a>) -> Weights {
+    fn state(&self, lane: usize, band: &mut GuidedBand<'a>) -> Weights {
         (band.ratio, band.heading) = self.steps.state(lane);
         self.weights[lane]
     }
 
-    /// The ray of a walk's flight, its length if no boundary ends it, and where it ends then.
     #[inline(always)]
-    pub(in crate::estimators) fn flight(&self, lane: usize) -> (Ray, f64, DVec3) {
+    fn flight(&self, lane: usize) -> (Ray, f64, DVec3) {
         let [origin, dir] = self.steps.flight(lane);
         (Ray { origin, dir }, self.steps.lengths()[lane], vector(self.steps.ends(), lane))
     }
 
-    /// All flights, if no boundary ends them.
     #[inline(always)]
-    pub(in crate::estimators) fn flights(&self) -> Flights<'_, LANES> {
+    fn flights(&self) -> Flights<'_, LANES> {
         let (origins, ends) = (self.steps.origins(), self.steps.ends());
         Flights { origins, ends, lengths: self.steps.lengths() }
     }
 
-    /// Where flights end, if no boundary ends them.
-    #[inline(always)]
-    pub(in crate::estimators) fn ends(&self) -> &VectorLanes {
-        self.steps.ends()
-    }
-
-    /// How many flights a walk has begun since it was put in.
     #[inline]
-    pub(in crate::estimators) fn begun(&self, lane: usize) -> u64 {
+    fn begun(&self, lane: usize) -> u64 {
         self.flights[lane]
     }
 
-    /// Ends all flights in the medium, and begins the next ones; returns which walks survive roulette. Each of these is told
-    /// of its vertex, before its direction is drawn.
     #[inline(always)]
-    pub(in crate::estimators) fn scatter(
-        &mut self,
-        mut arrive: impl FnMut(usize, LaneVertex<'_>),
-    ) -> [bool; LANES] {
+    fn scatter(&mut self, mut arrive: impl FnMut(usize, LaneVertex<'_>)) -> [bool; LANES] {
         let Guidance { turns, share, .. } = self.guidance;
         let StepRule { roulette, survival, .. } = self.rule;
         let ends = self.steps.ends();
@@ -165,7 +116,8 @@ impl<'a> GuidedLanes<'a> {
                 && roulette.survive([throughput, seen], survival, importance, stream).is_some();
             if goes_on[lane] {
                 let (weights, ratio) = (&self.weights[lane], ratios[lane]);
-                arrive(lane, LaneVertex { steps: &self.steps, weights, ratio, lane });
+                let (points, arrivals) = (self.steps.origins(), self.steps.dirs());
+                arrive(lane, LaneVertex { points, arrivals, weights, ratio, lane });
                 self.draws.draw(lane, turns, *share, &self.guides, || stream.draw());
             } else {
                 self.draws.end(lane);
