@@ -17,13 +17,20 @@
 //!   cost of walks + sum_t f_t cost of calls,
 //! by counted work ([`Prices`]), so that no bit depends on a clock. Chosen are the factors with the least variance times cost
 //! on a fixed ladder. A choice that only one half of the pairs prefers to the given options is noise; then these stay.
-//! Results are unbiased for any factor above 0. Emission along flights, which no call changes, is left out.
+//! Emission along flights, which no call changes, is left out of the prediction.
+//!
+//! Results are unbiased for any factors above 0. Subdivision may also have the factor 0, where BSDF and light sampling draw all
+//! its paths and the last vertex takes part: then what its calls have scored is dropped, x_t < 1 for all other scores, and the
+//! cost of its densities is saved, too. Without the last vertex, the weights of what is left could be as large as those of path
+//! tracing, whose rare large scores a warm-up does not see.
 
 use std::cell::RefCell;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::guide::Guide;
+use super::options::Strategies;
 use super::{BandSetup, Snee, SneeOptions};
 use crate::estimators::connection::SolverWork;
 use crate::estimators::field::Path;
@@ -66,6 +73,9 @@ const MORE: f64 = 4.0;
 
 /// Factors of the warm-up's probabilities to choose from.
 const LADDER: [f64; 6] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125];
+
+/// The same for a technique that may be left out.
+const LADDER_TO_NONE: [f64; 7] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.0];
 
 /// What work costs, ns on the machine that it was measured on; only ratios matter. Printed by
 ///
@@ -204,6 +214,10 @@ impl CallNotes {
             by_call.fill(0.0);
             let mut expected = 0.0;
             for NotedScore { call, value, parts } in &self.scores {
+                // Without calls of a technique there is no such score.
+                if call.is_some_and(|call| factors[self.calls[call] as usize] == 0.0) {
+                    continue;
+                }
                 let rarer: f64 =
                     factors.iter().zip(parts).map(|(factor, part)| (factor - 1.0) * part).sum();
                 let value = value / (1.0 + rarer);
@@ -261,7 +275,11 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
         if most[technique] > 0.0 { asked[technique] / most[technique] } else { 1.0 }
     };
     let mut candidates: Vec<PerTechnique> = vec![std::array::from_fn(of_given)];
-    let ladders = most.map(|most| if most > 0.0 { &LADDER[..] } else { &LADDER[..1] });
+    let mut ladders = most.map(|most| if most > 0.0 { &LADDER[..] } else { &LADDER[..1] });
+    let [subdivision, last_vertex, _] = &most;
+    if *subdivision > 0.0 && *last_vertex > 0.0 && snee.covers_without_subdivision(index) {
+        ladders[CalledTechnique::Subdivision as usize] = &LADDER_TO_NONE;
+    }
     for &a in ladders[0] {
         for &b in ladders[1] {
             candidates.extend(ladders[2].iter().map(|&c| [a, b, c]));
@@ -349,12 +367,27 @@ fn used_probabilities(
     }
 }
 
+impl Snee {
+    /// Whether BSDF and light sampling draw every path that subdivision of this setup draws.
+    fn covers_without_subdivision(&self, index: usize) -> bool {
+        let Strategies { bsdf, light, .. } = self.options.strategies;
+        let scene = self.walks.scene();
+        let is_alone = |guide: &Guide| scene.lights[guide.light].is_directional();
+        let is_found =
+            !scene.boundary[index].is_delta() || !self.setups[index].guides.iter().any(is_alone);
+        bsdf && light && is_found
+    }
+}
+
 impl SneeOptions {
     /// With calls `more` times as often, at most always, and then with these factors.
     fn with_calls(&self, more: f64, factors: PerTechnique) -> SneeOptions {
         let of =
             |most: f64, technique: CalledTechnique| (more * most).min(1.0) * factors[technique as usize];
         let mut options = self.clone();
+        if factors[CalledTechnique::Subdivision as usize] == 0.0 {
+            (options.strategies.top_to_bottom, options.strategies.bottom_to_top) = (false, false);
+        }
         options.call.most = of(self.call.most, CalledTechnique::Subdivision);
         options.call_alone.most = of(self.call_alone.most, CalledTechnique::Subdivision);
         if let Some(last) = &mut options.last_vertex {
@@ -375,7 +408,7 @@ impl ChosenCalls {
 }
 
 /// What was learned, for the reader of a record: numbers band by band, one where all bands have the same.
-pub(super) fn notes(setups: &[BandSetup]) -> Option<String> {
+pub(super) fn notes(given: &SneeOptions, setups: &[BandSetup]) -> Option<String> {
     let learned: Vec<(&BandSetup, ChosenCalls)> =
         setups.iter().filter_map(|setup| Some((setup, setup.chosen?))).collect();
     let list = |numbers: Vec<f64>| match &numbers[..] {
@@ -389,9 +422,8 @@ pub(super) fn notes(setups: &[BandSetup]) -> Option<String> {
             calls.push(format!("{name}.most = {}", list(numbers)));
         }
     };
-    let subdivides = |setup: &BandSetup| setup.options.strategies.subdivides();
-    add("call", &|setup| subdivides(setup).then_some(setup.options.call.most));
-    add("call_alone", &|setup| subdivides(setup).then_some(setup.options.call_alone.most));
+    add("call", &|setup| given.strategies.subdivides().then_some(setup.options.call.most));
+    add("call_alone", &|setup| given.strategies.subdivides().then_some(setup.options.call_alone.most));
     add("last_vertex", &|setup| setup.options.last_vertex.map(|last| last.most));
     add("connection", &|setup| setup.specular.as_ref().map(|technique| technique.call.most));
     let gains =

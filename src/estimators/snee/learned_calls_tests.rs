@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::super::options::BandWalks;
 use super::super::testing::{Lamp, ROUGH, SMOOTH, body, medium, ring, sphere};
-use super::super::{Snee, SneeChoices, TwoBounce};
+use super::super::{EdgeTechnique, LastVertex, Snee, SneeChoices, TwoBounce};
 use super::*;
 use crate::error::Result;
 use crate::estimators::{Estimator, WalkDraw};
@@ -70,7 +70,7 @@ fn mean_and_error(estimates: &[f64]) -> [f64; 2] {
 fn predicted_second_moments_are_those_of_runs() {
     const BATCHES: u64 = 250;
     const PATHS: u64 = 4000;
-    let candidates = vec![[1.0; 3], [0.25, 0.5, 0.25], [0.125, 0.25, 0.5]];
+    let candidates = vec![[1.0; 3], [0.25, 0.5, 0.25], [0.125, 0.25, 0.5], [0.0, 0.5, 1.0]];
     for (name, shape, boundary, connects) in
         [("rough", sphere(), ROUGH, false), ("smooth", ring(), SMOOTH, true)]
     {
@@ -179,7 +179,8 @@ fn choices_are_reproducible() {
 #[test]
 fn calls_follow_their_cost() {
     let rarest = [0.03125, 1.0, 1.0];
-    let mut notes = CallNotes::new(&Prices::ANALYTIC, vec![[1.0; 3], [0.5, 1.0, 1.0], rarest]);
+    let none = [0.0, 1.0, 1.0];
+    let mut notes = CallNotes::new(&Prices::ANALYTIC, vec![[1.0; 3], [0.5, 1.0, 1.0], rarest, none]);
     for path in 0..400 {
         if path % 2 == 0 {
             notes.weigh([0.5, 0.0, 0.0]);
@@ -194,7 +195,7 @@ fn calls_follow_their_cost() {
         notes.end_path(path / 4 % 2);
     }
     notes.squared_mean = [100.0; 2];
-    for (candidate, factor) in [1.0, 0.5, rarest[0]].into_iter().enumerate() {
+    for (candidate, factor) in [1.0, 0.5, rarest[0], 0.0].into_iter().enumerate() {
         // (v / 2 + f v / 2)^2 + v^2 / 4 + v^2 f / 2 (1 - f / 2), v = 2 / (1 + f): the mean is 1.
         let v = 2.0 / (1.0 + factor);
         let expected = 1.0 + v * v * (0.25 + 0.5 * factor * (1.0 - 0.5 * factor));
@@ -203,8 +204,46 @@ fn calls_follow_their_cost() {
     }
     assert_eq!(notes.choice(200, 1e9).factors, None, "what costs nothing stays");
     let dear = notes.choice(200, 1.0);
-    assert_eq!(dear.factors, Some(rarest));
+    assert_eq!(dear.factors, Some(none));
     assert!(dear.gain > 10.0, "{dear:?}");
+}
+
+/// Paths that subdivision alone finds are not scored without it.
+#[test]
+fn what_only_subdivision_finds_needs_it() {
+    let mut notes = CallNotes::new(&Prices::ANALYTIC, vec![[1.0; 3], [0.0, 1.0, 1.0]]);
+    notes.begin(Some(CalledTechnique::Subdivision));
+    notes.weigh([1.0, 0.0, 0.0]);
+    notes.score(3.0);
+    notes.begin(None);
+    notes.end_path(0);
+    assert_eq!(notes.second[0], [9.0, 0.0]);
+}
+
+/// Subdivision is left out where it costs more than it gains, and only where other techniques draw all its paths: not of
+/// parallel light through a smooth boundary, and not without BSDF or light sampling, or the last vertex.
+#[test]
+fn subdivision_is_left_out_where_all_paths_are_drawn_without_it() {
+    let covers = |boundary, lamp, choices: SneeChoices| {
+        let scene = flux(&sphere(), boundary, &[medium(10.0, 0.99, 0.0)], &[lamp]);
+        let snee = set_up(&scene, &choices, false).expect("served");
+        (snee.covers_without_subdivision(0), snee.setups_in_use()[0].options.strategies.subdivides())
+    };
+    let learn = || learning(16384);
+    let without = |technique: EdgeTechnique| {
+        let all = [EdgeTechnique::Bsdf, EdgeTechnique::Light, EdgeTechnique::TopToBottom];
+        let strategies = all.into_iter().filter(|other| *other != technique).collect();
+        SneeChoices { strategies: Some(strategies), least_concentration: Some(1.0), ..learn() }
+    };
+    let no_last = LastVertex { most: 0.0, decay: 0.0, wide_share: 0.0, wide: 0.2 };
+    let alone = SneeChoices { last_vertex: Some(no_last), ..learn() };
+    assert_eq!(covers(ROUGH, Lamp::Disc, learn()), (true, false), "left out");
+    assert_eq!(covers(ROUGH, Lamp::Disc, SneeChoices::default()), (true, true), "not learned");
+    assert_eq!(covers(ROUGH, Lamp::Disc, alone), (true, true), "no last vertex");
+    assert_eq!(covers(ROUGH, Lamp::Disc, without(EdgeTechnique::Bsdf)), (false, true));
+    assert_eq!(covers(ROUGH, Lamp::Disc, without(EdgeTechnique::Light)), (false, true));
+    assert_eq!(covers(SMOOTH, Lamp::Sun, learn()), (false, true));
+    assert!(covers(SMOOTH, Lamp::Disc, learn()).0);
 }
 
 #[test]

@@ -276,7 +276,7 @@ impl Estimator for Snee {
             missing_notes(scene, "subdivision from its end")
         };
         if let Some(learned) = self.learned.get() {
-            notes.extend(learned_calls::notes(learned));
+            notes.extend(learned_calls::notes(&self.options, learned));
         }
         if !(bsdf && light) {
             notes.push(
