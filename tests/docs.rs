@@ -513,3 +513,21 @@ fn the_layout_of_records_is_documented_as_it_is() {
     let without = page.replace("`anomalies`", "");
     assert_eq!(unnamed_keys(&without), ["anomalies"]);
 }
+
+/// The plot of how run time grows has the points of its table: each point's title states what it shows.
+#[test]
+fn the_plot_of_growth_has_the_points_of_its_table() {
+    let [table, plot] = ["results/published/speed/scaling.md", "docs/speed.svg"].map(text);
+    let mut points = 0;
+    for line in table.lines().skip(2) {
+        let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
+        let &[axis, value, run, passes, ..] = &cells[..] else { panic!("a row of {table}") };
+        for (curve, seconds) in [("run", run), ("passes", passes)] {
+            let title = format!("<title>{value} {axis}, {curve}: {seconds} s</title>");
+            assert!(plot.contains(&title), "docs/speed.svg has no `{title}`: `scripts/bench scaling`");
+            points += 1;
+        }
+    }
+    assert_eq!(points, plot.matches("<title>").count());
+    assert!(points > 20, "{points} points");
+}

@@ -142,13 +142,13 @@ impl WalkLanes for PlainLanes<'_> {
     fn scatter(&mut self, mut arrive: impl FnMut(usize, LaneVertex<'_>)) -> [bool; LANES] {
         let PlainSteps { dirs, ends, .. } = &self.steps;
         let mut goes_on = [false; LANES];
-        for lane in 0..LANES {
+        for (lane, goes_on) in goes_on.iter_mut().enumerate() {
             if self.is_empty[lane] {
                 continue;
             }
             self.streams[lane] = self.ahead.streams[lane].clone();
-            goes_on[lane] = self.ahead.survives[lane];
-            if goes_on[lane] {
+            *goes_on = self.ahead.survives[lane];
+            if *goes_on {
                 self.weights[lane] = self.ahead.weights[lane];
                 let weights = &self.weights[lane];
                 arrive(lane, LaneVertex { points: ends, arrivals: dirs, weights, ratio: 1.0, lane });
@@ -156,8 +156,8 @@ impl WalkLanes for PlainLanes<'_> {
         }
         let numbers = &self.ahead.numbers;
         vectorized(Departures { steps: &mut self.steps, rule: self.rule, numbers });
-        for lane in 0..LANES {
-            if goes_on[lane] {
+        for (lane, goes_on) in goes_on.into_iter().enumerate() {
+            if goes_on {
                 self.draw_ahead(lane);
             }
         }

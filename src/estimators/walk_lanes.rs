@@ -116,8 +116,8 @@ pub(in crate::estimators) fn passes_at_once(field: &Field, bands: &[usize]) -> u
     }
 }
 
-/// Traces the paths of passes in a band in lanes that are still empty, with the scores and counts of [`CameraWalk::trace`] of one after the
-/// other.
+/// Traces the paths of passes in a band in lanes, which are still empty, with the scores and counts of [`CameraWalk::trace`] of
+/// one after the other.
 fn trace_side_by_side<R: Rivals, L: WalkLanes>(
     field: &Field,
     band: usize,

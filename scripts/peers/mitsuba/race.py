@@ -39,11 +39,12 @@ from cells import mi  # noqa: E402
 
 PROGRAM = os.path.join(HERE, "..", "..", "..", "target", "release", "scatterproof")
 LUMPY = {"lumpy-20k": 5, "lumpy-82k": 6, "lumpy-1.3M": 8}
+# Name in the table, and in the experiment file.
 ESTIMATORS = {
-    "path": "path = {}",
-    "best-environment": "path = { walk = { guided = {} } }",
-    "best-disc": "snee = {}",
-    "best-directional": "snee = {}",
+    "path": ("path", "path = {}"),
+    "best-environment": ("guided walks", "path = { walk = { guided = {} } }"),
+    "best-disc": ("snee, learned calls", "snee = { learned_calls = {} }"),
+    "best-directional": ("snee, learned calls", "snee = { learned_calls = {} }"),
 }
 
 
@@ -207,7 +208,7 @@ def race(cell, obj, args, folder):
         sys.exit(f"{body}: no pixel sees nothing but the body")
     rows = []
     for kind in ["path", f"best-{light}"]:
-        text = ESTIMATORS[kind]
+        label, text = ESTIMATORS[kind]
         _, _, seconds = estimate(text, cell[1:], obj, 64, 1, folder)
         passes = max(64, round(64 * args.seconds / seconds))
         ours, theirs = [], {rival.variant: [] for rival, _ in peers}
@@ -246,7 +247,7 @@ def race(cell, obj, args, folder):
         z = (mine - statistics.fmean(their_means)) / math.hypot(own_error, statistics.stdev(their_means) / math.sqrt(len(their_means)))
         row = {
             "cell": f"{body}, {medium}, {boundary}, {light}",
-            "estimator": "path" if kind == "path" else text.replace(" = {}", "").replace("path = { walk = { guided } }", "guided walks"),
+            "estimator": label,
             "mitsuba": f"{better.split('_')[0]}, {speeds[better] / 1e3:.0f} k/s",
             "own": f"{own_speed / 1e3:.0f} k/s",
             "speed": f"{speed:.2f} [{math.exp(math.log(speed) - 1.96 * errors[2]):.2f}, {math.exp(math.log(speed) + 1.96 * errors[2]):.2f}]",

@@ -161,7 +161,7 @@ impl Rivals for Connections<'_> {
         let by_last = last_vertex::density(walk, Slot::Latest, &leg, &end);
         let by_connection = specular::density(walk, Slot::Latest, &leg, exit, &end);
         let mut by_subdivision = 0.0;
-        if walk.rivals.count >= 2 && setup.options.strategies.subdivides() && walk.sees(exit) {
+        if walk.rivals.asks_for_subdivision() && walk.sees(exit) {
             let x_i = walk.rivals.vertex(Slot::Previous);
             if let Some(middle) = Middle::new(x_i.point, x_j.point, &exit.hit) {
                 by_subdivision = subdivision::density(walk, Slot::Previous, &middle, exit, &end);
@@ -179,7 +179,6 @@ pub(super) fn score_guided<B: WalkBands>(
     found: &GuidedEnd<'_>,
 ) {
     let GuidedEnd { guide, exit, leg, w_l, radiance } = found;
-    let setup = walk.rivals.setup;
     let end = End::new(walk, guide, exit, *w_l, walk.rivals.unidirectional(), *radiance);
     if !end.counts() {
         return;
@@ -188,7 +187,7 @@ pub(super) fn score_guided<B: WalkBands>(
     let by_last = last_vertex::density(walk, Slot::Latest, leg, &end);
     let by_connection = specular::density(walk, Slot::Latest, leg, exit, &end);
     let mut by_subdivision = 0.0;
-    if walk.rivals.count >= 2 && setup.options.strategies.subdivides() {
+    if walk.rivals.asks_for_subdivision() {
         let x_i = walk.rivals.vertex(Slot::Previous);
         if let Some(middle) = Middle::new(x_i.point, x_j.point, &exit.hit)
             && walk.sees_point(x_i.point, exit.hit.point)

@@ -14,29 +14,29 @@
 //!   E[score^2 | path] = (W + sum_c f_c S_c)^2 + sum_c f_c (1 - f_c) S_c^2,
 //! whose mean over paths is an unbiased estimate of the second moment, for every f at once. The squared mean of a pixel does not
 //! depend on f; paths come in pairs of one pixel, and the mean product of a pair is an unbiased estimate of it. The cost is
-//!   cost of walks + sum_t f_t cost of calls,
+//!   cost of walks + sum_t f_t cost of calls + cost of densities of subdivision, unless that is left out,
 //! by counted work ([`Prices`]), so that no bit depends on a clock. Chosen are the factors with the least variance times cost
 //! on a fixed ladder. A choice that only one half of the pairs prefers to the given options is noise; then these stay.
 //! Emission along flights, which no call changes, is left out of the prediction.
 //!
 //! Results are unbiased for any factors above 0. Subdivision may also have the factor 0, where BSDF and light sampling draw all
-//! its paths and the last vertex takes part: then what its calls have scored is dropped, x_t < 1 for all other scores, and the
-//! cost of its densities is saved, too. Without the last vertex, the weights of what is left could be as large as those of path
-//! tracing, whose rare large scores a warm-up does not see.
+//! its paths and the last vertex draws most of them: then what its calls have scored is dropped, x_t < 1 for all other scores,
+//! and the cost of its densities is saved, too. Without the last vertex, the weights of what is left could be as large as those
+//! of path tracing, whose rare large scores a warm-up does not see.
 
 use std::cell::RefCell;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::guide::Guide;
-use super::options::Strategies;
 use super::{BandSetup, Snee, SneeOptions};
 use crate::estimators::connection::SolverWork;
 use crate::estimators::field::Path;
 use crate::estimators::{Cost, Layout, Scores};
 use crate::geometry::Shape;
+use crate::optics::boundary::Boundary;
 use crate::sampling::stream::StreamKey;
+use crate::scene::Light;
 
 /// Options of the warm-up.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -92,6 +92,8 @@ struct Prices {
     boundary_event: f64,
     /// Of a call that has something to score.
     call: PerTechnique,
+    /// Of asking for the density of subdivision.
+    density: f64,
     /// Of a node and of a solve of the connection's search.
     node: f64,
     solve: f64,
@@ -104,6 +106,7 @@ impl Prices {
         medium_event: 60.0,
         boundary_event: 250.0,
         call: [1100.0, 1400.0, 400.0],
+        density: 400.0,
         node: 0.0,
         solve: 250.0,
     };
@@ -114,6 +117,7 @@ impl Prices {
         medium_event: 170.0,
         boundary_event: 700.0,
         call: [6500.0, 6900.0, 2000.0],
+        density: 1300.0,
         node: 120.0,
         solve: 700.0,
     };
@@ -160,6 +164,9 @@ pub(super) struct CallNotes {
     squared_mean: [f64; 2],
     /// Cost of all calls, by technique.
     spent: PerTechnique,
+    /// How often the density of subdivision was asked for: by calls of each technique, and by walks.
+    asked: PerTechnique,
+    asked_by_walks: f64,
 }
 
 impl CallNotes {
@@ -175,6 +182,8 @@ impl CallNotes {
             second: [second.clone(), second],
             squared_mean: [0.0; 2],
             spent: [0.0; CalledTechnique::COUNT],
+            asked: [0.0; CalledTechnique::COUNT],
+            asked_by_walks: 0.0,
         }
     }
 
@@ -184,6 +193,14 @@ impl CallNotes {
         if let Some(technique) = technique {
             self.calls.push(technique);
             self.spent[technique as usize] += self.prices.call[technique as usize];
+        }
+    }
+
+    /// A score asks for the density of subdivision.
+    pub(super) fn ask(&mut self) {
+        match self.calls.last().filter(|_| self.is_called) {
+            Some(technique) => self.asked[*technique as usize] += 1.0,
+            None => self.asked_by_walks += 1.0,
         }
     }
 
@@ -277,7 +294,7 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
     let mut candidates: Vec<PerTechnique> = vec![std::array::from_fn(of_given)];
     let mut ladders = most.map(|most| if most > 0.0 { &LADDER[..] } else { &LADDER[..1] });
     let [subdivision, last_vertex, _] = &most;
-    if *subdivision > 0.0 && *last_vertex > 0.0 && snee.covers_without_subdivision(index) {
+    if *subdivision > 0.0 && *last_vertex > 0.0 && snee.may_go_without_subdivision(index) {
         ladders[CalledTechnique::Subdivision as usize] = &LADDER_TO_NONE;
     }
     for &a in ladders[0] {
@@ -318,8 +335,16 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
 impl CallNotes {
     /// The best candidate, after so many pairs, in which walks without calls had this cost.
     fn choice(&self, pairs: u64, walks: f64) -> ChosenCalls {
+        let sum = |factors: &PerTechnique, of_all: &PerTechnique| {
+            factors.iter().zip(of_all).map(|(factor, all)| factor * all).sum::<f64>()
+        };
         let cost = |factors: &PerTechnique| {
-            walks + factors.iter().zip(&self.spent).map(|(factor, spent)| factor * spent).sum::<f64>()
+            let asked = if factors[CalledTechnique::Subdivision as usize] > 0.0 {
+                self.asked_by_walks + sum(factors, &self.asked)
+            } else {
+                0.0
+            };
+            walks + sum(factors, &self.spent) + self.prices.density * asked
         };
         // Second moments are per path, of which there are two in a pair.
         let inefficiency = |candidate: usize, halves: &[usize]| {
@@ -367,15 +392,24 @@ fn used_probabilities(
     }
 }
 
+/// The least roughness of a mesh whose walks may go without subdivision.
+const LEAST_ROUGHNESS: f64 = 0.1;
+
 impl Snee {
-    /// Whether BSDF and light sampling draw every path that subdivision of this setup draws.
-    fn covers_without_subdivision(&self, index: usize) -> bool {
-        let Strategies { bsdf, light, .. } = self.options.strategies;
+    /// Whether subdivision of this setup may be left out: BSDF and light sampling draw all its paths, and the last vertex draws
+    /// most of them. In a mesh it guesses the normal where light comes in. With a sharp boundary, paths by another normal would
+    /// be left to rare scores of light sampling, as large as the density of facets: a warm-up does not see them.
+    fn may_go_without_subdivision(&self, index: usize) -> bool {
+        let strategies = &self.options.strategies;
         let scene = self.walks.scene();
-        let is_alone = |guide: &Guide| scene.lights[guide.light].is_directional();
-        let is_found =
-            !scene.boundary[index].is_delta() || !self.setups[index].guides.iter().any(is_alone);
-        bsdf && light && is_found
+        let roughness = match scene.boundary[index] {
+            Boundary::Rough { ref facets, .. } => facets.alpha,
+            Boundary::Smooth { .. } | Boundary::Matched => 0.0,
+        };
+        let mut lights = self.setups[index].guides.iter().map(|guide| &scene.lights[guide.light]);
+        let is_found = roughness > 0.0 || !lights.any(Light::is_directional);
+        let is_guessed = matches!(*scene.shape, Shape::Mesh(_));
+        strategies.bsdf && strategies.light && is_found && !(is_guessed && roughness < LEAST_ROUGHNESS)
     }
 }
 

@@ -3,15 +3,18 @@
 use std::sync::Arc;
 
 use super::super::options::BandWalks;
+use super::super::state::Connections;
 use super::super::testing::{Lamp, ROUGH, SMOOTH, body, medium, ring, sphere};
 use super::super::{EdgeTechnique, LastVertex, Snee, SneeChoices, TwoBounce};
 use super::*;
 use crate::error::Result;
+use crate::estimators::walk::trace_passes;
 use crate::estimators::{Estimator, WalkDraw};
 use crate::geometry::{Shape, procedural};
 use crate::math::{DVec3, Frame};
 use crate::optics::boundary::Boundary;
 use crate::optics::medium::Medium;
+use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::scene::sensor::BodyFlux;
 use crate::scene::{Scene, Sensor};
 
@@ -208,6 +211,33 @@ fn calls_follow_their_cost() {
     assert!(dear.gain > 10.0, "{dear:?}");
 }
 
+/// Where calls of subdivision cost little and gain little, the price of its densities decides: those that walks ask for, and
+/// those that calls of other techniques ask for, as often as these are made.
+#[test]
+fn densities_of_subdivision_are_saved_without_it() {
+    let candidates = vec![[1.0; 3], [0.03125, 1.0, 1.0], [0.0, 1.0, 1.0]];
+    let mut notes = CallNotes::new(&Prices::ANALYTIC, candidates);
+    let asks = |notes: &mut CallNotes, times: usize| (0..times).for_each(|_| notes.ask());
+    for path in 0..400 {
+        // The score alternates, so that there is variance; no technique has a part in it.
+        asks(&mut notes, 2);
+        notes.weigh([0.0; 3]);
+        notes.score(f64::from(path % 2));
+        notes.begin(Some(CalledTechnique::LastVertex));
+        asks(&mut notes, 3);
+        notes.begin(Some(CalledTechnique::Subdivision));
+        notes.begin(None);
+        notes.end_path((path / 2 % 2) as usize);
+    }
+    assert_eq!((notes.asked_by_walks, notes.asked), (800.0, [0.0, 1200.0, 0.0]));
+    let chosen = notes.choice(200, 1.0);
+    let Prices { call: [subdivision, last_vertex, _], density, .. } = *notes.prices;
+    let cost =
+        |rate: f64, asked: f64| 1.0 + 400.0 * (rate * subdivision + last_vertex) + density * asked;
+    assert_eq!(chosen.factors, Some([0.0, 1.0, 1.0]));
+    assert!((chosen.gain - cost(1.0, 2000.0) / cost(0.0, 0.0)).abs() < 1e-12, "{chosen:?}");
+}
+
 /// Paths that subdivision alone finds are not scored without it.
 #[test]
 fn what_only_subdivision_finds_needs_it() {
@@ -221,13 +251,15 @@ fn what_only_subdivision_finds_needs_it() {
 }
 
 /// Subdivision is left out where it costs more than it gains, and only where other techniques draw all its paths: not of
-/// parallel light through a smooth boundary, and not without BSDF or light sampling, or the last vertex.
+/// parallel light through a smooth boundary, not without BSDF or light sampling, or the last vertex, and not behind sharp
+/// boundaries of meshes.
 #[test]
 fn subdivision_is_left_out_where_all_paths_are_drawn_without_it() {
-    let covers = |boundary, lamp, choices: SneeChoices| {
-        let scene = flux(&sphere(), boundary, &[medium(10.0, 0.99, 0.0)], &[lamp]);
+    let left_out = |shape: &Arc<Shape>, boundary, lamp, choices: SneeChoices| {
+        let scene = flux(shape, boundary, &[medium(10.0, 0.99, 0.0)], &[lamp]);
         let snee = set_up(&scene, &choices, false).expect("served");
-        (snee.covers_without_subdivision(0), snee.setups_in_use()[0].options.strategies.subdivides())
+        let subdivides = snee.setups_in_use()[0].options.strategies.subdivides();
+        (snee.may_go_without_subdivision(0), !subdivides)
     };
     let learn = || learning(16384);
     let without = |technique: EdgeTechnique| {
@@ -237,13 +269,18 @@ fn subdivision_is_left_out_where_all_paths_are_drawn_without_it() {
     };
     let no_last = LastVertex { most: 0.0, decay: 0.0, wide_share: 0.0, wide: 0.2 };
     let alone = SneeChoices { last_vertex: Some(no_last), ..learn() };
-    assert_eq!(covers(ROUGH, Lamp::Disc, learn()), (true, false), "left out");
-    assert_eq!(covers(ROUGH, Lamp::Disc, SneeChoices::default()), (true, true), "not learned");
-    assert_eq!(covers(ROUGH, Lamp::Disc, alone), (true, true), "no last vertex");
-    assert_eq!(covers(ROUGH, Lamp::Disc, without(EdgeTechnique::Bsdf)), (false, true));
-    assert_eq!(covers(ROUGH, Lamp::Disc, without(EdgeTechnique::Light)), (false, true));
-    assert_eq!(covers(SMOOTH, Lamp::Sun, learn()), (false, true));
-    assert!(covers(SMOOTH, Lamp::Disc, learn()).0);
+    let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.04 };
+    let sharp = Boundary::Rough { eta: 1.4, facets };
+    let (ball, mesh) = (&sphere(), &bumps(false));
+    assert_eq!(left_out(ball, ROUGH, Lamp::Disc, learn()), (true, true));
+    assert_eq!(left_out(ball, ROUGH, Lamp::Disc, SneeChoices::default()), (true, false), "not learned");
+    assert_eq!(left_out(ball, ROUGH, Lamp::Disc, alone), (true, false), "no last vertex");
+    assert_eq!(left_out(ball, ROUGH, Lamp::Disc, without(EdgeTechnique::Bsdf)), (false, false));
+    assert_eq!(left_out(ball, ROUGH, Lamp::Disc, without(EdgeTechnique::Light)), (false, false));
+    assert_eq!(left_out(ball, SMOOTH, Lamp::Sun, learn()), (false, false));
+    let may = |shape, boundary| left_out(shape, boundary, Lamp::Disc, SneeChoices::default()).0;
+    assert_eq!([ROUGH, sharp, SMOOTH].map(|boundary| may(ball, boundary)), [true; 3]);
+    assert_eq!([ROUGH, sharp, SMOOTH].map(|boundary| may(mesh, boundary)), [true, false, false]);
 }
 
 #[test]
@@ -268,31 +305,39 @@ fn what_calls_cost() {
             let scene = flux(&shape, boundary, &[medium(10.0, 0.98, 0.0)], &[Lamp::Disc]);
             let snee = set_up(&scene, &SneeChoices::default(), connects).expect("served");
             const RARE: f64 = 1e-6;
-            for factors in [[RARE; 3], [1.0, RARE, RARE], [RARE, 1.0, RARE], [RARE, RARE, 1.0]] {
+            for factors in [
+                [0.0, RARE, RARE],
+                [RARE; 3],
+                [1.0, RARE, RARE],
+                [0.0, 1.0, RARE],
+                [RARE, 1.0, RARE],
+                [RARE, RARE, 1.0],
+            ] {
                 let setup = snee.setups[0].calling(snee.options.with_calls(MORE, factors));
                 let notes = RefCell::new(CallNotes::new(Prices::of(&shape), vec![[1.0; 3]]));
                 let mut scores = Scores::new(Layout::new(&scene));
                 let key = StreamKey::named("what_calls_cost");
-                let mut run = |notes: Option<&RefCell<CallNotes>>| {
-                    scores.cost = Default::default();
+                let keys: Vec<_> = (0..PATHS).map(|pass| key.pass(pass)).collect();
+                for key in &keys {
+                    let path = Path { field: snee.walks.field(), band: 0, index: 0, key };
+                    snee.trace(&setup, Some(&notes), path, &mut scores);
+                    notes.borrow_mut().end_path(0);
+                }
+                let mut all = vec![scores.clone(); keys.len()];
+                let mut run = || {
                     let start = std::time::Instant::now();
-                    for pass in 0..PATHS {
-                        let key = key.pass(pass);
-                        let path = Path { field: snee.walks.field(), band: 0, index: 0, key: &key };
-                        snee.trace(&setup, notes, path, &mut scores);
-                        if let Some(notes) = notes {
-                            notes.borrow_mut().end_path(0);
-                        }
-                    }
+                    let connections = |path: &Path| Connections::of_path(&setup, path);
+                    trace_passes(snee.walks.field(), 0, &keys, &mut all, connections);
                     start.elapsed().as_secs_f64() * 1e9 / PATHS as f64
                 };
-                run(Some(&notes));
-                let least = (0..5).map(|_| run(None)).fold(f64::INFINITY, f64::min);
+                let least = (0..5).map(|_| run()).fold(f64::INFINITY, f64::min);
                 let notes = notes.into_inner();
                 let walks = notes.prices.walks(&scores, setup.views) / PATHS as f64;
                 let calls = notes.spent.iter().sum::<f64>() / PATHS as f64;
+                let asked = notes.asked_by_walks + notes.asked.iter().sum::<f64>();
+                let densities = asked * notes.prices.density / PATHS as f64;
                 println!(
-                    "{name}, {kind}, {factors:?}: {least:.0} ns a path, {walks:.0} + {calls:.0} by prices"
+                    "{name}, {kind}, {factors:?}: {least:.0} ns a path, {walks:.0} + {calls:.0} + {densities:.0} by prices"
                 );
             }
         }

@@ -118,6 +118,16 @@ impl<'a> Connections<'a> {
         }
     }
 
+    /// Whether subdivision draws paths like the one whose densities are asked for, which ends at the latest vertex.
+    #[inline]
+    pub(super) fn asks_for_subdivision(&self) -> bool {
+        let asks = self.count >= 2 && self.setup.options.strategies.subdivides();
+        if let Some(notes) = self.notes.filter(|_| asks) {
+            notes.borrow_mut().ask();
+        }
+        asks
+    }
+
     /// A connection was searched for.
     pub(super) fn search(&self, work: &SolverWork) {
         if let Some(notes) = self.notes {
