@@ -73,22 +73,27 @@ pub(in crate::estimators) fn trace_passes<R: Rivals>(
             trace_side_by_side(field, band, keys, scores, rivals, guided);
         }
         (None, true) => {
-            let plain = (PlainLanes::new(rule), OneBand);
-            trace_side_by_side(field, band, keys, scores, rivals, plain);
+            trace_side_by_side(field, band, keys, scores, rivals, (PlainLanes::new(rule), OneBand));
         }
-        (guidance, false) => {
-            for (key, scores) in keys.iter().zip(scores) {
-                for index in 0..field.scene.sensor.rays_per_pass() {
-                    let path = Path { field, band, index, key };
-                    match guidance {
-                        Some(guidance) => {
-                            let guided = GuidedBand::new(guidance, medium);
-                            CameraWalk::trace(path, scores, rivals(&path), guided)
-                        }
-                        None => CameraWalk::trace(path, scores, rivals(&path), OneBand),
-                    };
-                }
-            }
+        (Some(guidance), false) => {
+            trace_one_by_one(field, band, keys, scores, rivals, &GuidedBand::new(guidance, medium));
+        }
+        (None, false) => trace_one_by_one(field, band, keys, scores, rivals, &OneBand),
+    }
+}
+
+fn trace_one_by_one<R: Rivals, B: WalkBands>(
+    field: &Field,
+    band: usize,
+    keys: &[PassKey],
+    scores: &mut [Scores],
+    rivals: impl Fn(&Path) -> R,
+    bands: &B,
+) {
+    for (key, scores) in keys.iter().zip(scores) {
+        for index in 0..field.scene.sensor.rays_per_pass() {
+            let path = Path { field, band, index, key };
+            CameraWalk::trace(path, scores, rivals(&path), bands.clone());
         }
     }
 }

@@ -382,8 +382,7 @@ impl Passes {
         let at_once = |group: &Group| self.estimator.passes_at_once(&group.bands);
         let at_once = self.groups.iter().map(at_once).max().unwrap_or(1);
         let mut all = vec![Scores::new(self.layout.clone())];
-        let numbers = all[0].observables.len() + all[0].pixels.len();
-        let at_once = at_once.min(SCORES_AT_ONCE / numbers.max(1) as u64).max(1);
+        let at_once = held_at_once(at_once, all[0].observables.len() + all[0].pixels.len());
         let wall = Instant::now();
         let mut next = start;
         while next < end {
@@ -438,6 +437,11 @@ impl Passes {
 /// The most numbers in the scores of passes that run together, 8 MB: they are to stay in the cache.
 const SCORES_AT_ONCE: u64 = 1 << 20;
 
+/// How many of the passes that might run together do, if each has so many numbers in its scores.
+fn held_at_once(asked: u64, numbers: usize) -> u64 {
+    asked.min(SCORES_AT_ONCE / numbers.max(1) as u64).max(1)
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::{Arc, Mutex};
@@ -472,6 +476,15 @@ mod tests {
         fn pass(&self, bands: &[usize], _: &PassKey, _: &mut Scores) {
             let until = thread_cpu_time() + Duration::from_millis(2) * bands.len() as u32;
             while thread_cpu_time() < until {}
+        }
+    }
+
+    #[test]
+    fn scores_of_passes_that_run_together_are_bounded() {
+        for (asked, numbers, held) in
+            [(2048, 100, 2048), (2048, 1 << 16, 16), (2048, 1 << 21, 1), (0, 0, 1)]
+        {
+            assert_eq!(held_at_once(asked, numbers), held, "{asked} of {numbers}");
         }
     }
 

@@ -71,11 +71,8 @@ type PerTechnique = [f64; CalledTechnique::COUNT];
 /// The warm-up calls so many times as often as the options ask for, at most always.
 const MORE: f64 = 4.0;
 
-/// Factors of the warm-up's probabilities to choose from.
-const LADDER: [f64; 6] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125];
-
-/// The same for a technique that may be left out.
-const LADDER_TO_NONE: [f64; 7] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.0];
+/// Factors of the warm-up's probabilities to choose from; the last only for a technique that may be left out.
+const LADDER: [f64; 7] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.0];
 
 /// What work costs, ns on the machine that it was measured on; only ratios matter. Printed by
 ///
@@ -292,10 +289,11 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
         if most[technique] > 0.0 { asked[technique] / most[technique] } else { 1.0 }
     };
     let mut candidates: Vec<PerTechnique> = vec![std::array::from_fn(of_given)];
-    let mut ladders = most.map(|most| if most > 0.0 { &LADDER[..] } else { &LADDER[..1] });
+    let mut ladders =
+        most.map(|most| if most > 0.0 { &LADDER[..LADDER.len() - 1] } else { &LADDER[..1] });
     let [subdivision, last_vertex, _] = &most;
     if *subdivision > 0.0 && *last_vertex > 0.0 && snee.may_go_without_subdivision(index) {
-        ladders[CalledTechnique::Subdivision as usize] = &LADDER_TO_NONE;
+        ladders[CalledTechnique::Subdivision as usize] = &LADDER;
     }
     for &a in ladders[0] {
         for &b in ladders[1] {

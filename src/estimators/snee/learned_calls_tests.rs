@@ -133,10 +133,11 @@ fn means_stay() {
     let guided = WalkDraw::Guided { share: 0.8, nodes: 8, least_depth: Some(0.0), near_lights: true };
     let plain = WalkDraw::Plain {};
     let lamps = [Lamp::WideDisc, Lamp::Sky];
-    let mut count = 0;
+    let [mut count, mut without] = [0; 2];
     for (name, shape, boundary, connects, walk, bands) in [
         ("smooth ring", ring(), SMOOTH, true, guided, BandWalks::Alone),
         ("rough bumps", bumps(false), ROUGH, false, guided, BandWalks::Alone),
+        ("rough ball", sphere(), ROUGH, false, plain, BandWalks::Alone),
         ("smooth bumps", bumps(true), SMOOTH, true, plain, BandWalks::Alone),
         ("sphere", sphere(), SMOOTH, false, plain, BandWalks::Shared),
     ] {
@@ -151,7 +152,9 @@ fn means_stay() {
         };
         let pairs = measure(&given, "given").into_iter().zip(measure(&learned, "learned"));
         let chosen: Vec<_> = learned.setups_in_use().iter().map(|setup| setup.chosen).collect();
-        count += chosen.iter().flatten().filter(|chosen| chosen.factors.is_some()).count();
+        let factors = || chosen.iter().flatten().filter_map(|chosen| chosen.factors);
+        count += factors().count();
+        without += factors().filter(|factors| factors[0] == 0.0).count();
         for (band, ((a, of_a), (b, of_b))) in pairs.enumerate() {
             let error = (of_a * of_a + of_b * of_b).sqrt();
             println!("{name}, {band}: {a:.4} +- {of_a:.4}, learned {b:.4} +- {of_b:.4}, {chosen:?}");
@@ -160,6 +163,7 @@ fn means_stay() {
         }
     }
     assert!(count >= 5, "calls of {count} setups have been changed: too few to tell");
+    assert!(without > 0, "subdivision has been left out nowhere");
 }
 
 /// The same choice every time, stated in the record's notes once it is made; the warm-up's streams are no pass's.

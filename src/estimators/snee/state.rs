@@ -118,7 +118,8 @@ impl<'a> Connections<'a> {
         }
     }
 
-    /// Whether subdivision draws paths like the one whose densities are asked for, which ends at the latest vertex.
+    /// Whether subdivision draws paths like the one whose densities are asked for, which ends at the latest vertex. A warm-up
+    /// takes down that its density is asked for.
     #[inline]
     pub(super) fn asks_for_subdivision(&self) -> bool {
         let asks = self.count >= 2 && self.setup.options.strategies.subdivides();
