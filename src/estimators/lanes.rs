@@ -4,7 +4,7 @@ use super::bands::WalkBands;
 use super::steps::Weights;
 use crate::geometry::{Flights, Ray};
 use crate::math::DVec3;
-use crate::optics::guided::{LANES, VectorLanes, vector};
+use crate::math::lanes::{LANES, VectorLanes, vector};
 use crate::sampling::stream::Stream;
 
 /// A medium vertex of a walk that has survived roulette, before its direction is drawn. Each number is read where it is used:

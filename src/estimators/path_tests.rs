@@ -16,7 +16,7 @@ use crate::optics::medium::Medium;
 use crate::optics::microfacet::{MicrofacetKind, Microfacets};
 use crate::optics::phase::HenyeyGreenstein;
 use crate::sampling::stream::StreamKey;
-use crate::scene::sensor::Probe;
+use crate::scene::sensor::{Orthographic, Probe, Screen};
 use crate::scene::{Emission, Light, Sensor};
 
 fn environment(radiance: f64, toward: DVec3, height: f64, name: &str) -> Light {
@@ -396,7 +396,9 @@ fn assert_the_same_side_by_side(scene: Arc<Scene>, options: &PathOptions) -> u64
             }
         }
     }
-    let bits = |scores: &Scores| scores.observables.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    let bits = |scores: &Scores| {
+        scores.observables.iter().chain(&scores.pixels).map(|x| x.to_bits()).collect::<Vec<_>>()
+    };
     for (side_by_side, one_by_one) in side_by_side.iter().zip(&one_by_one) {
         assert_eq!(bits(side_by_side), bits(one_by_one));
         assert_eq!(side_by_side.cost, one_by_one.cost);
@@ -406,8 +408,8 @@ fn assert_the_same_side_by_side(scene: Arc<Scene>, options: &PathOptions) -> u64
     one_by_one.iter().map(|scores| scores.cost[Cost::MediumEvents as usize]).sum()
 }
 
-/// Under a sky that is brighter on one side and the sun, in two bands; plain walks, and every kind of guide. Plain walks in
-/// meshes and in thin bodies are not traced side by side.
+/// Under a sky that is brighter on one side and the sun, in two bands; plain walks, and every kind of guide; at a point, and in an
+/// image larger than the finite bodies. Plain walks in meshes and in thin bodies are not traced side by side.
 #[test]
 fn paths_side_by_side_are_paths_one_by_one() {
     let lights = || {
@@ -430,6 +432,15 @@ fn paths_side_by_side_are_paths_one_by_one() {
     let by_solution =
         WalkDraw::Guided { share: 0.9, nodes: 16, least_depth: Some(0.0), near_lights: true };
     let learned = WalkDraw::Learned { share: 0.5, cells: 4, paths: 512 };
+    let screen = Screen {
+        width: 25,
+        height: 40,
+        right: DVec3::X * 0.12,
+        down: DVec3::Y * -0.075,
+        view: -DVec3::Z,
+        has_tiles: true,
+    };
+    let image = Sensor::Orthographic(Orthographic { screen, center: DVec3::Z * 3.0 });
     let mut events = 0;
     for body in &bodies {
         for (boundary, walk, roulette) in [
@@ -445,10 +456,11 @@ fn paths_side_by_side_are_paths_one_by_one() {
                 continue;
             }
             let second = if is_plain { 12.0 } else { 3.0 };
-            for g in [-0.3, 0.0, 0.8] {
+            for (g, sensor) in [(-0.3, None), (0.0, None), (0.8, Some(image.clone()))] {
                 let one = scene(body.clone(), boundary, medium(1.0, 0.0, g), lights(), off_axis());
+                let sensor = sensor.unwrap_or_else(|| one.sensor.clone());
                 let medium = vec![medium(20.0, 0.9, g), medium(second, 0.999, g)];
-                let scene = Scene { boundary: vec![boundary; 2], medium, ..one };
+                let scene = Scene { boundary: vec![boundary; 2], medium, sensor, ..one };
                 let options = PathOptions { roulette, walk, sample_even_lights: None };
                 events += assert_the_same_side_by_side(Arc::new(scene), &options);
             }

@@ -4,8 +4,8 @@ use super::bands::OneBand;
 use super::lanes::{LaneVertex, WalkLanes};
 use super::steps::{StepRule, Weights, half_size};
 use crate::geometry::{BoundingSphere, Flights, Ray, Shape};
+use crate::math::lanes::{LANES, Lanes, VectorLanes, set_vector, vector};
 use crate::math::{DVec3, Vectorized, vectorized};
-use crate::optics::guided::{LANES, Lanes, VectorLanes, set_vector, vector};
 use crate::sampling::distance::sample_exponential_in_lanes;
 use crate::sampling::stream::Stream;
 

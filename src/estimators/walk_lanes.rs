@@ -22,7 +22,7 @@ use crate::estimators::steps::StepRule;
 use crate::estimators::vertices::WalkVertex;
 use crate::estimators::{Anomaly, Cost, Scores};
 use crate::geometry::{Ray, Side};
-use crate::optics::guided::LANES;
+use crate::math::lanes::LANES;
 use crate::sampling::stream::PassKey;
 
 /// A path.

@@ -4,8 +4,8 @@ use super::CameraWalk;
 use crate::estimators::bands::WalkBands;
 use crate::estimators::vertices::{Unscattered, WalkExit, WalkVertex};
 use crate::geometry::{Hit, Shape};
+use crate::math::lanes::{Lanes, VectorLanes};
 use crate::math::{DVec3, Frame};
-use crate::optics::guided::{Lanes, VectorLanes};
 
 /// Techniques beside unidirectional sampling.
 pub(in crate::estimators) trait Rivals: Sized {

@@ -46,6 +46,7 @@ mod bits;
 mod exponential;
 mod frame;
 mod inverse;
+pub mod lanes;
 mod logarithm;
 mod quadrature;
 mod turns;

@@ -57,9 +57,7 @@
 mod lanes;
 mod legendre;
 
-pub use lanes::{
-    DrawLanes, GuideLanes, LANES, Lanes, StepLanes, VectorLanes, set_vector, strengths, vector,
-};
+pub use lanes::{DrawLanes, GuideLanes, StepLanes, strengths};
 
 use std::f64::consts::TAU;
 

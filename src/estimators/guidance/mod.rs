@@ -26,10 +26,9 @@ use serde::Deserialize;
 
 use crate::geometry::Side;
 use crate::math::DVec3;
+use crate::math::lanes::{LANES, Lanes, VectorLanes, vector};
 use crate::optics::boundary::{Boundary, FEW_FACETS};
-use crate::optics::guided::{
-    GuideLanes, GuidedTurns, LANES, Lanes, Pull, StepGuide, VectorLanes, diffuse_growth, vector,
-};
+use crate::optics::guided::{GuideLanes, GuidedTurns, Pull, StepGuide, diffuse_growth};
 use crate::optics::medium::Medium;
 use crate::scene::Scene;
 

@@ -32,8 +32,8 @@ use crate::estimators::bands::WalkBands;
 use crate::estimators::vertices::{Unscattered, WalkExit, WalkVertex};
 use crate::estimators::walk::{CameraWalk, Rivals};
 use crate::geometry::{Hit, Ray, Shape};
+use crate::math::lanes::{Lanes, VectorLanes};
 use crate::math::{DVec3, Frame};
-use crate::optics::guided::{Lanes, VectorLanes};
 
 impl Rivals for Connections<'_> {
     fn call<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>) {

@@ -351,6 +351,8 @@ fn trace_with<B: WalkBands>(
 #[cfg(test)]
 mod draws_tests;
 #[cfg(test)]
+mod finite_tests;
+#[cfg(test)]
 mod snee_connect_tests;
 #[cfg(test)]
 mod specular_tests;

@@ -13,19 +13,11 @@ use super::{
     Escape, Growth, GuidedTurns, Heading, IsotropicLevel, LEVELS, Level, Levels, MOST, MOST_EXPONENT,
     Polynomial, Pull, StepGuide, TERMS, side,
 };
+use crate::math::lanes::{LANES, Lanes, VectorLanes, set_vector, vector};
 use crate::math::{
     DVec3, Frame, Vectorized, exp_near, ln_of_normal, renormalized, sin_cos_turns, vectorized,
 };
 use crate::optics::phase::HenyeyGreenstein;
-
-/// How many walks.
-pub const LANES: usize = 8;
-
-/// A number of each walk.
-pub type Lanes = [f64; LANES];
-
-/// A vector of each walk, component by component.
-pub type VectorLanes = [Lanes; 3];
 
 const ZERO: Lanes = [0.0; LANES];
 const NONE: VectorLanes = [ZERO; 3];
@@ -36,18 +28,6 @@ const GUIDED: f64 = 1.0;
 const ESCAPE: f64 = 2.0;
 /// No step: the walk has ended.
 const ENDED: f64 = 3.0;
-
-/// The vector of one walk.
-#[inline(always)]
-pub fn vector([x, y, z]: &VectorLanes, lane: usize) -> DVec3 {
-    DVec3::new(x[lane], y[lane], z[lane])
-}
-
-/// Sets the vector of one walk.
-#[inline(always)]
-pub fn set_vector([x, y, z]: &mut VectorLanes, lane: usize, to: DVec3) {
-    (x[lane], y[lane], z[lane]) = (to.x, to.y, to.z);
-}
 
 /// Flights of several walks in one medium, and the turns between them.
 #[derive(Clone, Debug)]

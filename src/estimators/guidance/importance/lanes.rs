@@ -2,8 +2,9 @@
 
 use super::ImportanceGrid;
 use crate::estimators::guidance::exit::fading;
+use crate::math::lanes::{LANES, Lanes, VectorLanes, vector};
 use crate::math::{DVec3, Vec3, Vectorized, renormalized, vectorized};
-use crate::optics::guided::{GuideLanes, LANES, Lanes, VectorLanes, bend, strengths, vector};
+use crate::optics::guided::{GuideLanes, bend, strengths};
 
 /// Vectors in single precision.
 type Vec3Lanes = [[f32; LANES]; 3];

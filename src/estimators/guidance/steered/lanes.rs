@@ -6,7 +6,8 @@ use crate::estimators::lanes::{LaneVertex, WalkLanes};
 use crate::estimators::steps::{StepRule, Weights};
 use crate::geometry::{Flights, Ray};
 use crate::math::DVec3;
-use crate::optics::guided::{DrawLanes, GuideLanes, LANES, Lanes, StepLanes, vector};
+use crate::math::lanes::{LANES, Lanes, vector};
+use crate::optics::guided::{DrawLanes, GuideLanes, StepLanes};
 use crate::sampling::stream::Stream;
 
 /// Walks inside the body, each of which has begun a flight. An empty lane takes part in what is computed together, with numbers
