@@ -18,7 +18,7 @@ const BANDS: [usize; 2] = [0, 1];
 
 /// Medium vertices of an analytic body, of a mesh with flat normals, and of one with interpolated normals, for each that another
 /// has: what takes less time takes more of them.
-const SHARES: [u64; 3] = [64, 8, 1];
+const SHARES: [u64; 3] = [256, 4, 1];
 
 /// Bodies and their shares: convex and not, with bumps of three sizes, with triangles a hundred times as long as wide, with normals
 /// that turn by more than a right angle within a triangle, and far from the origin.
