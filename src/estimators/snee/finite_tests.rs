@@ -58,12 +58,13 @@ fn estimators(shape: &Arc<Shape>) -> Vec<(String, Arc<Scene>, Box<dyn Estimator>
     };
     let [smooth, rough] = [SMOOTH, ROUGH].map(scene);
     let mut all: Vec<(String, Arc<Scene>, Box<dyn Estimator>)> = Vec::new();
-    for method in [Conic {}, Newton {}, Mnee {}, Sms {}, Segments {}, StraightLine {}] {
-        for (name, scene) in [("smooth", &smooth), ("rough", &rough)] {
-            if let Ok(connection) = SpecularConnection::new(scene.clone(), method, Roulette::default()) {
-                all.push((format!("{method:?}, {name}"), scene.clone(), Box::new(connection)));
-            }
-        }
+    let walks = [Newton {}, Mnee {}, Sms {}];
+    let of_smooth = [Conic {}, Segments {}, StraightLine {}].into_iter().chain(walks);
+    let of_rough = walks.into_iter().map(|method| ("rough", &rough, method));
+    for (name, scene, method) in of_smooth.map(|method| ("smooth", &smooth, method)).chain(of_rough) {
+        let connection = SpecularConnection::new(scene.clone(), method, Roulette::default());
+        let connection = connection.expect("a scene for it");
+        all.push((format!("{method:?}, {name}"), scene.clone(), Box::new(connection)));
     }
     for preset in [SneePreset::Paper, SneePreset::Guided] {
         let choices = || SneeChoices { preset, ..Default::default() };
