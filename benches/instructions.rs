@@ -63,10 +63,9 @@ fn numbers() -> Vec<f64> {
 }
 
 #[library_benchmark(config = at_most(314_000))]
-#[bench::of_eight(0)]
-fn streams(first: u64) {
-    let pass = pass();
-    for index in first..INPUTS as u64 {
+#[bench::of_eight(pass())]
+fn streams(pass: PassKey) {
+    for index in 0..INPUTS as u64 {
         let mut stream = pass.stream(index, Purpose::Walk);
         black_box((0..8).map(|_| stream.draw()).sum::<f64>());
     }
@@ -190,39 +189,17 @@ fn snee(shape: Shape, boundary: Boundary) -> Ready {
     (Box::new(snee), scores)
 }
 
-fn trace((estimator, mut scores): Ready) -> Scores {
+const SMOOTH: Boundary = Boundary::Smooth { eta: 1.3 };
+
+#[library_benchmark]
+#[bench::path_sphere(args = (path(sphere(), SMOOTH)), config = at_most(2_877_000))]
+#[bench::path_rough_sphere(args = (path(sphere(), ROUGH)), config = at_most(3_209_000))]
+#[bench::path_mesh(args = (path(bumps(), SMOOTH)), config = at_most(7_285_000))]
+#[bench::snee_rough_sphere(args = (snee(sphere(), ROUGH)), config = at_most(13_370_000))]
+#[bench::snee_rough_mesh(args = (snee(bumps(), ROUGH)), config = at_most(42_960_000))]
+fn traced((estimator, mut scores): Ready) -> Scores {
     estimator.pass(&[0], &pass(), &mut scores);
     scores
-}
-
-#[library_benchmark(config = at_most(2_877_000))]
-#[bench::smooth(path(sphere(), Boundary::Smooth { eta: 1.3 }))]
-fn sphere_paths(ready: Ready) -> Scores {
-    trace(ready)
-}
-
-#[library_benchmark(config = at_most(3_209_000))]
-#[bench::rough(path(sphere(), ROUGH))]
-fn rough_sphere_paths(ready: Ready) -> Scores {
-    trace(ready)
-}
-
-#[library_benchmark(config = at_most(7_285_000))]
-#[bench::smooth(path(bumps(), Boundary::Smooth { eta: 1.3 }))]
-fn mesh_paths(ready: Ready) -> Scores {
-    trace(ready)
-}
-
-#[library_benchmark(config = at_most(13_370_000))]
-#[bench::rough(snee(sphere(), ROUGH))]
-fn sphere_snee(ready: Ready) -> Scores {
-    trace(ready)
-}
-
-#[library_benchmark(config = at_most(42_960_000))]
-#[bench::rough(snee(bumps(), ROUGH))]
-fn mesh_snee(ready: Ready) -> Scores {
-    trace(ready)
 }
 
 library_benchmark_group!(
@@ -239,9 +216,6 @@ library_benchmark_group!(
     ]
 );
 
-library_benchmark_group!(
-    name = estimators,
-    benchmarks = [sphere_paths, rough_sphere_paths, mesh_paths, sphere_snee, mesh_snee]
-);
+library_benchmark_group!(name = estimators, benchmarks = [traced]);
 
 main!(library_benchmark_groups = [kernels, estimators]);
