@@ -96,10 +96,10 @@ pub(super) struct Clearance {
 impl Clearance {
     /// The grid of a mesh with the box (`min`, `max`), mm, around its triangles. `distance` is that of a point to the
     /// surface, both in units of the frame.
-    pub(super) fn new<'a>(
+    pub(super) fn new(
         frame: &MeshFrame,
         (min, max): (DVec3, DVec3),
-        triangles: impl Iterator<Item = &'a [DVec3; 3]>,
+        triangles: impl Iterator<Item = [DVec3; 3]>,
         distance: impl FnMut(DVec3) -> f64,
     ) -> Clearance {
         let corner = frame.place(min) - PAD;

@@ -2,8 +2,8 @@
 
 use super::clearance::Clearance;
 use super::normals::Normals;
-use super::tree::{BoxTree, MeshFrame, Visit};
-use super::triangle::{self, Crossing, Sheared};
+use super::tree::{BoxTree, Interest, MeshFrame, Visit};
+use super::triangle::{self, Crossing, PackedTriangle, Sheared};
 use super::{BoundingSphere, Cone, FaceId, Hit, Ray, Side, topology};
 use crate::error::Result;
 use crate::math::DVec3;
@@ -60,7 +60,7 @@ impl Around {
 
 #[derive(Clone, Debug)]
 struct Leaf {
-    corners: [DVec3; 3],
+    packed: PackedTriangle,
     /// The corners' normals, if shading normals are interpolated.
     normals: [u32; 3],
     triangle: u32,
@@ -69,7 +69,7 @@ struct Leaf {
 impl Leaf {
     /// The squared distance of a point, both in units of the frame.
     fn distance2(&self, frame: &MeshFrame, point: DVec3) -> f64 {
-        let [a, b, c] = self.corners;
+        let [a, b, c] = self.packed.corners();
         triangle::distance2(&[frame.place(a), frame.place(b), frame.place(c)], point)
     }
 }
@@ -88,11 +88,14 @@ impl Nearest {
         Nearest { t: t_max, triangle: u32::MAX, found: None }
     }
 
+    /// Whether it takes the crossing.
     #[inline(always)]
-    fn offer(&mut self, crossing: Crossing, triangle: u32, slot: usize) {
-        if (crossing.t, triangle) < (self.t, self.triangle) {
+    fn offer(&mut self, crossing: Crossing, triangle: u32, slot: usize) -> bool {
+        let is_nearer = (crossing.t, triangle) < (self.t, self.triangle);
+        if is_nearer {
             *self = Nearest { t: crossing.t, triangle, found: Some((crossing, slot)) };
         }
+        is_nearer
     }
 }
 
@@ -106,11 +109,13 @@ struct Closest<'a> {
 
 impl Visit for Closest<'_> {
     #[inline(always)]
-    fn visit(&mut self, slot: usize) -> f64 {
-        if let Some((crossing, triangle)) = self.mesh.meet(&self.sheared, slot, self.from) {
-            self.nearest.offer(crossing, triangle, slot);
+    fn visit(&mut self, slot: usize) -> Interest {
+        match self.mesh.meet(&self.sheared, slot, self.from) {
+            Some((crossing, triangle)) if self.nearest.offer(crossing, triangle, slot) => {
+                Interest::Within(crossing.t)
+            }
+            _ => Interest::AsBefore,
         }
-        self.nearest.t
     }
 }
 
@@ -124,9 +129,9 @@ struct Any<'a> {
 
 impl Visit for Any<'_> {
     #[inline(always)]
-    fn visit(&mut self, slot: usize) -> f64 {
+    fn visit(&mut self, slot: usize) -> Interest {
         self.is_met = self.mesh.meet(&self.sheared, slot, self.from).is_some();
-        if self.is_met { f64::NEG_INFINITY } else { f64::INFINITY }
+        if self.is_met { Interest::Nowhere } else { Interest::AsBefore }
     }
 }
 
@@ -164,7 +169,7 @@ impl Mesh {
             .map(|&triangle| {
                 let index = triangle as usize;
                 let normals = normals.as_ref().map_or([0; 3], |normals| normals.corners[index]);
-                Leaf { corners: corners(&triangles[index]), normals, triangle }
+                Leaf { packed: PackedTriangle::new(&corners(&triangles[index])), normals, triangle }
             })
             .collect();
         let mut slots = vec![0; leaves.len()];
@@ -176,7 +181,7 @@ impl Mesh {
             (last, distance2) = tree.nearest(point, last, |slot| leaves[slot].distance2(&frame, point));
             distance2.sqrt()
         };
-        let corners = leaves.iter().map(|leaf| &leaf.corners);
+        let corners = leaves.iter().map(|leaf| leaf.packed.corners());
         let clearance = Clearance::new(&frame, extent, corners, distance);
         let bounds = bounding_sphere(extent, &vertices);
         let slack = 16.0 * f64::EPSILON * extent.0.abs().max(extent.1.abs()).max_element();
@@ -308,8 +313,8 @@ impl Mesh {
     fn at_once(&self, ray: &Ray, side: Side, from: FaceId) -> Option<Hit> {
         let margin = 1e3 * self.slack;
         // The leaf has just been visited, the triangle's vertices have not.
-        let Leaf { corners, .. } = &self.leaves[self.slots[from.0 as usize] as usize];
-        if !triangle::is_on_edge(corners, ray.origin, margin) {
+        let Leaf { packed, .. } = &self.leaves[self.slots[from.0 as usize] as usize];
+        if !triangle::is_on_edge(&packed.corners(), ray.origin, margin) {
             return None;
         }
         self.first_beside(ray, side, from, margin)
@@ -346,9 +351,9 @@ impl Mesh {
 
     #[inline(always)]
     fn meet(&self, ray: &Sheared, slot: usize, from: Option<FaceId>) -> Option<(Crossing, u32)> {
-        let Leaf { corners, triangle, .. } = &self.leaves[slot];
+        let Leaf { packed, triangle, .. } = &self.leaves[slot];
         // Few are met at all: whether it is the ray's own is asked last.
-        let crossing = ray.meet(corners, self.slack)?;
+        let crossing = ray.meet(packed, self.slack)?;
         (from != Some(FaceId(*triangle))).then_some((crossing, *triangle))
     }
 
@@ -357,10 +362,11 @@ impl Mesh {
     }
 
     fn hit(&self, Crossing { t, weights }: Crossing, leaf: &Leaf) -> Hit {
-        let Leaf { corners, normals, triangle } = leaf;
-        let [a, b, c] = *corners;
+        let Leaf { packed, normals, triangle } = leaf;
+        let corners = packed.corners();
+        let [a, b, c] = corners;
         let point = a * weights[0] + b * weights[1] + c * weights[2];
-        let normal = triangle::normal(corners);
+        let normal = triangle::normal(&corners);
         let smooth = self.normals.as_ref().and_then(|n| n.between(*normals, weights));
         let shading_normal = smooth.unwrap_or(normal);
         Hit { t, point, normal, shading_normal, face: FaceId(*triangle) }
@@ -400,7 +406,7 @@ mod tests {
         }
 
         fn some_corners(&self, u: &mut Uniform) -> [DVec3; 3] {
-            self.leaves[(u.next() * self.leaves.len() as f64) as usize].corners
+            self.leaves[(u.next() * self.leaves.len() as f64) as usize].packed.corners()
         }
     }
 
@@ -486,7 +492,8 @@ mod tests {
             let Shape::Mesh(mesh) = &shape else { unreachable!("bodies are meshes") };
             for i in 0..40_000 {
                 let slot = (u.next() * mesh.leaves.len() as f64) as usize;
-                let Leaf { corners: [a, b, c], triangle, .. } = mesh.leaves[slot];
+                let Leaf { ref packed, triangle, .. } = mesh.leaves[slot];
+                let [a, b, c] = packed.corners();
                 // On an edge, within some roundings of it, or at a corner.
                 let off = [0.0, 1e-17, 1e-16, 1e-15][i % 4];
                 let s = if i % 8 < 4 { u.next() * (1.0 - off) } else { 0.0 };

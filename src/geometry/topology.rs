@@ -1,7 +1,7 @@
 //! Conditions for triangles to be the boundary of a body: closed, consistently oriented, a 2-manifold,
 //! and not inside out.
 
-use super::triangle::Sheared;
+use super::triangle::{PackedTriangle, Sheared};
 use super::{Ray, Side, extent};
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::DVec3;
@@ -217,7 +217,8 @@ impl TriangleSoup<'_> {
         let crossings = |side| {
             let ray = Sheared::new(&ray, side);
             (0..self.triangles.len())
-                .filter(|&i| part_of[i] != part && ray.meet(&self.corners(i), 0.0).is_some())
+                .filter(|&i| part_of[i] != part)
+                .filter(|&i| ray.meet(&PackedTriangle::new(&self.corners(i)), 0.0).is_some())
                 .count()
         };
         crossings(Side::Inside) > crossings(Side::Outside)

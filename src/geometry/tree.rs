@@ -40,7 +40,7 @@ use obvhs::ray::Ray as CullRay;
 use super::Ray;
 use super::node::{Slabs, distances2};
 use crate::error::{Error, Result};
-use crate::math::{DVec3, UVec2, Vec3, Vectorized, vectorized};
+use crate::math::{DVec3, Vec3, Vectorized, vectorized};
 
 /// Start of the f32 ray before the true origin, units of the frame.
 const BEHIND: f64 = 0.015625;
@@ -48,9 +48,11 @@ const BEHIND: f64 = 0.015625;
 /// Growth of every box on every side, units of the frame.
 pub(super) const PAD: f64 = 0.0078125;
 
-/// Levels that a traversal can hold: obvhs keeps a stack of 32 and overwrites its last entry, and
-/// so forgets a part of the mesh, when there are more.
+/// Levels that a search can hold.
 const MAX_DEPTH: usize = 32;
+
+/// The least of the bits by which a node states its inner children that a ray meets; those below are primitives.
+const INNER: u32 = 1 << 24;
 
 /// Map from mm to the units of the mesh's tree.
 #[derive(Clone, Copy, Debug)]
@@ -208,8 +210,18 @@ impl BoxTree {
 /// What a search does with the slots that it comes by. Implementations are `inline(always)`, or they are not compiled for the
 /// vector instructions that the search is compiled for.
 pub(super) trait Visit {
-    /// Looks at a slot. Returns the `t` beyond which nothing is of interest any more; minus infinity ends the search.
-    fn visit(&mut self, slot: usize) -> f64;
+    /// Looks at a slot.
+    fn visit(&mut self, slot: usize) -> Interest;
+}
+
+/// Where a search goes on after a visit.
+pub(super) enum Interest {
+    /// Where it did before.
+    AsBefore,
+    /// Up to this `t`.
+    Within(f64),
+    /// Nowhere: it ends.
+    Nowhere,
 }
 
 /// A search, for the vector instructions of the machine.
@@ -223,21 +235,47 @@ struct BoxSearch<'a, V> {
 impl<V: Visit> Vectorized for BoxSearch<'_, V> {
     type Output = ();
 
+    /// As `obvhs::traverse!`, which keeps its state in memory, and not in registers.
     #[inline(always)]
     fn call(self) {
         let BoxSearch { tree: BoxTree { frame, bvh }, ray, skip, visitor } = self;
         let slabs = Slabs::new(&ray);
+        let octant = bvh.new_traversal(ray.direction).oct_inv4 & 7;
+        let nodes = &bvh.nodes[..];
         let mut tau = ray.tmax;
-        let mut state = bvh.new_traversal(ray.direction);
-        let mut node;
-        'search: {
-            obvhs::traverse!(bvh, node, state, slabs.meet(node, state.oct_inv4, tau), {
-                let t = visitor.visit(state.primitive_id as usize);
-                if t == f64::NEG_INFINITY {
-                    break 'search;
+        // Children of a node that are still to be visited: index of the first of its inner ones; in the upper byte, by the
+        // order of visits, those of them that the ray meets; in the lower byte, by slot, those that there are.
+        let (mut first, mut children) = (0, 1_u32 << 31);
+        let (mut open, mut depth) = ([[0; 2]; MAX_DEPTH], 0);
+        loop {
+            let place = 31 - children.leading_zeros();
+            let others = children & !(1 << place);
+            if others >= INNER {
+                open[depth] = [first, others];
+                depth += 1;
+            }
+            let slot = (place - 24) ^ octant;
+            let before = (children & !(u32::MAX << slot)).count_ones();
+            let node = &nodes[(first + before) as usize];
+            let met = slabs.meet(node, octant, tau);
+            let mut primitives = met & (INNER - 1);
+            while primitives != 0 {
+                let primitive = 31 - primitives.leading_zeros();
+                primitives &= !(1 << primitive);
+                match visitor.visit((node.primitive_base_idx + primitive) as usize) {
+                    Interest::AsBefore => {}
+                    Interest::Within(t) => tau = tau.min(round_up(frame.scale * t - skip)),
+                    Interest::Nowhere => return,
                 }
-                tau = tau.min(round_up(frame.scale * t - skip));
-            });
+            }
+            (first, children) = (node.child_base_idx, met & !(INNER - 1) | u32::from(node.imask));
+            if children < INNER {
+                if depth == 0 {
+                    return;
+                }
+                depth -= 1;
+                [first, children] = open[depth];
+            }
         }
     }
 }

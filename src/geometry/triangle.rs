@@ -20,12 +20,31 @@
 use super::{Ray, Side};
 use crate::math::{DVec3, fma};
 
+/// A triangle as the test reads it: x of the three corners, y, z.
+#[derive(Clone, Debug)]
+pub(super) struct PackedTriangle([[f64; 3]; 3]);
+
+impl PackedTriangle {
+    pub(super) fn new([a, b, c]: &[DVec3; 3]) -> PackedTriangle {
+        PackedTriangle([[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]])
+    }
+
+    /// Its corners.
+    #[inline]
+    pub(super) fn corners(&self) -> [DVec3; 3] {
+        let [x, y, z] = self.0;
+        [DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1]), DVec3::new(x[2], y[2], z[2])]
+    }
+}
+
 /// A ray prepared for many triangles.
 pub(super) struct Sheared {
     origin: DVec3,
     /// The axes that become x, y, z: z is the ray's dominant one; x and y are swapped where the ray
     /// runs against it, so that orientation is kept.
     axes: [usize; 3],
+    /// The origin's coordinates along them.
+    start: [f64; 3],
     shear: [f64; 2],
     /// `t` per unit of z.
     t_per_z: f64,
@@ -56,33 +75,49 @@ impl Sheared {
         let t_per_z = 1.0 / ray.dir[z];
         let shear = [ray.dir[axes[0]] * t_per_z, ray.dir[axes[1]] * t_per_z];
         let orientation = if side == Side::Inside { 1.0 } else { -1.0 };
-        Sheared { origin: ray.origin, axes, shear, t_per_z, orientation }
+        let start = [ray.origin[axes[0]], ray.origin[axes[1]], ray.origin[axes[2]]];
+        Sheared { origin: ray.origin, axes, start, shear, t_per_z, orientation }
     }
 
     /// The crossing with t > 0, if the orientation is the wanted one; at the smallest t > 0 where the
     /// origin lies beyond the triangle's plane by `slack` or less.
     #[inline(always)]
-    pub(super) fn meet(&self, triangle: &[DVec3; 3], slack: f64) -> Option<Crossing> {
-        // Not `map`, which is not inlined.
-        let [a, b, c] = triangle;
-        let (a, b, c) = (self.project(a), self.project(b), self.project(c));
-        let u = edge(b, c) * self.orientation;
-        let v = edge(c, a) * self.orientation;
-        let w = edge(a, b) * self.orientation;
-        // One branch: which of the three it is cannot be foreseen.
-        if (u < 0.0) | (v < 0.0) | (w < 0.0) {
-            return None;
+    pub(super) fn meet(&self, triangle: &PackedTriangle, slack: f64) -> Option<Crossing> {
+        let Sheared { axes, start, shear, orientation, .. } = *self;
+        let (along_x, along_y, along_z) =
+            (triangle.0[axes[0]], triangle.0[axes[1]], triangle.0[axes[2]]);
+        // Of the three corners.
+        let (mut x, mut y, mut z) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+        for k in 0..3 {
+            z[k] = along_z[k] - start[2];
+            x[k] = (along_x[k] - start[0]) - shear[0] * z[k];
+            y[k] = (along_y[k] - start[1]) - shear[1] * z[k];
+        }
+        // As `edge`, where it is not zero, of the edges opposite to the corners.
+        let area = |p: usize, q: usize| (x[p] * y[q] - y[p] * x[q]) * orientation;
+        let (mut u, mut v, mut w) = (area(1, 2), area(2, 0), area(0, 1));
+        // One branch: which of the three is negative cannot be foreseen.
+        let least = lesser(lesser(u, v), w);
+        if least <= 0.0 {
+            if least < 0.0 {
+                return None;
+            }
+            [u, v, w] = edges(x, y).map(|area| area * orientation);
+            if u < 0.0 || v < 0.0 || w < 0.0 {
+                return None;
+            }
         }
         let sum = u + v + w;
         if sum <= 0.0 {
             return None; // seen exactly edge on
         }
         let weights = [u / sum, v / sum, w / sum];
-        let t = (weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) * self.t_per_z;
+        let t = (weights[0] * z[0] + weights[1] * z[1] + weights[2] * z[2]) * self.t_per_z;
         if t > 0.0 {
             return Some(Crossing { t, weights });
         }
-        self.has_just_passed(triangle, slack).then_some(Crossing { t: f64::MIN_POSITIVE, weights })
+        let just_passed = self.has_just_passed(&triangle.corners(), slack);
+        just_passed.then_some(Crossing { t: f64::MIN_POSITIVE, weights })
     }
 
     /// The origin lies beyond the plane of a triangle of the wanted orientation, by `slack` or less.
@@ -91,19 +126,23 @@ impl Sheared {
         let beyond = (self.origin - triangle[0]).dot(normal(triangle)) * self.orientation;
         beyond <= slack
     }
+}
 
-    #[inline(always)]
-    fn project(&self, vertex: &DVec3) -> [f64; 3] {
-        let [x, y, z] = self.axes;
-        let v = (*vertex - self.origin).to_array();
-        [v[x] - self.shear[0] * v[z], v[y] - self.shear[1] * v[z], v[z]]
-    }
+/// The lesser of two numbers, in one instruction.
+#[inline(always)]
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// [`edge`] of the edges opposite to the corners of a triangle.
+#[cold]
+fn edges(x: [f64; 3], y: [f64; 3]) -> [f64; 3] {
+    [(1, 2), (2, 0), (0, 1)].map(|(p, q)| edge([x[p], y[p]], [x[q], y[q]]))
 }
 
 /// Twice the signed area of (0, p, q) in the plane: exact in sign, and `edge(q, p) == -edge(p, q)`
 /// to the bit.
-#[inline]
-fn edge(p: [f64; 3], q: [f64; 3]) -> f64 {
+fn edge(p: [f64; 2], q: [f64; 2]) -> f64 {
     let (first, second) = (p[0] * q[1], p[1] * q[0]);
     match first - second {
         0.0 => edge_remainder(p, q, first, second),
@@ -112,8 +151,7 @@ fn edge(p: [f64; 3], q: [f64; 3]) -> f64 {
 }
 
 /// The difference of two products that round to the same number, from their exact remainders.
-#[cold]
-fn edge_remainder(p: [f64; 3], q: [f64; 3], first: f64, second: f64) -> f64 {
+fn edge_remainder(p: [f64; 2], q: [f64; 2], first: f64, second: f64) -> f64 {
     fma(p[0], q[1], -first) - fma(p[1], q[0], -second)
 }
 
@@ -181,14 +219,14 @@ mod tests {
     fn edge_is_antisymmetric_and_exact_in_sign() {
         let mut u = Uniform::named("edge_is_antisymmetric_and_exact_in_sign");
         for _ in 0..100_000 {
-            let p = [u.next() - 0.5, u.next() - 0.5, 0.0];
+            let p = [u.next() - 0.5, u.next() - 0.5];
             // q on the line through 0 and p up to one rounding: the products agree to a last digit.
             let s = u.next() + 0.5;
-            let q = [p[0] * s, p[1] * s, 0.0];
+            let q = [p[0] * s, p[1] * s];
             assert_eq!(edge(p, q).to_bits(), (-edge(q, p)).to_bits());
             // p times a power of two lies exactly on the line.
-            assert_eq!(edge(p, [p[0] * 0.25, p[1] * 0.25, 0.0]), 0.0);
-            let above = [p[0] * 0.25, (p[1] * 0.25).next_up(), 0.0];
+            assert_eq!(edge(p, [p[0] * 0.25, p[1] * 0.25]), 0.0);
+            let above = [p[0] * 0.25, (p[1] * 0.25).next_up()];
             assert_eq!(edge(p, above) > 0.0, p[0] > 0.0);
         }
     }
@@ -209,13 +247,58 @@ mod tests {
             }
             let side = if cosine > 0.0 { Side::Inside } else { Side::Outside };
             let other = if cosine > 0.0 { Side::Outside } else { Side::Inside };
-            let crossing = Sheared::new(&ray, side).meet(&triangle, 0.0).expect("aimed at it");
+            let packed = PackedTriangle::new(&triangle);
+            let crossing = Sheared::new(&ray, side).meet(&packed, 0.0).expect("aimed at it");
             assert!((crossing.t - to.length()).abs() < 1e-8, "{} {}", crossing.t, to.length());
-            assert!(Sheared::new(&ray, other).meet(&triangle, 0.0).is_none());
+            assert!(Sheared::new(&ray, other).meet(&packed, 0.0).is_none());
             let away = Ray { origin, dir: -ray.dir };
-            assert!(Sheared::new(&away, side).meet(&triangle, 0.0).is_none());
-            assert!(Sheared::new(&away, other).meet(&triangle, 0.0).is_none());
+            assert!(Sheared::new(&away, side).meet(&packed, 0.0).is_none());
+            assert!(Sheared::new(&away, other).meet(&packed, 0.0).is_none());
         }
+    }
+
+    /// Corners, origins and directions on a lattice: every product is exact, and many rays meet an edge or a corner.
+    #[test]
+    fn lattice_rays_meet_what_integers_tell() {
+        let mut u = Uniform::named("lattice_rays_meet_what_integers_tell");
+        let (mut met, mut at_edges) = (0, 0);
+        for i in 0..200_000 {
+            let mut number = |n: i64| (u.next() * (2 * n + 1) as f64) as i64 - n;
+            let corners = [(); 3].map(|()| [number(3), number(3), number(2)]);
+            // Seen along an axis, forwards or backwards.
+            let (z, sign) = (i % 3, if i % 2 == 0 { 1 } else { -1 });
+            let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+            let mut start = [number(3), number(3), number(3)];
+            start[z] = -5 * sign;
+            let edge = |p: usize, q: usize| {
+                let [p, q] = [p, q].map(|k| [corners[k][x] - start[x], corners[k][y] - start[y]]);
+                sign * (p[0] * q[1] - p[1] * q[0])
+            };
+            let areas = [edge(1, 2), edge(2, 0), edge(0, 1)];
+            let vector = |v: [i64; 3]| DVec3::from_array(v.map(|x| x as f64));
+            let mut dir = [0; 3];
+            dir[z] = sign;
+            let ray = Ray { origin: vector(start), dir: vector(dir) };
+            for (side, orientation) in [(Side::Inside, 1), (Side::Outside, -1)] {
+                let areas = areas.map(|area| orientation * area);
+                let sum: i64 = areas.iter().sum();
+                let triangle = PackedTriangle::new(&corners.map(vector));
+                let crossing = Sheared::new(&ray, side).meet(&triangle, 0.0);
+                if areas.iter().any(|area| *area < 0) || sum == 0 {
+                    assert!(crossing.is_none(), "{corners:?} {ray:?}");
+                    continue;
+                }
+                let crossing = crossing.expect("the ray starts before the triangle");
+                let weighted: i64 = (0..3).map(|k| areas[k] * (corners[k][z] - start[z]) * sign).sum();
+                assert!((crossing.t - weighted as f64 / sum as f64).abs() < 1e-14 * crossing.t);
+                for (weight, area) in crossing.weights.into_iter().zip(areas) {
+                    assert_eq!(weight, area as f64 / sum as f64, "{corners:?} {ray:?}");
+                }
+                met += 1;
+                at_edges += usize::from(areas.contains(&0));
+            }
+        }
+        assert!(met > 20_000 && at_edges > 5_000, "{met} {at_edges}");
     }
 
     #[test]

@@ -15,10 +15,10 @@
 /// tracing is one visibility test at every event and costs far less than its weight.
 pub const FACTORS: [(&str, f64); 8] = [
     ("path", 1.2),
-    ("snee", 3.2),
+    ("snee", 3.5),
     ("bidirectional", 4.2),
     ("light_trace", 1.7),
-    ("point_cloud", 4.1),
+    ("point_cloud", 4.6),
     ("bssrdf_probe", 8.1),
     ("bssrdf_rays", 3.6),
     ("bssrdf_density", 9.9),

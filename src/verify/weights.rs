@@ -27,9 +27,9 @@ use crate::results::store::Stored;
 ///
 /// prints them.
 pub const WEIGHTS: [(&str, f64); 10] = [
-    ("paths", 155.0),
-    ("rays", 34.0),
-    ("shadow_rays", 315.0),
+    ("paths", 210.0),
+    ("rays", 31.0),
+    ("shadow_rays", 280.0),
     ("medium_events", 0.0),
     ("boundary_events", 0.0),
     ("cloud_points", 500.0),
