@@ -15,7 +15,7 @@
 /// tracing is one visibility test at every event and costs far less than its weight.
 pub const FACTORS: [(&str, f64); 8] = [
     ("path", 1.2),
-    ("snee", 3.5),
+    ("snee", 3.6),
     ("bidirectional", 4.2),
     ("light_trace", 1.7),
     ("point_cloud", 4.6),
