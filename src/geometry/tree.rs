@@ -79,6 +79,7 @@ impl MeshFrame {
     }
 
     /// The f32 ray and its skip; none if it passes beside the mesh or stops before it.
+    #[inline(always)]
     fn cull_ray(&self, ray: &Ray, t_max: f64) -> Option<(CullRay, f64)> {
         let origin = self.place(ray.origin);
         let skip = self.distance(origin, ray.dir)? - BEHIND;
@@ -95,6 +96,7 @@ impl MeshFrame {
 
     /// Distance to the bounding sphere, 0 inside; none if it is missed or lies behind. The sphere
     /// is grown by the padding and by the rounding of coordinates of the origin's size.
+    #[inline(always)]
     fn distance(&self, origin: DVec3, dir: DVec3) -> Option<f64> {
         let away2 = origin.length_squared();
         if away2 <= self.radius * self.radius {
@@ -160,8 +162,7 @@ impl BoxTree {
 
     /// Visits every slot whose box the ray may meet within `t_max`, nearer nodes first, until the visitor has enough.
     pub(super) fn search(&self, ray: &Ray, t_max: f64, visitor: &mut impl Visit) {
-        let Some((ray, skip)) = self.frame.cull_ray(ray, t_max) else { return };
-        vectorized(BoxSearch { tree: self, ray, skip, visitor });
+        vectorized(BoxSearch { tree: self, ray, t_max, visitor });
     }
 
     /// The nearest slot to a point, in units of the frame, and its squared distance there. `first` is one that may be near.
@@ -227,8 +228,8 @@ pub(super) enum Interest {
 /// A search, for the vector instructions of the machine.
 struct BoxSearch<'a, V> {
     tree: &'a BoxTree,
-    ray: CullRay,
-    skip: f64,
+    ray: &'a Ray,
+    t_max: f64,
     visitor: &'a mut V,
 }
 
@@ -238,7 +239,8 @@ impl<V: Visit> Vectorized for BoxSearch<'_, V> {
     /// As `obvhs::traverse!`, which keeps its state in memory, and not in registers.
     #[inline(always)]
     fn call(self) {
-        let BoxSearch { tree: BoxTree { frame, bvh }, ray, skip, visitor } = self;
+        let BoxSearch { tree: BoxTree { frame, bvh }, ray, t_max, visitor } = self;
+        let Some((ray, skip)) = frame.cull_ray(ray, t_max) else { return };
         let slabs = Slabs::new(&ray);
         let octant = bvh.new_traversal(ray.direction).oct_inv4 & 7;
         let nodes = &bvh.nodes[..];

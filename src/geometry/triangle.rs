@@ -70,12 +70,13 @@ impl Sheared {
             _ if size.y >= size.z => 1,
             _ => 2,
         };
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let axes = if ray.dir[z] < 0.0 { [y, x, z] } else { [x, y, z] };
-        let t_per_z = 1.0 / ray.dir[z];
-        let shear = [ray.dir[axes[0]] * t_per_z, ray.dir[axes[1]] * t_per_z];
+        // Arrays: a component of a vector is chosen by branches, which cannot be foreseen.
+        let (dir, origin) = (ray.dir.to_array(), ray.origin.to_array());
+        let axes = AXES[z][usize::from(dir[z] < 0.0)];
+        let t_per_z = 1.0 / dir[z];
+        let shear = [dir[axes[0]] * t_per_z, dir[axes[1]] * t_per_z];
         let orientation = if side == Side::Inside { 1.0 } else { -1.0 };
-        let start = [ray.origin[axes[0]], ray.origin[axes[1]], ray.origin[axes[2]]];
+        let start = [origin[axes[0]], origin[axes[1]], origin[axes[2]]];
         Sheared { origin: ray.origin, axes, start, shear, t_per_z, orientation }
     }
 
@@ -127,6 +128,10 @@ impl Sheared {
         beyond <= slack
     }
 }
+
+/// The axes that become x, y, z, by the one that becomes z, for rays along it and against it.
+const AXES: [[[usize; 3]; 2]; 3] =
+    [[[1, 2, 0], [2, 1, 0]], [[2, 0, 1], [0, 2, 1]], [[0, 1, 2], [1, 0, 2]]];
 
 /// The lesser of two numbers, in one instruction.
 #[inline(always)]
