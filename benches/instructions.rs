@@ -137,7 +137,7 @@ fn sphere_rays((shape, rays): (Shape, Vec<(Ray, f64)>)) {
     all(&rays, |(ray, _)| shape.intersect(&ray, Side::Inside, None, f64::INFINITY));
 }
 
-#[library_benchmark(config = at_most(2_052_000))]
+#[library_benchmark(config = at_most(1_988_000))]
 #[bench::from_inside(rays(bumps()))]
 fn mesh_rays((shape, rays): (Shape, Vec<(Ray, f64)>)) {
     all(&rays, |(ray, _)| shape.intersect(&ray, Side::Inside, None, f64::INFINITY));
@@ -194,9 +194,9 @@ const SMOOTH: Boundary = Boundary::Smooth { eta: 1.3 };
 #[library_benchmark]
 #[bench::path_sphere(args = (path(sphere(), SMOOTH)), config = at_most(2_877_000))]
 #[bench::path_rough_sphere(args = (path(sphere(), ROUGH)), config = at_most(3_209_000))]
-#[bench::path_mesh(args = (path(bumps(), SMOOTH)), config = at_most(6_278_000))]
+#[bench::path_mesh(args = (path(bumps(), SMOOTH)), config = at_most(6_183_000))]
 #[bench::snee_rough_sphere(args = (snee(sphere(), ROUGH)), config = at_most(13_370_000))]
-#[bench::snee_rough_mesh(args = (snee(bumps(), ROUGH)), config = at_most(36_190_000))]
+#[bench::snee_rough_mesh(args = (snee(bumps(), ROUGH)), config = at_most(35_370_000))]
 fn traced((estimator, mut scores): Ready) -> Scores {
     estimator.pass(&[0], &pass(), &mut scores);
     scores
