@@ -25,6 +25,7 @@ impl Slabs {
     #[inline(always)]
     pub(super) fn meet(&self, node: &CwBvhNode, octant: u32, tau: f32) -> u32 {
         let mut times = Times { enter: [0.0; 8], leave: [tau; 8] };
+        // Axis by axis: of an array of references the compiler makes vectors of addresses.
         self.narrow(&mut times, node, 0, &node.child_min_x, &node.child_max_x);
         self.narrow(&mut times, node, 1, &node.child_min_y, &node.child_max_y);
         self.narrow(&mut times, node, 2, &node.child_min_z, &node.child_max_z);

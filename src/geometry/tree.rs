@@ -236,7 +236,7 @@ struct BoxSearch<'a, V> {
 impl<V: Visit> Vectorized for BoxSearch<'_, V> {
     type Output = ();
 
-    /// As `obvhs::traverse!`, which keeps its state in memory, and not in registers.
+    /// The loop of `obvhs::traverse!`, written out: the state of the macro stays in memory, as it holds the stack.
     #[inline(always)]
     fn call(self) {
         let BoxSearch { tree: BoxTree { frame, bvh }, ray, t_max, visitor } = self;

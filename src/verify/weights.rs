@@ -12,7 +12,7 @@ use crate::results::store::Stored;
 /// cargo test --release --test integration -- --ignored --nocapture weights_are_those_of_path_tracing
 /// ```
 ///
-/// Accuracy: a fit predicted the least CPU times of those 27 runs of `path` to 21 %, of 24 of them to 15 %; a rough boundary
+/// Accuracy: a fit predicted the least CPU times of those 27 runs of `path` to 28 %, of 24 of them to 17 %; a rough boundary
 /// under a sky costs more than they predict, because light samples below the horizon are not counted.
 /// Between kinds of estimators they may be off by the factors of [`crate::results::counted_work`].
 /// They predict together; one by one they mean little, because in a path tracer rays are paths, medium
