@@ -1,9 +1,10 @@
 //! Closed triangle meshes: f64 geometry behind an f32 tree.
 
 use super::clearance::Clearance;
+use super::near_surface::NearSurface;
 use super::normals::Normals;
 use super::tree::{BoxTree, Interest, MeshFrame, Visit};
-use super::triangle::{self, Crossing, PackedTriangle, Sheared};
+use super::triangle::{self, Crossing, PackedTriangle, PreciseNormal, Sheared};
 use super::{BoundingSphere, Cone, FaceId, Hit, Ray, Side, topology};
 use crate::error::Result;
 use crate::math::DVec3;
@@ -23,6 +24,7 @@ pub struct Mesh {
     /// Where a triangle is among them.
     slots: Vec<u32>,
     clearance: Clearance,
+    near_surface: NearSurface,
     /// The distance by which rounding may displace a point of the surface, mm: a point is a sum of three corners
     /// and, on a ray, of origin and flight, each rounded a few times at the size of its coordinates.
     slack: f64,
@@ -181,12 +183,31 @@ impl Mesh {
             (last, distance2) = tree.nearest(point, last, |slot| leaves[slot].distance2(&frame, point));
             distance2.sqrt()
         };
-        let corners = leaves.iter().map(|leaf| leaf.packed.corners());
-        let clearance = Clearance::new(&frame, extent, corners, distance);
-        let bounds = bounding_sphere(extent, &vertices);
         let slack = 16.0 * f64::EPSILON * extent.0.abs().max(extent.1.abs()).max_element();
+        let placed = leaves.iter().map(|leaf| {
+            let corners = leaf.packed.corners();
+            // Not `map`, which is not inlined.
+            let [a, b, c] = corners;
+            let placed = [frame.place(a), frame.place(b), frame.place(c)];
+            (placed, PreciseNormal::of(&corners, slack))
+        });
+        let (clearance, balls) = Clearance::new(&frame, extent, placed.clone(), distance);
+        let near_surface = NearSurface::new(&frame, extent, placed, (&clearance, &balls));
+        let bounds = bounding_sphere(extent, &vertices);
         let around = Around::new(vertices.len(), &triangles);
-        Ok(Mesh { vertices, triangles, normals, bounds, tree, leaves, slots, clearance, slack, around })
+        Ok(Mesh {
+            vertices,
+            triangles,
+            normals,
+            bounds,
+            tree,
+            leaves,
+            slots,
+            clearance,
+            near_surface,
+            slack,
+            around,
+        })
     }
 
     /// The vertices, mm.
@@ -218,8 +239,13 @@ impl Mesh {
 
     /// See [`super::Shape::intersect`].
     pub fn intersect(&self, ray: &Ray, side: Side, from: Option<FaceId>, t_max: f64) -> Option<Hit> {
-        if t_max < f64::INFINITY && self.is_clear(ray.origin, ray.at(t_max)) {
-            return None;
+        if t_max < f64::INFINITY {
+            if self.is_clear(ray.origin, ray.at(t_max)) {
+                return None;
+            }
+            if side == Side::Inside {
+                return self.end_of_unclear(ray, from, t_max);
+            }
         }
         self.search(ray, side, from, t_max)
     }
@@ -229,6 +255,22 @@ impl Mesh {
     pub(super) fn is_clear(&self, start: DVec3, end: DVec3) -> bool {
         let frame = &self.tree.frame;
         self.clearance.has_ball_around(frame.place(start), frame.place(end))
+    }
+
+    /// See [`super::Shape::end_of_unclear`]. What is known near the surface is asked here, not of every flight: most are clear.
+    #[inline(never)]
+    pub(super) fn end_of_unclear(&self, ray: &Ray, from: Option<FaceId>, t: f64) -> Option<Hit> {
+        if self.is_clear_near_surface(ray, t) {
+            return None;
+        }
+        self.search(ray, Side::Inside, from, t)
+    }
+
+    /// Whether a flight of length `t` inside surely meets nothing.
+    #[inline]
+    pub(super) fn is_clear_near_surface(&self, ray: &Ray, t: f64) -> bool {
+        let frame = &self.tree.frame;
+        self.near_surface.is_clear(frame.place(ray.origin), ray.dir, t * frame.scale)
     }
 
     /// A lower bound of the distance from a point to the surface, mm.
@@ -289,6 +331,11 @@ impl Mesh {
         false
     }
 
+    /// See [`super::Shape::building_bytes`].
+    pub(super) fn building_bytes(&self) -> usize {
+        200 * self.triangles.len() + self.near_surface.building_bytes()
+    }
+
     /// Memory of the mesh on the heap, bytes.
     pub fn heap_bytes(&self) -> usize {
         size_of_val(&*self.vertices)
@@ -298,6 +345,7 @@ impl Mesh {
             + size_of_val(&*self.leaves)
             + size_of_val(&*self.slots)
             + self.clearance.heap_bytes()
+            + self.near_surface.heap_bytes()
             + size_of_val(&*self.around.starts)
             + size_of_val(&*self.around.triangles)
     }
@@ -390,6 +438,10 @@ mod tests {
     const BRUTE_FORCE_RAYS: usize = 50_000;
 
     impl Mesh {
+        pub(in super::super) fn near_surface(&self) -> (&NearSurface, &MeshFrame) {
+            (&self.near_surface, &self.tree.frame)
+        }
+
         /// [`Mesh::search`] without the tree.
         fn brute_force(&self, ray: &Ray, side: Side, from: Option<FaceId>, t_max: f64) -> Option<Hit> {
             if let Some(hit) = from.and_then(|face| self.at_once(ray, side, face)) {
