@@ -154,8 +154,7 @@ impl WalkLanes for PlainLanes<'_> {
                 arrive(lane, LaneVertex { points: ends, arrivals: dirs, weights, ratio: 1.0, lane });
             }
         }
-        let numbers = &self.ahead.numbers;
-        vectorized(Departures { steps: &mut self.steps, rule: self.rule, numbers });
+        vectorized(Departures(self));
         for (lane, goes_on) in goes_on.into_iter().enumerate() {
             if goes_on {
                 self.draw_ahead(lane);
@@ -167,31 +166,27 @@ impl WalkLanes for PlainLanes<'_> {
 }
 
 /// Ends all flights in the medium, and begins the next ones.
-struct Departures<'s, 'a> {
-    steps: &'s mut PlainSteps,
-    rule: StepRule<'a>,
-    numbers: &'s [Lanes; 3],
-}
+struct Departures<'l, 'a>(&'l mut PlainLanes<'a>);
 
 impl Vectorized for Departures<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let Departures { steps, rule, numbers: [turn, azimuth, flight] } = self;
-        // Copies: what references lead to might be among the results, which would keep the loop below from vectors.
+        let PlainLanes { rule, steps, ahead: Ahead { numbers: [turn, azimuth, flight], .. }, .. } =
+            self.0;
+        // Copies: what references lead to might be among the results, which would keep the loop below from vectors. The lanes are
+        // parts of one structure, which do not overlap.
         let (sigma_t, phase) = (rule.medium.sigma_t, rule.medium.phase);
-        let (origins, [x, y, z]) = (steps.ends, steps.dirs);
-        let (mut dirs, mut ends) = (origins, origins);
-        let mut lengths = [0.0; LANES];
+        let PlainSteps { origins, dirs, lengths, ends } = steps;
         for lane in 0..LANES {
-            let arrival = DVec3::new(x[lane], y[lane], z[lane]);
-            let dir = phase.turned(arrival, phase.sample_local([turn[lane], azimuth[lane]]));
-            lengths[lane] = sample_exponential_in_lanes(sigma_t, flight[lane]);
-            let end = vector(&origins, lane) + dir * lengths[lane];
-            set_vector(&mut dirs, lane, dir);
-            set_vector(&mut ends, lane, end);
+            let dir = phase.turned(vector(dirs, lane), phase.sample_local([turn[lane], azimuth[lane]]));
+            let length = sample_exponential_in_lanes(sigma_t, flight[lane]);
+            let origin = vector(ends, lane);
+            set_vector(origins, lane, origin);
+            set_vector(dirs, lane, dir);
+            lengths[lane] = length;
+            set_vector(ends, lane, origin + dir * length);
         }
-        *steps = PlainSteps { origins, dirs, lengths, ends };
     }
 }
