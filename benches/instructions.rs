@@ -137,13 +137,13 @@ fn sphere_rays((shape, rays): (Shape, Vec<(Ray, f64)>)) {
     all(&rays, |(ray, _)| shape.intersect(&ray, Side::Inside, None, f64::INFINITY));
 }
 
-#[library_benchmark(config = at_most(1_988_000))]
+#[library_benchmark(config = at_most(1_968_000))]
 #[bench::from_inside(rays(bumps()))]
 fn mesh_rays((shape, rays): (Shape, Vec<(Ray, f64)>)) {
     all(&rays, |(ray, _)| shape.intersect(&ray, Side::Inside, None, f64::INFINITY));
 }
 
-#[library_benchmark(config = at_most(126_000))]
+#[library_benchmark(config = at_most(132_900))]
 #[bench::mean_0_02(rays(bumps()))]
 fn mesh_flights((shape, rays): (Shape, Vec<(Ray, f64)>)) {
     all(&rays, |(ray, t)| shape.end_of_flight(&ray, None, t));
@@ -192,11 +192,11 @@ fn snee(shape: Shape, boundary: Boundary) -> Ready {
 const SMOOTH: Boundary = Boundary::Smooth { eta: 1.3 };
 
 #[library_benchmark]
-#[bench::path_sphere(args = (path(sphere(), SMOOTH)), config = at_most(2_877_000))]
-#[bench::path_rough_sphere(args = (path(sphere(), ROUGH)), config = at_most(3_209_000))]
-#[bench::path_mesh(args = (path(bumps(), SMOOTH)), config = at_most(6_183_000))]
-#[bench::snee_rough_sphere(args = (snee(sphere(), ROUGH)), config = at_most(13_370_000))]
-#[bench::snee_rough_mesh(args = (snee(bumps(), ROUGH)), config = at_most(35_370_000))]
+#[bench::path_sphere(args = (path(sphere(), SMOOTH)), config = at_most(2_677_000))]
+#[bench::path_rough_sphere(args = (path(sphere(), ROUGH)), config = at_most(3_027_000))]
+#[bench::path_mesh(args = (path(bumps(), SMOOTH)), config = at_most(5_680_000))]
+#[bench::snee_rough_sphere(args = (snee(sphere(), ROUGH)), config = at_most(13_056_000))]
+#[bench::snee_rough_mesh(args = (snee(bumps(), ROUGH)), config = at_most(34_363_000))]
 fn traced((estimator, mut scores): Ready) -> Scores {
     estimator.pass(&[0], &pass(), &mut scores);
     scores
