@@ -60,7 +60,7 @@ impl NormalBounds {
 /// Bounds of normals in every voxel.
 #[derive(Clone, Debug)]
 pub(super) struct NormalGrid {
-    pub voxels: Voxels,
+    voxels: Voxels,
     bounds: Vec<NormalBounds>,
 }
 
