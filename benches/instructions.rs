@@ -143,7 +143,7 @@ fn mesh_rays((shape, rays): (Shape, Vec<(Ray, f64)>)) {
     all(&rays, |(ray, _)| shape.intersect(&ray, Side::Inside, None, f64::INFINITY));
 }
 
-#[library_benchmark(config = at_most(132_900))]
+#[library_benchmark(config = at_most(126_000))]
 #[bench::mean_0_02(rays(bumps()))]
 fn mesh_flights((shape, rays): (Shape, Vec<(Ray, f64)>)) {
     all(&rays, |(ray, t)| shape.end_of_flight(&ray, None, t));
