@@ -92,12 +92,28 @@ impl TriangleSoup<'_> {
     }
 
     /// All sides, those of one edge next to each other, in order of vertices and triangles.
+    ///
+    /// Each is put to those of its lesser vertex, of which a vertex has a few: in time proportional to the triangles.
     fn edges(&self) -> Vec<Edge> {
-        let sides = |(i, &[a, b, c]): (usize, &[u32; 3])| {
-            [(a, b), (b, c), (c, a)].map(|(from, to)| Edge { from, to, triangle: i as u32 })
+        let sides = || {
+            let triangles = self.triangles.iter().zip(0..);
+            triangles.flat_map(|(&[a, b, c], triangle)| {
+                [(a, b), (b, c), (c, a)].into_iter().map(move |(from, to)| Edge { from, to, triangle })
+            })
         };
-        let mut edges: Vec<Edge> = self.triangles.iter().enumerate().flat_map(sides).collect();
-        edges.sort_unstable_by_key(|edge| (edge.key(), edge.triangle));
+        let mut starts = vec![0; self.vertices.len() + 1];
+        sides().for_each(|edge| starts[edge.key().0 as usize + 1] += 1);
+        (0..self.vertices.len()).for_each(|vertex| starts[vertex + 1] += starts[vertex]);
+        let mut next = starts.clone();
+        let mut edges = vec![Edge { from: 0, to: 0, triangle: 0 }; 3 * self.triangles.len()];
+        for edge in sides() {
+            let place = &mut next[edge.key().0 as usize];
+            edges[*place] = edge;
+            *place += 1;
+        }
+        for range in starts.windows(2) {
+            edges[range[0]..range[1]].sort_unstable_by_key(|edge| (edge.key().1, edge.triangle));
+        }
         edges
     }
 

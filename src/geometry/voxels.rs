@@ -66,10 +66,16 @@ impl Voxels {
     /// The index of the voxel of a point; none beside the box.
     #[inline]
     pub(super) fn index_of(&self, point: DVec3) -> Option<usize> {
+        let (voxel, place) = self.voxel_of(point);
+        if voxel.min_element() < 0.0 { None } else { self.index(place) }
+    }
+
+    /// Where a point is, in edges from the corner, and the place of its voxel: at 0 where that is negative.
+    #[inline]
+    fn voxel_of(&self, point: DVec3) -> (DVec3, [usize; 3]) {
         let voxel = (point - self.corner) * self.per_edge;
         // Not `map`, which is not inlined.
-        let place = [voxel.x as usize, voxel.y as usize, voxel.z as usize];
-        if voxel.min_element() < 0.0 { None } else { self.index(place) }
+        (voxel, [voxel.x as usize, voxel.y as usize, voxel.z as usize])
     }
 
     /// The place of the voxel whose middle is nearest to a point, in fewer instructions: that of its voxel, but for rounding;
@@ -107,9 +113,8 @@ impl Voxels {
         mut visit: impl FnMut(usize),
     ) {
         let [a, b, c] = *triangle;
-        let voxel =
-            |point: DVec3| ((point - self.corner) * self.per_edge).to_array().map(|x| x as usize);
-        let (low, high) = (voxel(a.min(b).min(c) - PAD), voxel(a.max(b).max(c) + PAD));
+        let (_, low) = self.voxel_of(a.min(b).min(c) - PAD);
+        let (_, high) = self.voxel_of(a.max(b).max(c) + PAD);
         let plane = normal
             .map(|PreciseNormal(normal)| (normal, (0.5 * self.edge + PAD) * normal.abs().element_sum()));
         let [nx, ny, nz] = self.counts;
