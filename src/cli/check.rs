@@ -10,7 +10,7 @@ use crate::error::{Diagnostic, Error, Result};
 use crate::experiment::{Experiment, LoadOptions, Registry, load};
 use crate::run::job::{Job, Passes};
 use crate::run::memory_limits::available;
-use crate::run::{Options, Plan, plan};
+use crate::run::{Built, Options, Plan, plan_with};
 
 /// Validate experiment files and report all errors.
 ///
@@ -38,9 +38,10 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
         };
         let checked = load(path, &options, registry).and_then(|experiment| {
             let others: &[String] = if options.setting.is_some() { &[] } else { &experiment.settings };
-            let planned = |setting| plan(&load_setting(setting)?, registry);
+            let mut built = Built::default();
+            let own = plan_with(&experiment, registry, &mut built);
+            let planned = |setting| plan_with(&load_setting(setting)?, registry, &mut built);
             let mut wrong: Vec<Diagnostic> = Vec::new();
-            let own = plan(&experiment, registry);
             let remarks = own.as_ref().map_or(String::new(), |plan| notes(plan) + &too_large(plan));
             for planned in std::iter::once(own).chain(others.iter().map(planned)) {
                 match planned {

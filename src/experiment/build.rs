@@ -25,19 +25,29 @@ use crate::results::json::hash_hex;
 use crate::results::record::Band;
 use crate::scene::{Emission, LatLong, Light, Scene};
 
+/// Shapes by what an experiment file says of them.
+pub(crate) type Shapes = BTreeMap<String, Arc<Shape>>;
+
 /// Builds the scenes of an experiment; equal shapes and maps are built once and shared.
 pub(crate) struct Builder<'a> {
     experiment: &'a Experiment,
     bands: Vec<Band>,
-    shapes: BTreeMap<String, Arc<Shape>>,
+    /// Shapes of the same file that have been built before.
+    known: &'a Shapes,
+    shapes: Shapes,
     maps: BTreeMap<(PathBuf, [u64; 2], bool), Arc<LatLong>>,
 }
 
 impl<'a> Builder<'a> {
-    /// A builder of the experiment's scenes.
-    pub(crate) fn new(experiment: &'a Experiment) -> Builder<'a> {
+    /// A builder of the experiment's scenes; `known` has shapes of the same file that have been built before.
+    pub(crate) fn new(experiment: &'a Experiment, known: &'a Shapes) -> Builder<'a> {
         let bands = experiment.file.bands.as_ref().map(bands).unwrap_or_default();
-        Builder { experiment, bands, shapes: BTreeMap::new(), maps: BTreeMap::new() }
+        Builder { experiment, bands, known, shapes: BTreeMap::new(), maps: BTreeMap::new() }
+    }
+
+    /// The shapes of all scenes that have been built.
+    pub(crate) fn into_shapes(self) -> Shapes {
+        self.shapes
     }
 
     /// The bands, with the colours they show as.
@@ -139,7 +149,10 @@ impl<'a> Builder<'a> {
         if let Some(shape) = self.shapes.get(&name) {
             return Ok(Arc::clone(shape));
         }
-        let shape = Arc::new(build_shape(words, self.experiment)?);
+        let shape = match self.known.get(&name) {
+            Some(known) => Arc::clone(known),
+            None => Arc::new(build_shape(words, self.experiment)?),
+        };
         self.shapes.insert(name, Arc::clone(&shape));
         Ok(shape)
     }

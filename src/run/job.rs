@@ -1,7 +1,7 @@
 //! Units of work: an estimator in a cell, or a sampler; and the passes of an estimator with their
 //! results.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
@@ -78,7 +78,7 @@ pub(crate) struct Passes {
     /// Passes that are run, if not all are.
     pub part: Option<PassRange>,
     /// Estimator that runs the passes.
-    pub estimator: Box<dyn Estimator>,
+    pub estimator: Arc<dyn Estimator>,
     /// CPU time of building and preparing the estimator.
     pub set_up: SetUp,
     /// Observables and bands of the scores.
@@ -444,7 +444,7 @@ fn held_at_once(asked: u64, numbers: usize) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::{Arc, Mutex};
+    use std::sync::Mutex;
     use std::time::Duration;
 
     use super::*;
@@ -498,7 +498,7 @@ mod tests {
         let experiment = experiment::load(file.as_ref(), &options, &registry).expect("an experiment");
         let mut plan = plan(&experiment, &registry).expect("a plan");
         let Task::Estimate(passes) = &mut plan.jobs[0].task else { panic!("passes") };
-        passes.estimator = Box::new(Spinning);
+        passes.estimator = Arc::new(Spinning);
         assert_eq!(passes.groups.len(), 3);
         let begun = thread_cpu_time();
         let block = passes.run(Stage::Main, 0, 4, 0, &|| false).expect("four passes");
@@ -542,7 +542,7 @@ mod tests {
             let mut plan = plan(&experiment, &registry).expect("a plan");
             let Task::Estimate(passes) = &mut plan.jobs[0].task else { panic!("passes") };
             let given = Arc::default();
-            passes.estimator = Box::new(Counting { at_once, given: Arc::clone(&given) });
+            passes.estimator = Arc::new(Counting { at_once, given: Arc::clone(&given) });
             passes.groups.truncate(1);
             let block = passes.run(Stage::Main, 2, 25, 3, &|| false).expect("23 passes");
             let given = given.lock().expect("one thread").clone();

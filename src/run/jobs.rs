@@ -14,8 +14,8 @@ use super::job::{Arm, BudgetTerms, Group, Job, Passes, SetUp, Task, band_groups}
 use super::keys::{KEY_VERSION, Stage, StreamName};
 use super::memory::MemoryEstimate;
 use crate::error::{Error, Refusals, Result};
-use crate::estimators::Layout;
-use crate::experiment::build::{self, Builder};
+use crate::estimators::{Estimator, Layout};
+use crate::experiment::build::{self, Builder, Shapes};
 use crate::experiment::registry::Registry;
 use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure, Faster, SamplerEntry};
 use crate::experiment::{CellSpec, Experiment, titled};
@@ -58,20 +58,57 @@ const MOST_OBSERVABLES: usize = 4096;
 /// Everything that only shows when it is built: meshes, maps, sensors inside bodies, claims on
 /// observables that do not exist, options that a sampler refuses.
 pub(crate) fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
-    plan_stage(experiment, registry, Stage::Main)
+    plan_stage(experiment, registry, Stage::Main, None)
+}
+
+/// What plans of a file's settings have built, for the next one: settings often differ in budgets only.
+#[derive(Default)]
+pub(crate) struct Built {
+    shapes: Shapes,
+    /// Estimators by the hash of their scene, bands and options.
+    estimators: BTreeMap<String, Arc<dyn Estimator>>,
+}
+
+/// As [`plan`], where equal parts of plans are built once: for plans that are not run, as the arms of a claim share them, too.
+///
+/// # Errors
+/// Those of [`plan`].
+pub(crate) fn plan_with(
+    experiment: &Experiment,
+    registry: &Registry,
+    built: &mut Built,
+) -> Result<Plan> {
+    plan_stage(experiment, registry, Stage::Main, Some(built))
 }
 
 /// Plans the passes of `stage`.
-pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: Stage) -> Result<Plan> {
+pub(super) fn plan_stage(
+    experiment: &Experiment,
+    registry: &Registry,
+    stage: Stage,
+    mut built: Option<&mut Built>,
+) -> Result<Plan> {
     if !experiment.cells.is_empty() && experiment.file.budget.is_none() {
         return Err(Error::input_help(
             "the experiment has no budget",
             "give it one, as `budget.passes = 64`",
         ));
     }
-    let mut builder = Builder::new(experiment);
+    let known = built.as_mut().map(|built| std::mem::take(&mut built.shapes)).unwrap_or_default();
+    let mut builder = Builder::new(experiment, &known);
     let bands = builder.bands().to_vec();
-    let cells = cells(experiment, &mut builder)?;
+    let cells = cells(experiment, &mut builder);
+    if built.is_none() {
+        // Now: no estimator's time is to hold it, and the memory of the scenes is to be known.
+        cells.iter().flatten().for_each(|cell| cell.scene.shape.prepare());
+    }
+    let scene_bytes = [builder.memory_bytes(), builder.building_bytes()];
+    let shapes = builder.into_shapes();
+    if let Some(built) = &mut built {
+        built.shapes = known;
+        built.shapes.extend(shapes);
+    }
+    let cells = cells?;
     let observables: Vec<Vec<Observable>> = cells.iter().map(|cell| named(&cell.layout)).collect();
     let scenes: Vec<&Scene> = cells.iter().map(|cell| &*cell.scene).collect();
     let mut refusals = Refusals::default();
@@ -80,7 +117,7 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
     let are_claims_sound = comparisons.is_some();
     let comparisons = comparisons.unwrap_or_default();
     let inputs = json!(build::inputs(experiment));
-    let planner = Planner { experiment, registry, bands: &bands, inputs, stage };
+    let mut planner = Planner { experiment, registry, bands: &bands, inputs, stage, built };
     let arms = Duels::new(experiment);
     let mut jobs = Vec::new();
     for (index, cell) in cells.iter().enumerate() {
@@ -117,7 +154,6 @@ pub(super) fn plan_stage(experiment: &Experiment, registry: &Registry, stage: St
         _ => None,
     });
     let passes = passes.collect::<Option<Vec<u64>>>().and_then(|passes| passes.into_iter().max());
-    let scene_bytes = [builder.memory_bytes(), builder.building_bytes()];
     Ok(Plan { jobs, comparisons, stage, scene_bytes, passes, bands })
 }
 
@@ -168,12 +204,13 @@ struct Planner<'a> {
     /// Hashes of the files that the scenes read.
     inputs: Value,
     stage: Stage,
+    built: Option<&'a mut Built>,
 }
 
 impl Planner<'_> {
     /// The passes of an estimator in a cell.
     fn passes(
-        &self,
+        &mut self,
         index: usize,
         cell: &BuiltCell,
         entry: usize,
@@ -181,15 +218,8 @@ impl Planner<'_> {
         terms: BudgetTerms,
     ) -> Result<Job> {
         let words = self.experiment.estimator(index, entry);
-        let no_kind = || Error::input(format!("estimator `{}` has no kind", words.name));
-        let (kind, options) = words.choice().ok_or_else(no_kind)?;
-        let unknown = || Error::input(format!("estimator `{}`: unknown kind `{kind}`", words.name));
-        let registered = self.registry.get(kind).ok_or_else(unknown)?;
         let before = thread_cpu_time();
-        let estimator = (registered.build)(options, Arc::clone(&cell.scene)).map_err(|error| {
-            let place = self.experiment.sources.place(index, &format!("estimator.{entry}.{kind}"));
-            error.about(&format!("estimator `{}`", words.name)).at(place)
-        })?;
+        let estimator = self.estimator(index, cell, entry)?;
         let set_up = SetUp::built(thread_cpu_time().saturating_sub(before));
         let groups = band_groups(estimator.band_use(), self.bands.len()).into_iter();
         let groups = groups.map(|group| self.group(cell.spec, &arm.name, group)).collect();
@@ -231,6 +261,32 @@ impl Planner<'_> {
         };
         let task = Task::Estimate(Box::new(passes));
         Ok(Job { label, title, identity: hash_json(&identity), task })
+    }
+
+    /// An estimator in a cell: a new one, unless plans share what they build.
+    fn estimator(&mut self, index: usize, cell: &BuiltCell, entry: usize) -> Result<Arc<dyn Estimator>> {
+        let words = self.experiment.estimator(index, entry);
+        let no_kind = || Error::input(format!("estimator `{}` has no kind", words.name));
+        let (kind, options) = words.choice().ok_or_else(no_kind)?;
+        let name = self.built.is_some().then(|| {
+            let (content, inputs) = (cell.spec.content(), &self.inputs);
+            hash_json(&json!([content, inputs, self.bands, words.kind]))
+        });
+        let known = |name| self.built.as_ref()?.estimators.get(name).cloned();
+        if let Some(known) = name.as_ref().and_then(known) {
+            return Ok(known);
+        }
+        let unknown = || Error::input(format!("estimator `{}`: unknown kind `{kind}`", words.name));
+        let registered = self.registry.get(kind).ok_or_else(unknown)?;
+        let estimator = (registered.build)(options, Arc::clone(&cell.scene)).map_err(|error| {
+            let place = self.experiment.sources.place(index, &format!("estimator.{entry}.{kind}"));
+            error.about(&format!("estimator `{}`", words.name)).at(place)
+        })?;
+        let estimator: Arc<dyn Estimator> = Arc::from(estimator);
+        if let (Some(built), Some(name)) = (&mut self.built, name) {
+            built.estimators.insert(name, Arc::clone(&estimator));
+        }
+        Ok(estimator)
     }
 
     /// Bands that run together, with their streams.
@@ -368,4 +424,38 @@ fn targets(
     indices.sort_unstable();
     indices.dedup();
     if indices.is_empty() { vec![0] } else { indices }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::{self, LoadOptions};
+
+    /// Plans share estimators of one scene in the same bands by the same options, and no others.
+    #[test]
+    fn plans_share_what_is_the_same() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/experiments/compare/nine-cells.toml");
+        let registry = Registry::builtin();
+        let mut built = Built::default();
+        let mut estimators = |set: &str| -> Vec<Arc<dyn Estimator>> {
+            let options = LoadOptions { sets: vec![set.into()], setting: None };
+            let experiment =
+                experiment::load(file.as_ref(), &options, &registry).expect("an experiment");
+            let plan = plan_with(&experiment, &registry, &mut built).expect("a plan");
+            plan.jobs.iter().filter_map(Job::passes).map(|passes| passes.estimator.clone()).collect()
+        };
+        let first = estimators("budget.passes=2");
+        let is_shared = |other: &Arc<dyn Estimator>| first.iter().any(|one| Arc::ptr_eq(one, other));
+        assert!(estimators("budget.passes=3").iter().all(is_shared), "another budget");
+        for set in [
+            "bands={ rgb = {} }",
+            "object.medium.coefficients={ sigma_t_per_mm = 3, albedo = 0.5, g = 0 }",
+            "object.shape.sphere.radius_mm=1.5",
+            "estimator.0.path.roulette={ analog = {} }",
+            "sensor.orthographic.resolution=[4,4]",
+        ] {
+            let others = estimators(set);
+            assert!(!others.is_empty() && !others.iter().any(is_shared), "{set}");
+        }
+    }
 }

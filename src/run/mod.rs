@@ -44,7 +44,7 @@ use live::{Live, Show};
 use progress::Progress;
 use workers::Completed;
 
-pub(crate) use jobs::{Plan, plan};
+pub(crate) use jobs::{Built, Plan, plan, plan_with};
 pub(crate) use merge::merge;
 pub(crate) use pilot::estimate_seconds;
 pub(crate) use retest::{Remeasured, retest};

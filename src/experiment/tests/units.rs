@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use super::*;
-use crate::experiment::build::Builder;
+use crate::experiment::build::{Builder, Shapes};
 use crate::geometry::Ray;
 use crate::math::{DVec3, Frame, cos, sin};
 use crate::scene::{Light, Scene, Sensor};
@@ -16,7 +16,7 @@ const LIGHT: &str = "directional = { toward = [1, 1, 1], irradiance = 1.0 }";
 fn scene(old: &str, new: &str) -> Scene {
     assert!(GOOD.contains(old));
     let experiment = good(&GOOD.replace(old, new));
-    Builder::new(&experiment).scene(0).unwrap_or_else(|error| panic!("{error}"))
+    Builder::new(&experiment, &Shapes::new()).scene(0).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Irradiance of band 1 on a plane with this normal, int L(w) cos dw: midpoints in cosine and azimuth.
@@ -166,7 +166,7 @@ fn skies_are_turned_and_upsampled() {
             format!("environment = {{ map = {:?}, scale = 2.0{more} }}", path.display().to_string());
         let text = GOOD.replace(LIGHT, &light).replace("bands = { rgb = {} }", bands);
         let experiment = good(&text);
-        Builder::new(&experiment).scene(0).unwrap_or_else(|error| panic!("{error}"))
+        Builder::new(&experiment, &Shapes::new()).scene(0).unwrap_or_else(|error| panic!("{error}"))
     };
     let at = |scene: &Scene, band: usize, degrees: f64| {
         let azimuth = degrees.to_radians();
