@@ -318,7 +318,7 @@ fn single_scattering_below_a_plane() {
     let (sigma_t, albedo, g) = (2.0, 0.8, 0.4);
     let beam = PlaneBeam::new(toward, ETA).expect("from above");
     for (shape, name) in [(Shape::HalfSpace, "half-space"), (Shape::Slab { thickness: 0.4 }, "slab")] {
-        let scene = scene(shape, medium(sigma_t, albedo, g), vec![sun(toward, 1.0)], ray, 2000);
+        let scene = scene(shape, medium(sigma_t, albedo, g), vec![sun(toward, 1.0)], ray, 600);
         let (segment, out) = camera_segment(&scene, &ray);
         let phase = HenyeyGreenstein { g }.pdf(beam.toward.dot(segment.dir));
         let sigma = [sigma_t * albedo, sigma_t];
@@ -368,7 +368,7 @@ fn single_scattering_of_flat_facets() {
     for (name, shape, facets) in bodies {
         let ray =
             Ray { origin: DVec3::new(0.3, -0.2, 3.0), dir: DVec3::new(-0.1, 0.15, -1.0).normalize() };
-        let scene = scene(shape, medium(sigma_t, albedo, g), vec![sun(toward, 1.0)], ray, 2000);
+        let scene = scene(shape, medium(sigma_t, albedo, g), vec![sun(toward, 1.0)], ray, 500);
         let (segment, out) = camera_segment(&scene, &ray);
         let phase = |mu: f64| HenyeyGreenstein { g }.pdf(mu);
         let sigma = [sigma_t * albedo, sigma_t];
