@@ -17,6 +17,7 @@ use crate::results::store::RecordFolder;
 use crate::run::live::Live;
 use crate::run::shard::{Shard, Sharded, run_shard};
 use crate::run::tev::Address;
+use crate::run::{Built, plan_with};
 use crate::verify::verdict::Verdict;
 
 /// Run experiments; print progress, then a table and the path of the report.
@@ -59,9 +60,8 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
         experiments.iter().try_for_each(|e| crate::run::refuse_to_replace(e, &options.out))?;
     }
     if let [_, _, ..] = experiments[..] {
-        experiments
-            .iter()
-            .try_for_each(|experiment| crate::run::plan(experiment, registry).map(drop))?;
+        let is_sound = |experiment| plan_with(experiment, registry, &mut Built::default()).map(drop);
+        experiments.iter().try_for_each(is_sound)?;
     }
     if let Some(address) = &args.tev {
         match Live::connect(address) {
