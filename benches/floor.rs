@@ -151,9 +151,7 @@ fn estimator<'a>(name: &str, shape: Shape, sigma_t: f64, albedo: f64) -> Row<'a>
 fn lumpy(subdivisions: u32) -> (String, Shape) {
     let triangles = 20 * 4usize.pow(subdivisions);
     let mesh = procedural::lumpy_sphere(1.0, subdivisions, 0.25, false).expect("a closed mesh");
-    let mesh = Shape::Mesh(mesh);
-    mesh.prepare();
-    (format!("path, {triangles} triangles"), mesh)
+    (format!("path, {triangles} triangles"), Shape::Mesh(mesh))
 }
 
 /// Mean and its standard error.

@@ -120,10 +120,7 @@ fn sphere() -> Shape {
 
 /// 20,480 triangles.
 fn bumps() -> Shape {
-    let mesh = procedural::bumpy_sphere(1.0, 5, 0.1, 6.0, true).expect("the mesh is closed");
-    let mesh = Shape::Mesh(mesh);
-    mesh.prepare();
-    mesh
+    Shape::Mesh(procedural::bumpy_sphere(1.0, 5, 0.1, 6.0, true).expect("the mesh is closed"))
 }
 
 fn rays(shape: Shape) -> (Shape, Vec<(Ray, f64)>) {

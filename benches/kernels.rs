@@ -121,7 +121,6 @@ fn geometry(group: &mut BenchmarkGroup<WallTime>) {
     // 20 * 4^6 = 81920 triangles.
     let mesh = procedural::bumpy_sphere(1.0, 6, 0.1, 6.0, true).expect("the mesh is closed");
     let mesh = Shape::Mesh(mesh);
-    mesh.prepare();
     let flights: Vec<(Ray, f64)> = inside
         .iter()
         .zip(inputs(7, Stream::draw))

@@ -209,7 +209,7 @@ fn bodies(files: &[PathBuf]) -> Vec<(String, Shape)> {
         let mesh = load_mesh(file, &placement, false).unwrap_or_else(|error| panic!("{error}"));
         (name, Shape::Mesh(mesh))
     });
-    lumpy.into_iter().chain(read).inspect(|(_, shape)| shape.prepare()).collect()
+    lumpy.into_iter().chain(read).collect()
 }
 
 fn main() {

@@ -17,7 +17,6 @@ use crate::results::store::RecordFolder;
 use crate::run::live::Live;
 use crate::run::shard::{Shard, Sharded, run_shard};
 use crate::run::tev::Address;
-use crate::run::{Built, plan_with};
 use crate::verify::verdict::Verdict;
 
 /// Run experiments; print progress, then a table and the path of the report.
@@ -60,8 +59,9 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
         experiments.iter().try_for_each(|e| crate::run::refuse_to_replace(e, &options.out))?;
     }
     if let [_, _, ..] = experiments[..] {
-        let is_sound = |experiment| plan_with(experiment, registry, &mut Built::default()).map(drop);
-        experiments.iter().try_for_each(is_sound)?;
+        experiments
+            .iter()
+            .try_for_each(|experiment| crate::run::plan(experiment, registry).map(drop))?;
     }
     if let Some(address) = &args.tev {
         match Live::connect(address) {

@@ -18,7 +18,7 @@ use crate::results::record::{Quantity, Record};
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::{atomic, provenance};
 use crate::run::interrupt::Interrupt;
-use crate::run::{Built, Options, Plan, Remeasured, plan, plan_with, run_plan};
+use crate::run::{Options, Remeasured, plan};
 use crate::verify::judge::{Case, Judgement, Looks, Measured, judge};
 use crate::verify::junit;
 use crate::verify::levels::{FAMILY_LEVEL, FIRST_LOOK, RETEST_FACTOR};
@@ -86,8 +86,8 @@ struct Judged {
 enum Named {
     /// A record, judged as it is.
     Record(Box<Judged>),
-    /// An experiment, run where it has no record yet, by its plan if there is one.
-    Experiment(Box<Experiment>, Option<Box<Plan>>),
+    /// An experiment, run where it has no record yet.
+    Experiment(Box<Experiment>),
 }
 
 /// Everything that verification of one call works with.
@@ -189,19 +189,14 @@ impl Court<'_> {
     /// is wrong with a file is told, before anything runs.
     fn subjects(&self, paths: &[PathBuf]) -> Result<Vec<Judged>> {
         let (mut named, mut wrong) = (Vec::new(), Vec::new());
-        let is_record = |path: &Path| path.join("record").join("record.json").exists();
-        let files = paths.iter().filter(|path| !is_record(path)).map(|path| files_of(path));
-        let count: usize = files.map(|files| Ok(files?.len())).sum::<Result<_>>()?;
         for path in paths {
-            if is_record(path) {
+            if path.join("record").join("record.json").exists() {
                 named.push(Named::Record(Box::new(Self::judged(RecordFolder::new(path), None, None)?)));
                 continue;
             }
             for file in files_of(path)? {
-                match self.checked(&file, count > 1) {
-                    Ok((experiment, plan)) => {
-                        named.push(Named::Experiment(Box::new(experiment), plan.map(Box::new)));
-                    }
+                match self.checked(&file) {
+                    Ok(experiment) => named.push(Named::Experiment(Box::new(experiment))),
                     Err(Error::Input(findings)) => wrong.extend(findings),
                     Err(other) => return Err(other),
                 }
@@ -212,7 +207,7 @@ impl Court<'_> {
         }
         let measured = |named| match named {
             Named::Record(judged) => Ok(*judged),
-            Named::Experiment(experiment, plan) => self.measured(*experiment, plan.map(|plan| *plan)),
+            Named::Experiment(experiment) => self.measured(*experiment),
         };
         named.into_iter().map(measured).collect()
     }
@@ -228,37 +223,27 @@ impl Court<'_> {
         Ok(Judged { folder, main, retest, experiment, _lock: lock })
     }
 
-    fn measured(&self, experiment: Experiment, plan: Option<Plan>) -> Result<Judged> {
+    fn measured(&self, experiment: Experiment) -> Result<Judged> {
         let folder = RecordFolder::new(self.working.folder(&experiment.file.name));
         let lock = if crate::run::has_record(&experiment, &self.working.out) {
             self.reports.then(|| lock::lock(folder.root())).transpose()?
         } else {
             say(format_args!("running {}", experiment.file.name));
-            let ran = match plan {
-                Some(plan) => run_plan(&experiment, plan, &self.working, &self.interrupt),
-                None => crate::run::run(&experiment, self.registry, &self.working, &self.interrupt),
-            };
-            Some(ran?.lock)
+            Some(crate::run::run(&experiment, self.registry, &self.working, &self.interrupt)?.lock)
         };
         Self::judged(folder, Some(experiment), lock)
     }
 
-    /// An experiment, with everything found that `check` finds where it has yet to run, and its plan, unless it is one of many,
-    /// whose plans may be too large together.
-    fn checked(&self, file: &Path, is_one_of_many: bool) -> Result<(Experiment, Option<Plan>)> {
+    /// An experiment, with everything found that `check` finds where it has yet to run.
+    fn checked(&self, file: &Path) -> Result<Experiment> {
         let experiment = load(file, &self.reading, self.registry)?;
-        if crate::run::has_record(&experiment, &self.working.out) {
-            return Ok((experiment, None));
+        if !crate::run::has_record(&experiment, &self.working.out) {
+            if !self.replaces {
+                crate::run::refuse_to_replace(&experiment, &self.working.out)?;
+            }
+            plan(&experiment, self.registry)?;
         }
-        if !self.replaces {
-            crate::run::refuse_to_replace(&experiment, &self.working.out)?;
-        }
-        if is_one_of_many {
-            plan_with(&experiment, self.registry, &mut Built::default())?;
-            return Ok((experiment, None));
-        }
-        let plan = plan(&experiment, self.registry)?;
-        Ok((experiment, Some(plan)))
+        Ok(experiment)
     }
 
     /// Runs second looks where they are needed; true where any was run.

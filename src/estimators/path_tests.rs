@@ -344,8 +344,6 @@ fn flights_at_once_are_flights_one_by_one() {
     let walks = [WalkDraw::Dwivedi { share: 0.5 }, by_solution];
     let [mut plain, mut guided, mut shared] = [0; 3];
     for shape in shapes {
-        // Once, not for every clone.
-        shape.prepare();
         for (boundary, g) in
             [(Boundary::Smooth { eta: 1.3 }, 0.0), (rough, 0.7), (Boundary::Matched, 0.2)]
         {
@@ -444,8 +442,6 @@ fn paths_side_by_side_are_paths_one_by_one() {
     };
     let image = Sensor::Orthographic(Orthographic { screen, center: DVec3::Z * 3.0 });
     let mut events = 0;
-    // Once, not for every clone.
-    bodies.iter().for_each(Shape::prepare);
     for body in &bodies {
         for (boundary, walk, roulette) in [
             (boundaries[0], by_solution, ROULETTES[1]),
@@ -486,8 +482,6 @@ fn walks_are_guided_under_small_lights_where_it_pays() {
     let [side, behind] = [DVec3::new(0.9, 0.0, 0.5), DVec3::new(0.3, 0.0, -0.9)];
     let lamp = |toward| cap(toward, 0.02, [1.0; 2]);
     let mesh = Shape::Mesh(procedural::icosphere(1.0, 3, true).expect("closed"));
-    // Once, not for every clone.
-    mesh.prepare();
     for shape in [SPHERE, mesh] {
         let guided = |boundary, [albedo, g]: [f64; 2], lights: Vec<Light>, near_lights| {
             let dense = medium(10.0 / (1.0 - albedo * g), albedo, g);

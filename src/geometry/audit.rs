@@ -201,12 +201,12 @@ mod tests {
 
     #[test]
     fn no_ray_from_inside_is_lost() {
-        aim(50_000);
+        aim(150_000);
     }
 
     #[test]
     fn no_walk_escapes() {
-        walk(200_000);
+        walk(500_000);
     }
 
     #[test]

@@ -87,11 +87,6 @@ impl Clearance {
     }
 }
 
-/// What [`Clearance::heap_bytes`] will be.
-pub(super) fn expected_bytes(voxels: &Voxels) -> usize {
-    voxels.len() * (size_of::<f32>() + size_of::<EmptyBall>())
-}
-
 /// The voxels outside the body: those that the border of the grid is connected with by voxels that are not occupied.
 fn outside(voxels: &Voxels, distance2: &[u32]) -> Vec<bool> {
     let counts = voxels.counts();

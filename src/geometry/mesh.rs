@@ -1,9 +1,8 @@
 //! Closed triangle meshes: f64 geometry behind an f32 tree.
 
-use std::sync::OnceLock;
-
+use super::clearance::Clearance;
+use super::near_surface::NearSurface;
 use super::normals::Normals;
-use super::surface_grids::{self, SurfaceGrids};
 use super::tree::{BoxTree, Interest, MeshFrame, Visit};
 use super::triangle::{self, Crossing, PackedTriangle, PreciseNormal, Sheared};
 use super::{BoundingSphere, Cone, FaceId, Hit, Ray, Side, topology};
@@ -24,7 +23,8 @@ pub struct Mesh {
     leaves: Vec<Leaf>,
     /// Where a triangle is among them.
     slots: Vec<u32>,
-    grids: OnceLock<SurfaceGrids>,
+    clearance: Clearance,
+    near_surface: NearSurface,
     /// The distance by which rounding may displace a point of the surface, mm: a point is a sum of three corners
     /// and, on a ray, of origin and flight, each rounded a few times at the size of its coordinates.
     slack: f64,
@@ -176,7 +176,23 @@ impl Mesh {
             .collect();
         let mut slots = vec![0; leaves.len()];
         leaves.iter().enumerate().for_each(|(slot, leaf)| slots[leaf.triangle as usize] = slot as u32);
+        // In units of the frame, whose squares neither overflow nor vanish.
+        let mut last = 0;
+        let distance = |point: DVec3| {
+            let distance2;
+            (last, distance2) = tree.nearest(point, last, |slot| leaves[slot].distance2(&frame, point));
+            distance2.sqrt()
+        };
         let slack = 16.0 * f64::EPSILON * extent.0.abs().max(extent.1.abs()).max_element();
+        let placed = leaves.iter().map(|leaf| {
+            let corners = leaf.packed.corners();
+            // Not `map`, which is not inlined.
+            let [a, b, c] = corners;
+            let placed = [frame.place(a), frame.place(b), frame.place(c)];
+            (placed, PreciseNormal::of(&corners, slack))
+        });
+        let (clearance, balls) = Clearance::new(&frame, extent, placed.clone(), distance);
+        let near_surface = NearSurface::new(&frame, extent, placed, (&clearance, &balls));
         let bounds = bounding_sphere(extent, &vertices);
         let around = Around::new(vertices.len(), &triangles);
         Ok(Mesh {
@@ -187,51 +203,11 @@ impl Mesh {
             tree,
             leaves,
             slots,
-            grids: OnceLock::new(),
+            clearance,
+            near_surface,
             slack,
             around,
         })
-    }
-
-    /// See [`super::Shape::prepare`].
-    pub(super) fn prepare(&self) {
-        self.grids();
-    }
-
-    /// The grids, which the first flight waits for: not all that is done with a mesh has flights.
-    #[inline(always)]
-    fn grids(&self) -> &SurfaceGrids {
-        #[cold]
-        #[inline(never)]
-        fn first(mesh: &Mesh) -> &SurfaceGrids {
-            mesh.grids.get_or_init(|| mesh.surface_grids())
-        }
-        self.grids.get().unwrap_or_else(|| first(self))
-    }
-
-    fn surface_grids(&self) -> SurfaceGrids {
-        let frame = &self.tree.frame;
-        // In units of the frame, whose squares neither overflow nor vanish.
-        let mut last = 0;
-        let distance = |point: DVec3| {
-            let distance2;
-            let of = |slot: usize| self.leaves[slot].distance2(frame, point);
-            (last, distance2) = self.tree.nearest(point, last, of);
-            distance2.sqrt()
-        };
-        let placed = self.leaves.iter().map(|leaf| {
-            let corners = leaf.packed.corners();
-            // Not `map`, which is not inlined.
-            let [a, b, c] = corners;
-            let placed = [frame.place(a), frame.place(b), frame.place(c)];
-            (placed, PreciseNormal::of(&corners, self.slack))
-        });
-        SurfaceGrids::new(frame, self.extent(), placed, distance)
-    }
-
-    /// The box around it, mm.
-    fn extent(&self) -> (DVec3, DVec3) {
-        super::extent(self.vertices.iter().copied())
     }
 
     /// The vertices, mm.
@@ -278,7 +254,7 @@ impl Mesh {
     #[inline]
     pub(super) fn is_clear(&self, start: DVec3, end: DVec3) -> bool {
         let frame = &self.tree.frame;
-        self.grids().clearance.has_ball_around(frame.place(start), frame.place(end))
+        self.clearance.has_ball_around(frame.place(start), frame.place(end))
     }
 
     /// See [`super::Shape::end_of_unclear`]. What is known near the surface is asked here, not of every flight: most are clear.
@@ -294,27 +270,26 @@ impl Mesh {
     #[inline]
     pub(super) fn is_clear_near_surface(&self, ray: &Ray, t: f64) -> bool {
         let frame = &self.tree.frame;
-        self.grids().near_surface.is_clear(frame.place(ray.origin), ray.dir, t * frame.scale)
+        self.near_surface.is_clear(frame.place(ray.origin), ray.dir, t * frame.scale)
     }
 
     /// A lower bound of the distance from a point to the surface, mm.
     pub(super) fn clearance(&self, point: DVec3) -> f64 {
         let frame = &self.tree.frame;
-        self.grids().clearance.at(frame.place(point)) / frame.scale
+        self.clearance.at(frame.place(point)) / frame.scale
     }
 
     /// See [`super::Shape::clearance_within`]: the distance to the surface itself, or to that of a ball that has none inside.
     pub(super) fn clearance_within(&self, point: DVec3, cone: &Cone) -> f64 {
         let frame = &self.tree.frame;
         let place = frame.place(point);
-        let clearance = &self.grids().clearance;
-        let along = match clearance.ball(place) {
+        let along = match self.clearance.ball(place) {
             Some((center, radius)) if place.distance_squared(center) < radius * radius => {
                 cone.through_sphere(radius, place - center)
             }
             _ => 0.0,
         };
-        along.max(clearance.at(place)) / frame.scale
+        along.max(self.clearance.at(place)) / frame.scale
     }
 
     /// [`Mesh::intersect`] by the tree alone.
@@ -358,7 +333,7 @@ impl Mesh {
 
     /// See [`super::Shape::building_bytes`].
     pub(super) fn building_bytes(&self) -> usize {
-        200 * self.triangles.len() + surface_grids::building_bytes(&self.tree.frame, self.extent())
+        200 * self.triangles.len() + self.near_surface.building_bytes()
     }
 
     /// Memory of the mesh on the heap, bytes.
@@ -369,23 +344,10 @@ impl Mesh {
             + self.tree.heap_bytes()
             + size_of_val(&*self.leaves)
             + size_of_val(&*self.slots)
-            + self.grid_bytes()
+            + self.clearance.heap_bytes()
+            + self.near_surface.heap_bytes()
             + size_of_val(&*self.around.starts)
             + size_of_val(&*self.around.triangles)
-    }
-
-    /// Memory of the grids, bytes: expected, until they are made.
-    fn grid_bytes(&self) -> usize {
-        let frame = &self.tree.frame;
-        let area = |leaf: &Leaf| {
-            let [a, b, c] = leaf.packed.corners();
-            0.5 * frame.scale * frame.scale * (b - a).cross(c - a).length()
-        };
-        let expected = || {
-            let area = self.leaves.iter().map(area).sum();
-            surface_grids::expected_bytes(frame, self.extent(), area)
-        };
-        self.grids.get().map_or_else(expected, SurfaceGrids::heap_bytes)
     }
 
     /// The hit of a ray that starts on an edge of its face and points through an adjacent face.
@@ -468,7 +430,6 @@ fn bounding_sphere((min, max): (DVec3, DVec3), vertices: &[DVec3]) -> BoundingSp
 
 #[cfg(test)]
 mod tests {
-    use super::super::near_surface::NearSurface;
     use super::super::testing::{Uniform, bodies, creature, direction, inward};
     use super::super::{Shape, procedural};
     use super::*;
@@ -478,7 +439,7 @@ mod tests {
 
     impl Mesh {
         pub(in super::super) fn near_surface(&self) -> (&NearSurface, &MeshFrame) {
-            (&self.grids().near_surface, &self.tree.frame)
+            (&self.near_surface, &self.tree.frame)
         }
 
         /// [`Mesh::search`] without the tree.

@@ -23,7 +23,6 @@ mod ply;
 pub mod procedural;
 mod several;
 mod surface;
-mod surface_grids;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -279,13 +278,6 @@ impl Shape {
             Shape::Box { half } => cone.through_cuboid(half, point),
             Shape::Sphere { radius } => cone.through_sphere(radius, point),
             Shape::Mesh(ref mesh) => mesh.clearance_within(point, cone),
-        }
-    }
-
-    /// Makes what flights need, which else the first of them waits for: 0.1 to 0.4 s of a mesh.
-    pub fn prepare(&self) {
-        if let Shape::Mesh(mesh) = self {
-            mesh.prepare();
         }
     }
 

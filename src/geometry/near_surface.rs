@@ -134,27 +134,16 @@ impl NearSurface {
         self.grids.get(octave)?.at([i >> (octave + 1), j >> (octave + 1), k >> (octave + 1)])
     }
 
+    /// Memory that making it needed for a moment beside what it holds, bytes: bounds in every fine voxel.
+    pub(super) fn building_bytes(&self) -> usize {
+        size_of::<NormalBounds>() * self.voxels.len()
+    }
+
     /// Memory behind it, bytes.
     pub(super) fn heap_bytes(&self) -> usize {
         let grids: usize = self.grids.iter().map(NormalGrid::heap_bytes).sum();
         size_of_val(&*self.eights) + size_of_val(&*self.fine) + grids
     }
-}
-
-/// Memory that making it needs for a moment beside what it holds, bytes: bounds in every fine voxel. `coarse` are those of the
-/// clearance.
-pub(super) fn building_bytes(coarse: &Voxels) -> usize {
-    8 * size_of::<NormalBounds>() * coarse.len()
-}
-
-/// About what [`NearSurface::heap_bytes`] will be, of a surface of an area in units of the frame.
-pub(super) fn expected_bytes(coarse: &Voxels, area: f64) -> usize {
-    // The layer that the surface passes through, and one inside, each thicker where it is oblique.
-    const LAYERS: f64 = 3.0;
-    let beside = (LAYERS * area / (coarse.edge() * coarse.edge())).min(coarse.len() as f64);
-    // Grids of normals: as many voxels as there are coarse ones, an eighth of them, and so on.
-    let bounds = coarse.len() * 8 / 7 * size_of::<NormalBounds>();
-    coarse.len() * size_of::<u32>() + beside as usize * size_of::<[FineVoxel; 8]>() + bounds
 }
 
 #[cfg(test)]

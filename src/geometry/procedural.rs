@@ -272,7 +272,7 @@ mod tests {
 
     #[test]
     fn extremes_of_the_parameters_are_manifolds() {
-        for subdivisions in 0..=5 {
+        for subdivisions in 0..=6 {
             bumpy_sphere(1.0, subdivisions, 0.5, 1000.0, true).expect("closed");
             lumpy_sphere(1.0, subdivisions, 0.5, true).expect("closed");
             cavity_sphere(1.0, 0.999, subdivisions, true).expect("closed");

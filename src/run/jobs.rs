@@ -69,7 +69,7 @@ pub(crate) struct Built {
     estimators: BTreeMap<String, Arc<dyn Estimator>>,
 }
 
-/// As [`plan`], where equal parts of plans are built once: for plans that are not run, as the arms of a claim share them, too.
+/// As [`plan`], for plans that are not run: equal parts are built once, those of the two arms of one estimator, too.
 ///
 /// # Errors
 /// Those of [`plan`].
@@ -94,21 +94,14 @@ pub(super) fn plan_stage(
             "give it one, as `budget.passes = 64`",
         ));
     }
-    let known = built.as_mut().map(|built| std::mem::take(&mut built.shapes)).unwrap_or_default();
+    let known = built.as_ref().map(|built| built.shapes.clone()).unwrap_or_default();
     let mut builder = Builder::new(experiment, &known);
     let bands = builder.bands().to_vec();
-    let cells = cells(experiment, &mut builder);
-    if built.is_none() {
-        // Now: no estimator's time is to hold it, and the memory of the scenes is to be known.
-        cells.iter().flatten().for_each(|cell| cell.scene.shape.prepare());
-    }
+    let cells = cells(experiment, &mut builder)?;
     let scene_bytes = [builder.memory_bytes(), builder.building_bytes()];
-    let shapes = builder.into_shapes();
     if let Some(built) = &mut built {
-        built.shapes = known;
-        built.shapes.extend(shapes);
+        built.shapes.extend(builder.into_shapes());
     }
-    let cells = cells?;
     let observables: Vec<Vec<Observable>> = cells.iter().map(|cell| named(&cell.layout)).collect();
     let scenes: Vec<&Scene> = cells.iter().map(|cell| &*cell.scene).collect();
     let mut refusals = Refusals::default();

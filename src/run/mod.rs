@@ -109,19 +109,7 @@ pub(crate) fn run(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<Ran> {
-    run_plan(experiment, plan(experiment, registry)?, options, interrupt)
-}
-
-/// As [`run`], by the experiment's [`plan`].
-///
-/// # Errors
-/// Those of [`run`].
-pub(crate) fn run_plan(
-    experiment: &Experiment,
-    mut plan: Plan,
-    options: &Options,
-    interrupt: &Interrupt,
-) -> Result<Ran> {
+    let mut plan = plan(experiment, registry)?;
     if let Some(folder) = &options.passes_of {
         take_passes(&mut plan, experiment, &RecordFolder::new(folder.join(&experiment.file.name)))?;
     }

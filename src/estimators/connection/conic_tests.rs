@@ -76,7 +76,7 @@ fn light_that_enters_is_found() {
 #[test]
 fn light_that_enters_is_found_just_below_the_boundary() {
     for body in bodies() {
-        find_entering_light(body, 200, of_every_order);
+        find_entering_light(body, 400, of_every_order);
     }
 }
 

@@ -473,8 +473,6 @@ fn even_lights_are_sampled_where_it_pays() {
     let lights = || vec![sky(), cap(DVec3::new(0.5, 0.1, 0.7), 0.01, 50.0)];
     let mesh = Shape::Mesh(procedural::icosphere(1.0, 2, false).expect("closed"));
     let draw = WalkDraw::Guided { share: 0.95, nodes: 16, least_depth: Some(5.0), near_lights: true };
-    // Once, not for every clone.
-    mesh.prepare();
     for shape in [SPHERE, mesh] {
         // An albedo of 0.9 is 0.64 after similarity, one of 0.95 is 0.79.
         for (boundary, albedo, depth, is_sampled) in [

@@ -52,7 +52,7 @@ fn estimators(shape: &Arc<Shape>) -> Vec<(String, Arc<Scene>, Box<dyn Estimator>
         let scene = body(shape, boundary, &media, &[Lamp::Sun, Lamp::Disc, Lamp::WideDisc]);
         let mut scene = Arc::into_inner(scene).expect("not shared");
         let bounds = shape.bounds().expect("finite");
-        let sensor = BodyFlux { bounds, frame: Frame::about(DVec3::Z), bins: 1, paths: 8 };
+        let sensor = BodyFlux { bounds, frame: Frame::about(DVec3::Z), bins: 1, paths: 64 };
         scene.sensor = Sensor::BodyFlux(sensor);
         Arc::new(scene)
     };

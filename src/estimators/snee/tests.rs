@@ -186,8 +186,6 @@ fn connections_side_by_side_are_connections_one_by_one() {
         name: "sun".into(),
         emission: Emission::Directional { toward, irradiance: vec![1.0, 0.3] },
     };
-    // Once, not for every clone.
-    bodies.iter().for_each(Shape::prepare);
     let mut events = 0;
     let scenes = bodies
         .iter()
@@ -247,8 +245,6 @@ fn guesses_are_no_nearer_than_their_bound() {
         [Shape::Sphere { radius: 1.0 }, Shape::Box { half }, Shape::HalfSpace, Shape::Mesh(mesh)];
     let stream = &mut StreamKey::named("guesses_are_no_nearer_than_their_bound").pass(0);
     let mut stream = stream.stream(0, Purpose::Walk);
-    // Once, not for every clone.
-    bodies.iter().for_each(Shape::prepare);
     for (body, eta) in bodies.iter().flat_map(|body| [(body, 1.4), (body, 0.8)]) {
         let sphere = scene(Boundary::Smooth { eta }, &[(9.0, 0.9, 0.0)], cap(0.2, 1));
         let sphere = Arc::into_inner(sphere).expect("not shared");
