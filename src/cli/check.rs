@@ -30,7 +30,7 @@ pub(super) struct Args {
 /// # Errors
 /// The findings of all files together.
 pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Result<()> {
-    let mut findings = Vec::new();
+    let (mut findings, threads) = (Vec::new(), Options::new("").threads);
     for path in &experiment_files(&args.files)? {
         let options = args.reading.options();
         let load_setting = |setting: &String| {
@@ -39,8 +39,8 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut dyn Write) -> Resu
         let checked = load(path, &options, registry).and_then(|experiment| {
             let others: &[String] = if options.setting.is_some() { &[] } else { &experiment.settings };
             let mut built = Built::default();
-            let own = plan_with(&experiment, registry, &mut built);
-            let planned = |setting| plan_with(&load_setting(setting)?, registry, &mut built);
+            let own = plan_with(&experiment, registry, threads, &mut built);
+            let planned = |setting| plan_with(&load_setting(setting)?, registry, threads, &mut built);
             let mut wrong: Vec<Diagnostic> = Vec::new();
             let remarks = own.as_ref().map_or(String::new(), |plan| notes(plan) + &too_large(plan));
             for planned in std::iter::once(own).chain(others.iter().map(planned)) {

@@ -40,8 +40,8 @@ pub(super) struct Args {
 /// Bad input; memory that does not suffice.
 pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Result<u8> {
     let experiment = load(&args.file, &args.reading.options(), registry)?;
-    let plan = run::plan(&experiment, registry)?;
     let threads = args.threads.unwrap_or_else(|| run::Options::new("").threads);
+    let plan = run::plan(&experiment, registry, threads)?;
     let available = available();
     // As a run does: the estimators of a cell by turns where there is room for all of them.
     let is_interleaved = plan.memory(threads, true).fits(available);

@@ -59,9 +59,9 @@ pub(super) fn run(args: &Args, registry: &Registry, out: &mut impl Write) -> Res
         experiments.iter().try_for_each(|e| crate::run::refuse_to_replace(e, &options.out))?;
     }
     if let [_, _, ..] = experiments[..] {
-        experiments
-            .iter()
-            .try_for_each(|experiment| crate::run::plan(experiment, registry).map(drop))?;
+        experiments.iter().try_for_each(|experiment| {
+            crate::run::plan(experiment, registry, options.threads).map(drop)
+        })?;
     }
     if let Some(address) = &args.tev {
         match Live::connect(address) {

@@ -241,7 +241,7 @@ impl Court<'_> {
             if !self.replaces {
                 crate::run::refuse_to_replace(&experiment, &self.working.out)?;
             }
-            plan(&experiment, self.registry)?;
+            plan(&experiment, self.registry, self.working.threads)?;
         }
         Ok(experiment)
     }

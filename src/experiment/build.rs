@@ -1,5 +1,6 @@
 //! From a validated experiment to the scene: the one match from names to types.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -28,18 +29,45 @@ use crate::scene::{Emission, LatLong, Light, Scene};
 /// Shapes by what an experiment file says of them.
 pub(crate) type Shapes = BTreeMap<String, Arc<Shape>>;
 
+/// What an experiment file says of a shape, with the name that the shape has among [`Shapes`].
+pub(crate) struct ShapeWords<'a> {
+    pub name: String,
+    words: &'a ShapeEntry,
+}
+
+impl ShapeWords<'_> {
+    fn of(words: &ShapeEntry) -> ShapeWords<'_> {
+        ShapeWords { name: format!("{words:?}"), words }
+    }
+
+    /// The shape.
+    ///
+    /// # Errors
+    /// A mesh that cannot be read, or bounds no body.
+    pub(crate) fn build(&self, experiment: &Experiment) -> Result<Arc<Shape>> {
+        build_shape(self.words, experiment).map(Arc::new)
+    }
+}
+
+/// What an experiment says of its shapes, each once.
+pub(crate) fn shape_words(experiment: &Experiment) -> Vec<ShapeWords<'_>> {
+    let words = experiment.cells.iter().map(|cell| ShapeWords::of(&cell.object.shape));
+    let mut seen = BTreeSet::new();
+    words.filter(|words| seen.insert(words.name.clone())).collect()
+}
+
 /// Builds the scenes of an experiment; equal shapes and maps are built once and shared.
 pub(crate) struct Builder<'a> {
     experiment: &'a Experiment,
     bands: Vec<Band>,
-    /// Shapes of the same file that have been built before.
+    /// Shapes that have been built before.
     known: &'a Shapes,
     shapes: Shapes,
     maps: BTreeMap<(PathBuf, [u64; 2], bool), Arc<LatLong>>,
 }
 
 impl<'a> Builder<'a> {
-    /// A builder of the experiment's scenes; `known` has shapes of the same file that have been built before.
+    /// A builder of the experiment's scenes; `known` has shapes that have been built before.
     pub(crate) fn new(experiment: &'a Experiment, known: &'a Shapes) -> Builder<'a> {
         let bands = experiment.file.bands.as_ref().map(bands).unwrap_or_default();
         Builder { experiment, bands, known, shapes: BTreeMap::new(), maps: BTreeMap::new() }
@@ -61,9 +89,11 @@ impl<'a> Builder<'a> {
         shapes + self.maps.values().map(|map| map.memory_bytes()).sum::<usize>()
     }
 
-    /// Bytes that making the largest shape took for a moment.
-    pub(crate) fn building_bytes(&self) -> usize {
-        self.shapes.values().map(|shape| shape.building_bytes()).max().unwrap_or(0)
+    /// Bytes that making shapes took for a moment at most, where one is made on each of so many threads.
+    pub(crate) fn building_bytes(&self, threads: usize) -> usize {
+        let mut bytes: Vec<usize> = self.shapes.values().map(|shape| shape.building_bytes()).collect();
+        bytes.sort_unstable_by_key(|bytes| Reverse(*bytes));
+        bytes.iter().take(threads.max(1)).sum()
     }
 
     /// The scene of the cell `index`.
@@ -145,15 +175,15 @@ impl<'a> Builder<'a> {
     }
 
     fn shape(&mut self, words: &ShapeEntry) -> Result<Arc<Shape>> {
-        let name = format!("{words:?}");
-        if let Some(shape) = self.shapes.get(&name) {
+        let words = ShapeWords::of(words);
+        if let Some(shape) = self.shapes.get(&words.name) {
             return Ok(Arc::clone(shape));
         }
-        let shape = match self.known.get(&name) {
+        let shape = match self.known.get(&words.name) {
             Some(known) => Arc::clone(known),
-            None => Arc::new(build_shape(words, self.experiment)?),
+            None => words.build(self.experiment)?,
         };
-        self.shapes.insert(name, Arc::clone(&shape));
+        self.shapes.insert(words.name, Arc::clone(&shape));
         Ok(shape)
     }
 

@@ -157,17 +157,29 @@ impl CenteredBalls {
     /// Of the balls about the centres of voxels near one, those that may be the one worth most to flights of a length that start
     /// within `reach` of its middle, both in units of the frame.
     pub(super) fn about(&self, place: [usize; 3], flight: f64, reach: f64) -> Vec<EmptyBall> {
-        let ball = |&(steps, distance): &([usize; 3], f32)| {
-            let at = array::from_fn(|axis| (place[axis] + steps[axis]).wrapping_sub(ABOUT));
-            let radius = self.radii[self.voxels.index(at)?];
-            (radius > 0.0).then(|| (at, radius, worth(radius, distance, flight as f32)))
-        };
-        let balls: Vec<([usize; 3], f32, f32)> = self.steps.iter().filter_map(ball).collect();
-        let most = balls.iter().map(|ball| ball.2).fold(f32::NEG_INFINITY, f32::max);
+        let flight = flight as f32;
+        let mut balls: Vec<([usize; 3], f32, f32)> = Vec::with_capacity(self.steps.len());
+        let mut most = f32::NEG_INFINITY;
+        let [i, j, k] = place;
+        for &([di, dj, dk], distance) in &self.steps {
+            // Beside the grid, or wrapped around to what is far beside it.
+            let at = [
+                (i + di).wrapping_sub(ABOUT),
+                (j + dj).wrapping_sub(ABOUT),
+                (k + dk).wrapping_sub(ABOUT),
+            ];
+            let Some(index) = self.voxels.index(at) else { continue };
+            let radius = self.radii[index];
+            if radius > 0.0 {
+                let worth = worth(radius, distance, flight);
+                most = most.max(worth);
+                balls.push((at, radius, worth));
+            }
+        }
         // On the way from the middle one ball loses no more than the way is long, and another gains no more.
         let least = most - 2.0 * reach as f32;
-        let near = balls.into_iter().filter(|ball| ball.2 >= least);
-        near.map(|(at, radius, _)| self.ball(at, radius)).collect()
+        let near = balls.iter().filter(|ball| ball.2 >= least);
+        near.map(|&(at, radius, _)| self.ball(at, radius)).collect()
     }
 }
 

@@ -116,9 +116,19 @@ fn grow(line: &[u32], grown: &mut [u32]) {
 /// The least of value plus squared distance.
 fn transform(line: &[u32], transformed: &mut [u32]) {
     for (i, value) in transformed.iter_mut().enumerate() {
-        let far = |j: usize| (i.abs_diff(j) * i.abs_diff(j)) as u32;
-        *value =
-            line.iter().enumerate().map(|(j, &value)| value.saturating_add(far(j))).fold(FAR, u32::min);
+        let mut least = line[i];
+        // From there on every value is larger.
+        for (away, far) in (1..line.len()).map(|away| (away, (away * away) as u32)) {
+            if far >= least {
+                break;
+            }
+            let beside = [i.checked_sub(away), Some(i + away)].map(|j| line.get(j?).copied());
+            least = beside
+                .into_iter()
+                .flatten()
+                .fold(least, |least, value| least.min(value.saturating_add(far)));
+        }
+        *value = least;
     }
 }
 

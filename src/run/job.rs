@@ -496,7 +496,7 @@ mod tests {
         let options = LoadOptions { sets: vec!["bands = { rgb = {} }".into()], setting: None };
         let registry = Registry::builtin();
         let experiment = experiment::load(file.as_ref(), &options, &registry).expect("an experiment");
-        let mut plan = plan(&experiment, &registry).expect("a plan");
+        let mut plan = plan(&experiment, &registry, 1).expect("a plan");
         let Task::Estimate(passes) = &mut plan.jobs[0].task else { panic!("passes") };
         passes.estimator = Arc::new(Spinning);
         assert_eq!(passes.groups.len(), 3);
@@ -539,7 +539,7 @@ mod tests {
             let options = LoadOptions { sets: Vec::new(), setting: None };
             let experiment =
                 experiment::load(file.as_ref(), &options, &registry).expect("an experiment");
-            let mut plan = plan(&experiment, &registry).expect("a plan");
+            let mut plan = plan(&experiment, &registry, 1).expect("a plan");
             let Task::Estimate(passes) = &mut plan.jobs[0].task else { panic!("passes") };
             let given = Arc::default();
             passes.estimator = Arc::new(Counting { at_once, given: Arc::clone(&given) });

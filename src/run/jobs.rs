@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde_json::{Value, json};
 
@@ -13,9 +14,10 @@ use super::decidable;
 use super::job::{Arm, BudgetTerms, Group, Job, Passes, SetUp, Task, band_groups};
 use super::keys::{KEY_VERSION, Stage, StreamName};
 use super::memory::MemoryEstimate;
+use super::parallel::in_parallel;
 use crate::error::{Error, Refusals, Result};
 use crate::estimators::{Estimator, Layout};
-use crate::experiment::build::{self, Builder, Shapes};
+use crate::experiment::build::{self, Builder, ShapeWords, Shapes};
 use crate::experiment::registry::Registry;
 use crate::experiment::schema::{Budget, CONTROL, ClaimEntry, CostMeasure, Faster, SamplerEntry};
 use crate::experiment::{CellSpec, Experiment, titled};
@@ -52,13 +54,13 @@ impl Plan {
 /// Observables per cell that a record holds at most.
 const MOST_OBSERVABLES: usize = 4096;
 
-/// Builds everything an experiment needs; what cannot be built is found here, before any work.
+/// Builds everything an experiment needs, on a number of threads; what cannot be built is found here, before any work.
 ///
 /// # Errors
 /// Everything that only shows when it is built: meshes, maps, sensors inside bodies, claims on
 /// observables that do not exist, options that a sampler refuses.
-pub(crate) fn plan(experiment: &Experiment, registry: &Registry) -> Result<Plan> {
-    plan_stage(experiment, registry, Stage::Main, None)
+pub(crate) fn plan(experiment: &Experiment, registry: &Registry, threads: usize) -> Result<Plan> {
+    plan_stage(experiment, registry, threads, Stage::Main, None)
 }
 
 /// What plans of a file's settings have built, for the next one: settings often differ in budgets only.
@@ -76,15 +78,17 @@ pub(crate) struct Built {
 pub(crate) fn plan_with(
     experiment: &Experiment,
     registry: &Registry,
+    threads: usize,
     built: &mut Built,
 ) -> Result<Plan> {
-    plan_stage(experiment, registry, Stage::Main, Some(built))
+    plan_stage(experiment, registry, threads, Stage::Main, Some(built))
 }
 
 /// Plans the passes of `stage`.
 pub(super) fn plan_stage(
     experiment: &Experiment,
     registry: &Registry,
+    threads: usize,
     stage: Stage,
     mut built: Option<&mut Built>,
 ) -> Result<Plan> {
@@ -94,11 +98,11 @@ pub(super) fn plan_stage(
             "give it one, as `budget.passes = 64`",
         ));
     }
-    let known = built.as_ref().map(|built| built.shapes.clone()).unwrap_or_default();
+    let known = shapes(experiment, threads, built.as_deref());
     let mut builder = Builder::new(experiment, &known);
     let bands = builder.bands().to_vec();
     let cells = cells(experiment, &mut builder)?;
-    let scene_bytes = [builder.memory_bytes(), builder.building_bytes()];
+    let scene_bytes = [builder.memory_bytes(), builder.building_bytes(threads)];
     if let Some(built) = &mut built {
         built.shapes.extend(builder.into_shapes());
     }
@@ -110,9 +114,9 @@ pub(super) fn plan_stage(
     let are_claims_sound = comparisons.is_some();
     let comparisons = comparisons.unwrap_or_default();
     let inputs = json!(build::inputs(experiment));
-    let mut planner = Planner { experiment, registry, bands: &bands, inputs, stage, built };
+    let planner = Planner { experiment, registry, bands: &bands, inputs, stage };
     let arms = Duels::new(experiment);
-    let mut jobs = Vec::new();
+    let mut planned = Vec::new();
     for (index, cell) in cells.iter().enumerate() {
         let wanted = claimed(experiment, index, &comparisons).filter(|_| are_claims_sound);
         for (entry, words) in experiment.file.estimator.iter().enumerate() {
@@ -123,11 +127,11 @@ pub(super) fn plan_stage(
             let share = share(experiment, cell.spec, &words.name);
             let terms = BudgetTerms { targets, share, budget: cell.spec.budget.clone() };
             for arm in arms.of(cell.spec, &words.name) {
-                let job = planner.passes(index, cell, entry, arm, terms.clone());
-                jobs.extend(refusals.keep(&cell.spec.label, job)?);
+                planned.push(PlannedPasses { index, cell, entry, arm, terms: terms.clone() });
             }
         }
     }
+    let mut jobs = planner.passes(planned, threads, built, &mut refusals)?;
     for index in 0..experiment.file.sampler.len() {
         jobs.extend(refusals.keep("", planner.draws(index))?);
     }
@@ -189,6 +193,28 @@ fn cells<'a>(experiment: &'a Experiment, builder: &mut Builder) -> Result<Vec<Bu
     Ok(cells)
 }
 
+/// The shapes of an experiment, as far as they can be built: the rest is refused in the cells that it is of.
+fn shapes(experiment: &Experiment, threads: usize, built: Option<&Built>) -> Shapes {
+    let mut known = built.map(|built| built.shapes.clone()).unwrap_or_default();
+    let new: Vec<ShapeWords> = build::shape_words(experiment)
+        .into_iter()
+        .filter(|words| !known.contains_key(&words.name))
+        .collect();
+    let shapes = in_parallel(threads, new.len(), |i| new[i].build(experiment).ok());
+    let named = new.iter().zip(shapes).filter_map(|(words, shape)| Some((words.name.clone(), shape?)));
+    known.extend(named);
+    known
+}
+
+/// An estimator to be measured in a cell.
+struct PlannedPasses<'a> {
+    index: usize,
+    cell: &'a BuiltCell<'a>,
+    entry: usize,
+    arm: Arm,
+    terms: BudgetTerms,
+}
+
 /// Input common to every job of a plan.
 struct Planner<'a> {
     experiment: &'a Experiment,
@@ -197,23 +223,53 @@ struct Planner<'a> {
     /// Hashes of the files that the scenes read.
     inputs: Value,
     stage: Stage,
-    built: Option<&'a mut Built>,
 }
 
 impl Planner<'_> {
-    /// The passes of an estimator in a cell.
+    /// The jobs of what is planned: each with an estimator of its own, unless plans share what they build.
     fn passes(
-        &mut self,
-        index: usize,
-        cell: &BuiltCell,
-        entry: usize,
-        arm: Arm,
-        terms: BudgetTerms,
-    ) -> Result<Job> {
+        &self,
+        planned: Vec<PlannedPasses>,
+        threads: usize,
+        mut built: Option<&mut Built>,
+        refusals: &mut Refusals,
+    ) -> Result<Vec<Job>> {
+        let names: Option<Vec<String>> =
+            built.is_some().then(|| planned.iter().map(|one| self.name(one)).collect());
+        let mut new: Vec<usize> = (0..planned.len()).collect();
+        if let (Some(built), Some(names)) = (&built, &names) {
+            let mut seen = BTreeSet::new();
+            new.retain(|&i| !built.estimators.contains_key(&names[i]) && seen.insert(&names[i]));
+        }
+        let made = in_parallel(threads, new.len(), |i| self.estimator(&planned[new[i]]));
+        let mut made: BTreeMap<usize, _> = new.into_iter().zip(made).collect();
+        let mut jobs = Vec::new();
+        for (i, one) in planned.into_iter().enumerate() {
+            let shared = built.as_deref_mut().zip(names.as_ref().map(|names| &names[i]));
+            let (estimator, set_up) = match (made.remove(&i), shared) {
+                (Some(made), shared) => {
+                    let Some(made) = refusals.keep(&one.cell.spec.label, made)? else { continue };
+                    if let Some((built, name)) = shared {
+                        built.estimators.insert(name.clone(), Arc::clone(&made.0));
+                    }
+                    made
+                }
+                (None, Some((built, name))) => match built.estimators.get(name) {
+                    Some(known) => (Arc::clone(known), Duration::ZERO),
+                    // Refused already, in its other arm.
+                    None => continue,
+                },
+                (None, None) => unreachable!("what is not shared is made for each"),
+            };
+            jobs.push(self.job(one, estimator, SetUp::built(set_up)));
+        }
+        Ok(jobs)
+    }
+
+    /// The passes of an estimator in a cell.
+    fn job(&self, planned: PlannedPasses, estimator: Arc<dyn Estimator>, set_up: SetUp) -> Job {
+        let PlannedPasses { index, cell, entry, arm, terms } = planned;
         let words = self.experiment.estimator(index, entry);
-        let before = thread_cpu_time();
-        let estimator = self.estimator(index, cell, entry)?;
-        let set_up = SetUp::built(thread_cpu_time().saturating_sub(before));
         let groups = band_groups(estimator.band_use(), self.bands.len()).into_iter();
         let groups = groups.map(|group| self.group(cell.spec, &arm.name, group)).collect();
         let label = match cell.spec.label.as_str() {
@@ -253,33 +309,30 @@ impl Planner<'_> {
             terms,
         };
         let task = Task::Estimate(Box::new(passes));
-        Ok(Job { label, title, identity: hash_json(&identity), task })
+        Job { label, title, identity: hash_json(&identity), task }
     }
 
-    /// An estimator in a cell: a new one, unless plans share what they build.
-    fn estimator(&mut self, index: usize, cell: &BuiltCell, entry: usize) -> Result<Arc<dyn Estimator>> {
+    /// Name of an estimator in a cell: another for every scene, set of bands, kind and option.
+    fn name(&self, planned: &PlannedPasses) -> String {
+        let words = self.experiment.estimator(planned.index, planned.entry);
+        let content = planned.cell.spec.content();
+        hash_json(&json!([content, self.inputs, self.bands, words.kind]))
+    }
+
+    /// A new estimator in a cell, and the CPU time of building it.
+    fn estimator(&self, planned: &PlannedPasses) -> Result<(Arc<dyn Estimator>, Duration)> {
+        let PlannedPasses { index, cell, entry, .. } = *planned;
         let words = self.experiment.estimator(index, entry);
         let no_kind = || Error::input(format!("estimator `{}` has no kind", words.name));
         let (kind, options) = words.choice().ok_or_else(no_kind)?;
-        let name = self.built.is_some().then(|| {
-            let (content, inputs) = (cell.spec.content(), &self.inputs);
-            hash_json(&json!([content, inputs, self.bands, words.kind]))
-        });
-        let known = |name| self.built.as_ref()?.estimators.get(name).cloned();
-        if let Some(known) = name.as_ref().and_then(known) {
-            return Ok(known);
-        }
         let unknown = || Error::input(format!("estimator `{}`: unknown kind `{kind}`", words.name));
         let registered = self.registry.get(kind).ok_or_else(unknown)?;
+        let before = thread_cpu_time();
         let estimator = (registered.build)(options, Arc::clone(&cell.scene)).map_err(|error| {
             let place = self.experiment.sources.place(index, &format!("estimator.{entry}.{kind}"));
             error.about(&format!("estimator `{}`", words.name)).at(place)
         })?;
-        let estimator: Arc<dyn Estimator> = Arc::from(estimator);
-        if let (Some(built), Some(name)) = (&mut self.built, name) {
-            built.estimators.insert(name, Arc::clone(&estimator));
-        }
-        Ok(estimator)
+        Ok((Arc::from(estimator), thread_cpu_time().saturating_sub(before)))
     }
 
     /// Bands that run together, with their streams.
@@ -434,7 +487,7 @@ mod tests {
             let options = LoadOptions { sets: vec![set.into()], setting: None };
             let experiment =
                 experiment::load(file.as_ref(), &options, &registry).expect("an experiment");
-            let plan = plan_with(&experiment, &registry, &mut built).expect("a plan");
+            let plan = plan_with(&experiment, &registry, 2, &mut built).expect("a plan");
             plan.jobs.iter().filter_map(Job::passes).map(|passes| passes.estimator.clone()).collect()
         };
         let first = estimators("budget.passes=2");

@@ -32,7 +32,7 @@ pub(crate) fn merge(
     folders: &[PathBuf],
     interrupt: &Interrupt,
 ) -> Result<Ran> {
-    let mut plan = super::plan(experiment, registry)?;
+    let mut plan = super::plan(experiment, registry, options.threads)?;
     let name = &experiment.file.name;
     if let Some(folder) = &options.passes_of {
         take_passes(&mut plan, experiment, &RecordFolder::new(folder.join(name)))?;

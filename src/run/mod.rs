@@ -23,8 +23,10 @@ mod assemble;
 mod decidable;
 mod jobs;
 mod merge;
+mod parallel;
 mod replay;
 mod retest;
+mod turns;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -39,8 +41,9 @@ use crate::results::record::Replay;
 use crate::results::store::{RecordFolder, Stored};
 use crate::results::timing::Timing;
 use interrupt::Interrupt;
-use job::Task;
+use job::{Finished, Passes, Task};
 use live::{Live, Show};
+use parallel::in_parallel;
 use progress::Progress;
 use workers::Completed;
 
@@ -109,7 +112,7 @@ pub(crate) fn run(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<Ran> {
-    let mut plan = plan(experiment, registry)?;
+    let mut plan = plan(experiment, registry, options.threads)?;
     if let Some(folder) = &options.passes_of {
         take_passes(&mut plan, experiment, &RecordFolder::new(folder.join(&experiment.file.name)))?;
     }
@@ -218,7 +221,7 @@ fn conclude(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<Ran> {
-    let replays = replays(experiment, plan, &completed, interrupt)?;
+    let replays = replays(experiment, plan, &completed, options.threads, interrupt)?;
     let assembled = assemble::assemble(experiment, plan, completed, replays)?;
     let folder = RecordFolder::new(root);
     let mut stored = folder.write(assembled.record, assembled.arrays)?;
@@ -235,15 +238,19 @@ fn replays(
     experiment: &Experiment,
     plan: &Plan,
     completed: &[Completed],
+    threads: usize,
     interrupt: &Interrupt,
 ) -> Result<Vec<Replay>> {
     let claims = experiment.file.claim.iter().filter_map(|claim| claim.reproduces.as_ref());
     let Some(count) = claims.map(|claim| claim.passes).max() else { return Ok(Vec::new()) };
     let measured = plan.jobs.iter().zip(completed);
     let measured = measured.filter_map(|(job, done)| Some((job.passes()?, done.passes()?)));
-    let replays: Option<Vec<Replay>> = measured
-        .map(|(job, finished)| replay::replay(job, finished, count, &|| interrupt.raised()))
-        .collect();
+    let measured: Vec<(&Passes, &Finished)> = measured.collect();
+    let replay = |(job, finished): (&Passes, &Finished)| {
+        replay::replay(job, finished, count, &|| interrupt.raised())
+    };
+    let replays = in_parallel(threads, measured.len(), |i| replay(measured[i]));
+    let replays: Option<Vec<Replay>> = replays.into_iter().collect();
     replays.ok_or_else(|| {
         Error::Interrupted("all passes are done and kept; the same command resumes from there".into())
     })

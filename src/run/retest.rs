@@ -35,7 +35,7 @@ pub(crate) fn retest(
     interrupt: &Interrupt,
     look: &Remeasured,
 ) -> Result<Stored> {
-    let mut plan = plan_stage(experiment, registry, Stage::Retest, None)?;
+    let mut plan = plan_stage(experiment, registry, options.threads, Stage::Retest, None)?;
     plan.jobs.retain(|job| match &job.task {
         Task::Estimate(passes) => {
             let same = |q: &Quantity| q.cell == passes.cell && q.estimator == passes.arm.name;

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use super::interrupt::Interrupt;
 use super::job::{Job, PassRange, Passes, Task};
 use super::jobs::Plan;
-use super::workers::{self, Lane};
+use super::turns::{Lane, done_everywhere, groups};
 use super::{Options, checkpoint, pilot, take_passes};
 use crate::error::{Error, Result};
 use crate::experiment::Experiment;
@@ -146,7 +146,7 @@ pub(crate) fn run_shard(
     shard: Shard,
     interrupt: &Interrupt,
 ) -> Result<Sharded> {
-    let mut plan = super::plan(experiment, registry)?;
+    let mut plan = super::plan(experiment, registry, options.threads)?;
     let name = &experiment.file.name;
     if let Some(folder) = &options.passes_of {
         take_passes(&mut plan, experiment, &RecordFolder::new(folder.join(name)))?;
@@ -243,7 +243,7 @@ fn keep_own(
     shard: Shard,
     interrupt: &Interrupt,
 ) -> Result<()> {
-    let groups = workers::groups(&plan.jobs, true);
+    let groups = groups(&plan.jobs, true);
     let total = groups.len() as u64;
     let mut own: Vec<bool> = vec![false; plan.jobs.len()];
     for (at, group) in groups.iter().enumerate() {
@@ -300,7 +300,7 @@ fn share(at: u64, total: u64, shard: Shard) -> Option<[u64; 2]> {
 /// are those of batches, or of smaller powers of two where a shard has less than a batch.
 fn parts(lanes: &[Lane], share: [u64; 2], count: u64) -> Vec<PassRange> {
     let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
-    let from = workers::done_everywhere(lanes);
+    let from = done_everywhere(lanes);
     let left = longest - from;
     let level = batch_level(longest).min((left / count).max(1).ilog2());
     let edge = |part: u64| match part {

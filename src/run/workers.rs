@@ -5,6 +5,9 @@
 //! finished blocks in the order of their passes, whatever the order in which they arrive. Blocks are
 //! sized by the time they take; the fixed tree over passes makes results independent of that size.
 //!
+//! Budgets that are not in passes need a pilot of each job ([`super::pilot`]). Workers run pilots side by side, and those of
+//! later cells where the cell under way has no passes left to give.
+//!
 //! The estimators of a cell are interleaved, so that their CPU times can be compared. In one turn of about an
 //! eighth of a second, a worker runs the same part of every arm's passes in the order A B .. B A, so that a
 //! steady drift (clock rate, temperature, other load) adds the same time to each arm. Arms may have different
@@ -22,18 +25,19 @@ use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::checkpoint;
 use super::chi_square::{Draws, Sampled};
 use super::interrupt::Interrupt;
-use super::job::{Block, Finished, Job, PassRange, Passes, Start, Task};
+use super::job::{Block, Finished, Job, PassRange, Start};
 use super::keys::Stage;
 use super::live::Show;
 use super::memory_limits::has_room_for_thread;
 use super::pilot;
 use super::progress::Progress;
+use super::turns::{Lane, Second, Span, done_everywhere, groups, last, turn};
 use crate::error::{Error, Result};
 use crate::experiment::schema::Budget;
 use crate::results::json::hash_json;
@@ -114,6 +118,16 @@ enum Message {
 struct Queue {
     next_group: usize,
     active: Option<Active>,
+    /// Of every job.
+    beginnings: Vec<Beginning>,
+}
+
+/// Whether it is known what is fixed before the first pass of a job.
+enum Beginning {
+    Unknown,
+    /// A worker finds it, maybe by a pilot.
+    UnderWay,
+    Known(Start),
 }
 
 /// The group of jobs under way: one, or the arms of a cell.
@@ -129,42 +143,12 @@ struct Active {
     seconds_per_pass: Option<f64>,
 }
 
-/// A job among those of its group.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Lane {
-    /// Index of the job.
-    pub job: usize,
-    /// Number of all its passes.
-    pub passes: u64,
-    /// The first that is not done.
-    pub next: u64,
-    /// The one after the last that is run here.
-    pub end: u64,
-}
-
-/// A run of passes of one job.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Span {
-    job: usize,
-    start: u64,
-    end: u64,
-    keep_level: u32,
-    twice: Option<Second>,
-}
-
-/// When passes run a second time as a control of CPU time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Second {
-    /// Before the run that counts.
-    Before,
-    /// After it.
-    After,
-}
-
 /// Unit of work of a worker.
 enum Unit {
     /// All draws from a sampler.
     Draws(usize),
+    /// What is fixed before the first pass of a job.
+    Beginning(usize),
     /// Passes of estimators.
     Passes(Turn),
 }
@@ -187,14 +171,18 @@ struct Pool<'a> {
     samplers: usize,
     settings: &'a Settings<'a>,
     queue: Mutex<Queue>,
+    /// A beginning has become known.
+    found: Condvar,
 }
 
 /// Runs every job and returns the results in the order of the jobs. Where the run is interrupted, all
 /// states are saved first.
 pub(crate) fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed>> {
-    let queue = Mutex::new(Queue { next_group: 0, active: None });
+    let beginnings = jobs.iter().map(|_| Beginning::Unknown).collect();
+    let queue = Mutex::new(Queue { next_group: 0, active: None, beginnings });
     let samplers = jobs.iter().filter(|job| job.draws().is_some()).count();
-    let pool = Pool { jobs, groups: groups(jobs, settings.is_interleaved), samplers, settings, queue };
+    let groups = groups(jobs, settings.is_interleaved);
+    let pool = Pool { jobs, groups, samplers, settings, queue, found: Condvar::new() };
     // Bounded: workers wait with finished blocks, so that images do not accumulate in memory.
     let (sender, receiver) = mpsc::sync_channel(settings.threads);
     std::thread::scope(|scope| {
@@ -222,64 +210,6 @@ pub(crate) fn run_all(jobs: &[Job], settings: &Settings) -> Result<Vec<Completed
     })
 }
 
-/// The jobs of a cell together, where they are interleaved; the others one by one.
-pub(super) fn groups(jobs: &[Job], is_interleaved: bool) -> Vec<Vec<usize>> {
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    let cell = |index: usize| jobs[index].passes().map(|passes| passes.cell).filter(|_| is_interleaved);
-    for index in 0..jobs.len() {
-        let own = cell(index);
-        match groups.iter_mut().find(|group| own.is_some() && cell(group[0]) == own) {
-            Some(group) => group.push(index),
-            None => groups.push(vec![index]),
-        }
-    }
-    groups
-}
-
-/// Whole batches of the longest lane for which every lane has completed its part.
-pub(super) fn done_everywhere(lanes: &[Lane]) -> u64 {
-    let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
-    let part =
-        |lane: &Lane| u128::from(lane.next) * u128::from(longest) / u128::from(lane.passes.max(1));
-    let level = batch_level(longest);
-    (lanes.iter().map(part).min().unwrap_or(0) as u64 >> level) << level
-}
-
-/// The pass of the longest lane after which no lane has any left.
-fn last(lanes: &[Lane]) -> u64 {
-    let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
-    let end = |lane: &Lane| {
-        (u128::from(lane.end) * u128::from(longest)).div_ceil(u128::from(lane.passes.max(1))) as u64
-    };
-    lanes.iter().map(end).max().unwrap_or(0)
-}
-
-/// The passes [from, from + length) of the longest lane and the same part of every other, in the order
-/// A B .. B A, except for passes that are done already; and whether none of them was. A single last pass is not
-/// split over both directions of the order.
-fn turn(lanes: &[Lane], from: u64, length: u64, has_control: bool) -> (Vec<Span>, bool) {
-    let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
-    let [middle, end] = [length.div_ceil(2), length].map(|passes| longest.min(from + passes));
-    let span = |lane: &Lane, (from, to): (u64, u64), second: Second| {
-        let part = u128::from(lane.passes);
-        let at = |pass: u64| (u128::from(pass) * part / u128::from(longest)) as u64;
-        let keep_level = batch_level(lane.passes);
-        let twice = (has_control && lane.job == lanes[0].job).then_some(second);
-        Span { job: lane.job, start: at(from), end: at(to), keep_level, twice }
-    };
-    let there = lanes.iter().map(|lane| (lane, span(lane, (from, middle), Second::After)));
-    let back = lanes.iter().rev().map(|lane| (lane, span(lane, (middle, end), Second::Before)));
-    let spans: Vec<(&Lane, Span)> = there.chain(back).collect();
-    let is_whole =
-        length > 1 && spans.iter().all(|(lane, span)| span.start >= lane.next && span.end <= lane.end);
-    let left = |(lane, span): (&Lane, Span)| Span {
-        start: span.start.max(lane.next),
-        end: span.end.min(lane.end),
-        ..span
-    };
-    (spans.into_iter().map(left).filter(|span| span.start < span.end).collect(), is_whole)
-}
-
 /// Stops the other threads where one panics: the run is lost, and they should not continue to its end.
 struct StopOnPanic<'a>(&'a Interrupt);
 
@@ -298,6 +228,7 @@ impl Pool<'_> {
         while let Some(unit) = self.next(sender) {
             let went_on = match unit {
                 Unit::Draws(job) => self.draw(job, sender),
+                Unit::Beginning(job) => self.find_beginning(job),
                 Unit::Passes(turn) => {
                     let was_warm = warm.replace(turn.group) == Some(turn.group);
                     self.take_turn(&turn, was_warm, sender)
@@ -322,7 +253,6 @@ impl Pool<'_> {
             if turn.is_balanced && is_warm {
                 block.settle(span.keep_level, before.or(after).as_ref());
             }
-            // Sent before taking the lock, which another worker's pilot may hold for a long time.
             sender.send(Message::Block { job: span.job, block: Box::new(block) }).ok()?;
         }
         let seconds = begun.elapsed().as_secs_f64() / turn.passes as f64;
@@ -360,7 +290,8 @@ impl Pool<'_> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The next unit of work; begins the next group where the last one has none left.
+    /// The next unit of work: passes of the group under way; else of the next group, once all its beginnings are known; else
+    /// a beginning that no worker finds yet, of this group or a later one.
     fn next(&self, sender: &mpsc::SyncSender<Message>) -> Option<Unit> {
         let mut queue = self.lock();
         loop {
@@ -372,16 +303,34 @@ impl Pool<'_> {
             }
             let group = queue.next_group;
             let jobs = self.groups.get(group)?;
-            queue.next_group += 1;
-            let mut lanes = Vec::new();
-            for &index in jobs {
-                match &self.jobs[index].task {
-                    Task::Draw(_) => return Some(Unit::Draws(index)),
-                    Task::Estimate(passes) => lanes.push(self.begin(index, passes, sender)?),
-                }
+            if let [index] = jobs[..]
+                && self.jobs[index].draws().is_some()
+            {
+                queue.next_group += 1;
+                return Some(Unit::Draws(index));
             }
-            let given = done_everywhere(&lanes);
-            queue.active = Some(Active { group, lanes, given, turn: 0, seconds_per_pass: None });
+            let start = |&index: &usize| match &queue.beginnings[index] {
+                Beginning::Known(start) => Some((index, start.clone())),
+                _ => None,
+            };
+            if let Some(starts) = jobs.iter().map(start).collect::<Option<Vec<_>>>() {
+                queue.next_group += 1;
+                let lanes = starts.into_iter().map(|(index, start)| self.begin(index, start, sender));
+                let lanes: Vec<Lane> = lanes.collect::<Option<_>>()?;
+                let given = done_everywhere(&lanes);
+                queue.active = Some(Active { group, lanes, given, turn: 0, seconds_per_pass: None });
+                continue;
+            }
+            let is_open = |&&index: &&usize| {
+                matches!(queue.beginnings[index], Beginning::Unknown)
+                    && self.jobs[index].passes().is_some()
+            };
+            if let Some(&index) = self.groups[group..].iter().flatten().find(is_open) {
+                queue.beginnings[index] = Beginning::UnderWay;
+                return Some(Unit::Beginning(index));
+            }
+            let waited = self.found.wait_timeout(queue, LOOK);
+            queue = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 
@@ -439,11 +388,11 @@ impl Pool<'_> {
         self.settings.block_passes.unwrap_or(timed.min(fair)).max(1)
     }
 
-    /// Fixes a job's passes and finds which are done. Other workers wait meanwhile.
-    fn begin(&self, index: usize, passes: &Passes, sender: &mpsc::SyncSender<Message>) -> Option<Lane> {
+    /// Fixes the passes of a job, by a pilot where its budget is not in passes; nothing where the run ends meanwhile.
+    fn find_beginning(&self, index: usize) -> Option<()> {
+        let passes = self.jobs[index].passes()?;
         let identity = &self.jobs[index].identity;
-        let path = checkpoint::path(self.settings.root, identity);
-        let earlier = checkpoint::start(&path, identity);
+        let earlier = checkpoint::start(&checkpoint::path(self.settings.root, identity), identity);
         let budget = hash_json(&(self.settings.budget, &passes.terms));
         // A pilot that times itself would find another number each time.
         let count = match (passes.count, &earlier) {
@@ -451,13 +400,23 @@ impl Pool<'_> {
             (None, Some(earlier)) if earlier.budget == budget => earlier.passes,
             _ => pilot::passes(passes, self.settings.budget?, &|| self.settings.interrupt.raised())?,
         };
+        let start = Start { claims: self.claims(earlier.as_ref()), budget, passes: count };
+        self.lock().beginnings[index] = Beginning::Known(start);
+        self.found.notify_all();
+        Some(())
+    }
+
+    /// Begins a job: finds which of its passes are done. Other workers wait meanwhile.
+    fn begin(&self, index: usize, start: Start, sender: &mpsc::SyncSender<Message>) -> Option<Lane> {
+        let (identity, count) = (&self.jobs[index].identity, start.passes);
         let keep_level = batch_level(count);
         // Where a state has too many passes, or keeps them too coarsely, its passes run again.
-        let PassRange { start: from, end } = passes.part.unwrap_or(PassRange { start: 0, end: count });
+        let part = self.jobs[index].passes()?.part;
+        let PassRange { start: from, end } = part.unwrap_or(PassRange { start: 0, end: count });
+        let path = checkpoint::path(self.settings.root, identity);
         let mut done = checkpoint::load_passes(&path, identity, from, keep_level)
             .filter(|block| block.next_pass() <= end)
             .unwrap_or_else(|| Block::empty(from, keep_level));
-        let start = Start { claims: self.claims(earlier.as_ref()), budget, passes: count };
         let next = done.next_pass();
         done.tally.processes += u64::from(next < end);
         sender.send(Message::Begin { job: index, start, done: Box::new(done), end }).ok()?;
@@ -626,60 +585,87 @@ impl<'a> Collector<'a> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
     use super::*;
+    use crate::estimators::{Estimator, Scores};
+    use crate::experiment::registry::Registry;
+    use crate::experiment::{self, LoadOptions};
+    use crate::run::job::Task;
+    use crate::run::plan;
+    use crate::sampling::stream::PassKey;
 
-    /// (job, first pass, last) of a turn.
-    fn order(lanes: &[Lane], from: u64, length: u64) -> (Vec<(usize, u64, u64)>, bool) {
-        let (spans, is_whole) = turn(lanes, from, length, false);
-        (spans.iter().map(|s| (s.job, s.start, s.end)).collect(), is_whole)
+    /// How many have come, and whether one waited in vain for the other.
+    #[derive(Default)]
+    struct Place {
+        come: Mutex<(usize, bool)>,
+        comes: Condvar,
     }
 
-    #[test]
-    fn rivals_run_in_an_order_that_cancels_drift() {
-        let lane = |job| Lane { job, passes: 300, next: 0, end: 300 };
-        let lanes = [lane(3), lane(5), lane(8)];
-        let (spans, is_whole) = order(&lanes, 8, 8);
-        assert!(is_whole);
-        let expected = [(3, 8, 12), (5, 8, 12), (8, 8, 12), (8, 12, 16), (5, 12, 16), (3, 12, 16)];
-        assert_eq!(spans, expected);
-        // With a steady drift, the middle of the passes of every arm is at the same time.
-        for job in [3, 5, 8] {
-            let places = spans.iter().enumerate().filter(|(_, s)| s.0 == job).map(|(i, _)| i);
-            assert_eq!(places.sum::<usize>(), 5);
+    /// An estimator whose first pass, which is one of its pilot, waits for that of another.
+    struct Meeting {
+        place: Arc<Place>,
+        has_begun: AtomicBool,
+    }
+
+    impl Estimator for Meeting {
+        fn pass(&self, _: &[usize], _: &PassKey, scores: &mut Scores) {
+            scores.observables[0] += 1.0;
+            if self.has_begun.swap(true, Ordering::Relaxed) {
+                return;
+            }
+            let mut come = self.place.come.lock().expect("no panic");
+            come.0 += 1;
+            self.place.comes.notify_all();
+            let is_alone = |come: &mut (usize, bool)| come.0 < 2;
+            let waited = self.place.comes.wait_timeout_while(come, Duration::from_secs(10), is_alone);
+            let (mut come, timeout) = waited.expect("no panic");
+            come.1 |= timeout.timed_out();
         }
-        // The first arm's second run stands next to its first, outwards of the others: A C B .. B C A.
-        let (spans, _) = turn(&lanes, 8, 8, true);
-        let twice: Vec<Option<Second>> = spans.iter().map(|span| span.twice).collect();
-        assert_eq!(twice, [Some(Second::After), None, None, None, None, Some(Second::Before)]);
     }
 
+    /// Pilots of two estimators of a cell, and of two groups.
     #[test]
-    fn arms_of_different_lengths_run_the_same_part() {
-        let lanes = [
-            Lane { job: 0, passes: 300, next: 0, end: 300 },
-            Lane { job: 1, passes: 1000, next: 0, end: 1000 },
+    fn pilots_run_side_by_side() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/experiments/compare/nine-cells.toml");
+        let sets = vec![
+            "budget={ relative_error = { at_most = 0.1 } }".into(),
+            "estimator=[{ name = 'a', path = {} }, { name = 'b', path = {} }]".into(),
         ];
-        let turns: Vec<_> = (0..250).flat_map(|i| order(&lanes, 4 * i, 4).0).collect();
-        for (job, passes) in [(0, 300), (1, 1000)] {
-            let mut own: Vec<(u64, u64)> =
-                turns.iter().filter(|s| s.0 == job).map(|s| (s.1, s.2)).collect();
-            assert!(own.windows(2).all(|pair| pair[0].1 == pair[1].0), "no pass is missed or run twice");
-            assert_eq!((own.remove(0).0, own.pop().map(|last| last.1)), (0, Some(passes)));
+        let registry = Registry::builtin();
+        let experiment =
+            experiment::load(file.as_ref(), &LoadOptions { sets, setting: None }, &registry)
+                .expect("valid");
+        for is_interleaved in [true, false] {
+            let mut plan = plan(&experiment, &registry, 2).expect("a plan");
+            plan.jobs.truncate(2);
+            let place = Arc::<Place>::default();
+            for job in &mut plan.jobs {
+                let Task::Estimate(passes) = &mut job.task else { panic!("passes") };
+                assert_eq!(passes.cell, 0);
+                let has_begun = AtomicBool::new(false);
+                passes.estimator = Arc::new(Meeting { place: Arc::clone(&place), has_begun });
+                passes.groups.truncate(1);
+            }
+            let folder = tempfile::tempdir().expect("a folder");
+            checkpoint::prepare(folder.path()).expect("a folder of states");
+            let settings = Settings {
+                threads: 2,
+                block_passes: None,
+                is_interleaved,
+                interrupt: &Interrupt::default(),
+                root: folder.path(),
+                progress: &Progress::new(2, true),
+                show: None,
+                budget: experiment.file.budget.as_ref(),
+                claims: &[],
+            };
+            let completed = run_all(&plan.jobs, &settings).expect("complete");
+            let passes: Vec<u64> = completed.iter().map(|one| one.start.passes).collect();
+            // Every pass gives the same.
+            assert_eq!(passes, [pilot::LEAST_PASSES; 2]);
+            assert_eq!(*place.come.lock().expect("no panic"), (2, false), "one waited in vain");
         }
-        // 150.6 passes of the first arm end in this turn's way back.
-        assert_eq!(order(&lanes, 500, 4).0, [(1, 500, 502), (1, 502, 504), (0, 150, 151)]);
-    }
-
-    #[test]
-    fn what_was_run_is_not_run_again() {
-        let lane = |job, next| Lane { job, passes: 300, next, end: 300 };
-        let lanes = [lane(0, 10), lane(1, 16)];
-        assert_eq!(done_everywhere(&lanes), 8);
-        assert_eq!(order(&lanes, 0, 8), (vec![], false));
-        assert_eq!(order(&lanes, 8, 8), (vec![(0, 10, 12), (0, 12, 16)], false));
-        assert!(order(&lanes, 16, 8).1);
-        // A last pass has no way back.
-        assert_eq!(order(&lanes, 299, 1), (vec![(0, 299, 300), (1, 299, 300)], false));
-        assert!(order(&lanes, 300, 8).0.is_empty());
     }
 }

@@ -4,12 +4,12 @@
 //! integers, and the moments of contrasts are merged by the fixed tree over chunks.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread::Builder;
 
 use super::bins::{Extra, Partition};
 use crate::results::sampler::OWN_DENSITY;
 use crate::run::clock::thread_cpu_time;
 use crate::run::interrupt::Interrupt;
+use crate::run::parallel::in_parallel;
 use crate::samplers::{Contrast, Draw, Sampler};
 use crate::sampling::stream::{Purpose, Stream, StreamKey};
 use crate::stats::moments::Moments;
@@ -123,19 +123,8 @@ impl Counting<'_> {
                     moments.push((chunk, self.chunk(chunk, draws, &mut own)));
                 }
             };
-            let parts = std::thread::scope(|scope| {
-                // A thread that the system refuses is done without: results do not depend on their number.
-                let spawn = |_| Builder::new().spawn_scoped(scope, worker).ok();
-                let others: Vec<_> = (1..threads).filter_map(spawn).collect();
-                let mut parts = vec![worker()];
-                for other in others {
-                    match other.join() {
-                        Ok(part) => parts.push(part),
-                        Err(panic) => std::panic::resume_unwind(panic),
-                    }
-                }
-                parts
-            });
+            // The counts of a worker that finds no chunk left are empty.
+            let parts = in_parallel(threads, threads.max(1), |_| worker());
             let mut moments = Vec::new();
             for (own, part) in parts {
                 counts.add(&own);
