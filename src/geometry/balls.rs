@@ -11,8 +11,6 @@
 //! "Euclidean distance mapping", Computer Graphics and Image Processing 14, 1980): that does not find the best ball
 //! always, and need not.
 
-use std::array;
-
 use super::tree::PAD;
 use super::voxels::Voxels;
 use crate::math::DVec3;
@@ -80,7 +78,9 @@ impl NearbyBall {
 
     /// What the ball is worth, voxels.
     fn worth(&self) -> f32 {
-        let [i, j, k] = self.offset.map(f32::from);
+        // Not `map`, which is not inlined.
+        let [i, j, k] = self.offset;
+        let [i, j, k] = [f32::from(i), f32::from(j), f32::from(k)];
         worth(self.radius, (i * i + j * j + k * k).sqrt(), FLIGHT as f32)
     }
 
@@ -147,9 +147,9 @@ impl CenteredBalls {
             (0..balls.len()).rev().for_each(|index| improve(voxels, index, &mut balls, outside, 1));
         }
         let about = |(index, ball): (usize, NearbyBall)| {
-            let place = voxels.place(index);
-            let at = array::from_fn(|axis| place[axis].wrapping_add_signed(ball.offset[axis].into()));
-            self.ball(at, ball.radius * voxels.edge() as f32)
+            let ([i, j, k], [x, y, z]) = (voxels.place(index), ball.offset);
+            let step = |at: usize, step: i8| at.wrapping_add_signed(step.into());
+            self.ball([step(i, x), step(j, y), step(k, z)], ball.radius * voxels.edge() as f32)
         };
         balls.into_iter().enumerate().map(about).collect()
     }

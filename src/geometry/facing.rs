@@ -84,7 +84,8 @@ impl NormalGrid {
         let mut bounds = vec![NormalBounds::NONE; voxels.len()];
         let fine = self.bounds.iter().enumerate();
         for (index, fine) in fine.filter(|(_, fine)| **fine != NormalBounds::NONE) {
-            let coarse = voxels.index(self.voxels.place(index).map(|at| at / 2));
+            let [i, j, k] = self.voxels.place(index);
+            let coarse = voxels.index([i / 2, j / 2, k / 2]);
             let coarse = coarse.expect("it covers the same box");
             bounds[coarse] = bounds[coarse].with(fine);
         }
