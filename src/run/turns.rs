@@ -19,10 +19,15 @@ pub(super) struct Lane {
 /// A run of passes of one job.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Span {
+    /// Index of the job.
     pub job: usize,
+    /// Its first pass.
     pub start: u64,
+    /// The one after its last.
     pub end: u64,
+    /// Level of the tree over passes at which batches are kept.
     pub keep_level: u32,
+    /// Whether the passes run a second time.
     pub twice: Option<Second>,
 }
 

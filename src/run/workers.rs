@@ -593,35 +593,22 @@ mod tests {
     use crate::experiment::registry::Registry;
     use crate::experiment::{self, LoadOptions};
     use crate::run::job::Task;
+    use crate::run::parallel::rendezvous::Rendezvous;
     use crate::run::plan;
     use crate::sampling::stream::PassKey;
 
-    /// How many have come, and whether one waited in vain for the other.
-    #[derive(Default)]
-    struct Place {
-        come: Mutex<(usize, bool)>,
-        comes: Condvar,
-    }
-
     /// An estimator whose first pass, which is one of its pilot, waits for that of another.
     struct Meeting {
-        place: Arc<Place>,
+        place: Arc<Rendezvous>,
         has_begun: AtomicBool,
     }
 
     impl Estimator for Meeting {
         fn pass(&self, _: &[usize], _: &PassKey, scores: &mut Scores) {
             scores.observables[0] += 1.0;
-            if self.has_begun.swap(true, Ordering::Relaxed) {
-                return;
+            if !self.has_begun.swap(true, Ordering::Relaxed) {
+                self.place.wait();
             }
-            let mut come = self.place.come.lock().expect("no panic");
-            come.0 += 1;
-            self.place.comes.notify_all();
-            let is_alone = |come: &mut (usize, bool)| come.0 < 2;
-            let waited = self.place.comes.wait_timeout_while(come, Duration::from_secs(10), is_alone);
-            let (mut come, timeout) = waited.expect("no panic");
-            come.1 |= timeout.timed_out();
         }
     }
 
@@ -640,7 +627,7 @@ mod tests {
         for is_interleaved in [true, false] {
             let mut plan = plan(&experiment, &registry, 2).expect("a plan");
             plan.jobs.truncate(2);
-            let place = Arc::<Place>::default();
+            let place = Arc::new(Rendezvous::of(2));
             for job in &mut plan.jobs {
                 let Task::Estimate(passes) = &mut job.task else { panic!("passes") };
                 assert_eq!(passes.cell, 0);
@@ -665,7 +652,7 @@ mod tests {
             let passes: Vec<u64> = completed.iter().map(|one| one.start.passes).collect();
             // Every pass gives the same.
             assert_eq!(passes, [pilot::LEAST_PASSES; 2]);
-            assert_eq!(*place.come.lock().expect("no panic"), (2, false), "one waited in vain");
+            assert_eq!(place.state(), (2, 0), "one waited in vain");
         }
     }
 }
