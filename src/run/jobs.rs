@@ -67,9 +67,11 @@ pub(crate) fn plan(experiment: &Experiment, registry: &Registry, threads: usize)
 #[derive(Default)]
 pub(crate) struct Built {
     shapes: Shapes,
-    /// Estimators by the hash of their scene, bands and options.
-    estimators: BTreeMap<String, Arc<dyn Estimator>>,
+    estimators: Estimators,
 }
+
+/// Estimators by the hash of their scene, bands and options, with the CPU time of building each.
+type Estimators = BTreeMap<String, (Arc<dyn Estimator>, Duration)>;
 
 /// As [`plan`], for plans that are not run: equal parts are built once, those of the two arms of one estimator, too.
 ///
@@ -131,7 +133,8 @@ pub(super) fn plan_stage(
             }
         }
     }
-    let mut jobs = planner.passes(planned, threads, built, &mut refusals)?;
+    let mut jobs =
+        planner.passes(planned, threads, built.map(|built| &mut built.estimators), &mut refusals)?;
     for index in 0..experiment.file.sampler.len() {
         jobs.extend(refusals.keep("", planner.draws(index))?);
     }
@@ -231,44 +234,33 @@ impl Planner<'_> {
         &self,
         planned: Vec<PlannedPasses>,
         threads: usize,
-        mut built: Option<&mut Built>,
+        shared: Option<&mut Estimators>,
         refusals: &mut Refusals,
     ) -> Result<Vec<Job>> {
-        let names: Option<Vec<String>> =
-            built.is_some().then(|| planned.iter().map(|one| self.name(one)).collect());
-        let mut new: Vec<usize> = (0..planned.len()).collect();
-        if let (Some(built), Some(names)) = (&built, &names) {
-            let mut seen = BTreeSet::new();
-            new.retain(|&i| !built.estimators.contains_key(&names[i]) && seen.insert(&names[i]));
-        }
+        let name = |(i, one): (usize, &PlannedPasses)| match shared {
+            Some(_) => self.name(one),
+            None => i.to_string(),
+        };
+        let names: Vec<String> = planned.iter().enumerate().map(name).collect();
+        let mut own = Estimators::new();
+        let known = shared.unwrap_or(&mut own);
+        let mut seen = BTreeSet::new();
+        let is_new = |&i: &usize| !known.contains_key(&names[i]) && seen.insert(&names[i]);
+        let new: Vec<usize> = (0..planned.len()).filter(is_new).collect();
         let made = in_parallel(threads, new.len(), |i| self.estimator(&planned[new[i]]));
-        let mut made: BTreeMap<usize, _> = new.into_iter().zip(made).collect();
-        let mut jobs = Vec::new();
-        for (i, one) in planned.into_iter().enumerate() {
-            let shared = built.as_deref_mut().zip(names.as_ref().map(|names| &names[i]));
-            let (estimator, set_up) = match (made.remove(&i), shared) {
-                (Some(made), shared) => {
-                    let Some(made) = refusals.keep(&one.cell.spec.label, made)? else { continue };
-                    if let Some((built, name)) = shared {
-                        built.estimators.insert(name.clone(), Arc::clone(&made.0));
-                    }
-                    made
-                }
-                (None, Some((built, name))) => match built.estimators.get(name) {
-                    Some(known) => (Arc::clone(known), Duration::ZERO),
-                    // Refused already, in its other arm.
-                    None => continue,
-                },
-                (None, None) => unreachable!("what is not shared is made for each"),
-            };
-            jobs.push(self.job(one, estimator, SetUp::built(set_up)));
+        for (i, made) in new.into_iter().zip(made) {
+            let made = refusals.keep(&planned[i].cell.spec.label, made)?;
+            known.extend(made.map(|made| (names[i].clone(), made)));
         }
-        Ok(jobs)
+        // Without those that are refused.
+        let job = |(one, name)| Some(self.job(one, known.get(name)?));
+        Ok(planned.into_iter().zip(&names).filter_map(job).collect())
     }
 
     /// The passes of an estimator in a cell.
-    fn job(&self, planned: PlannedPasses, estimator: Arc<dyn Estimator>, set_up: SetUp) -> Job {
+    fn job(&self, planned: PlannedPasses, (estimator, set_up): &(Arc<dyn Estimator>, Duration)) -> Job {
         let PlannedPasses { index, cell, entry, arm, terms } = planned;
+        let (estimator, set_up) = (Arc::clone(estimator), SetUp::built(*set_up));
         let words = self.experiment.estimator(index, entry);
         let groups = band_groups(estimator.band_use(), self.bands.len()).into_iter();
         let groups = groups.map(|group| self.group(cell.spec, &arm.name, group)).collect();
