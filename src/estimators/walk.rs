@@ -35,7 +35,7 @@ use crate::scene::sensor::PathMeasure;
 #[cfg(test)]
 pub(super) use lanes::may_fly_side_by_side;
 pub(super) use lanes::{passes_at_once, trace_passes};
-pub(super) use rivals::{Rivals, Unrivalled};
+pub(super) use rivals::{LookingRay, Rivals, Unrivalled};
 
 /// How the path's current direction was drawn, as light sampling sees it.
 #[derive(Clone, Copy)]
@@ -209,7 +209,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             let frame = Frame::about(hit.shading_normal);
             let wo = frame.to_local(-self.ray.dir);
             if wo.z > 0.0 {
-                R::look(self, &hit, &frame, wo);
+                R::look(self, LookingRay::Further, &hit, &frame, wo);
             } else {
                 self.scores.note(Anomaly::WrongSide);
             }
@@ -439,7 +439,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         if !self.boundary.is_delta() {
             self.connect_from_surface(hit, &frame, local);
         } else if side == Side::Outside {
-            R::look(self, hit, &frame, local);
+            R::look(self, LookingRay::Own, hit, &frame, local);
             self.look_share = 1.0;
         }
         Some((frame, local))

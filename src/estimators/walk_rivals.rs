@@ -7,6 +7,15 @@ use crate::geometry::{Hit, Shape};
 use crate::math::lanes::{Lanes, VectorLanes};
 use crate::math::{DVec3, Frame};
 
+/// Whose meeting with the boundary is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::estimators) enum LookingRay {
+    /// Of the walk.
+    Own,
+    /// Of the sensor, followed no further.
+    Further,
+}
+
 /// Techniques beside unidirectional sampling.
 pub(in crate::estimators) trait Rivals: Sized {
     /// Nothing happens at a medium vertex.
@@ -37,9 +46,16 @@ pub(in crate::estimators) trait Rivals: Sized {
         1
     }
 
-    /// The walk has met a smooth boundary from outside, from the direction `wo` in the frame of the shading normal:
+    /// A ray has met a smooth boundary from outside, from the direction `wo` in the frame of the shading normal:
     /// scores lights that are seen without scattering by their expectation.
-    fn look<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _: &Hit, _: &Frame, _wo: DVec3) {}
+    fn look<B: WalkBands>(
+        _: &mut CameraWalk<'_, Self, B>,
+        _: LookingRay,
+        _: &Hit,
+        _: &Frame,
+        _wo: DVec3,
+    ) {
+    }
 
     /// Whether [`Self::look`] scores a light that is seen in this way.
     fn is_expected<B: WalkBands>(

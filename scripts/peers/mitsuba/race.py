@@ -39,13 +39,20 @@ from cells import mi  # noqa: E402
 
 PROGRAM = os.path.join(HERE, "..", "..", "..", "target", "release", "scatterproof")
 LUMPY = {"lumpy-20k": 5, "lumpy-82k": 6, "lumpy-1.3M": 8}
-# Name in the table, and in the experiment file.
-ESTIMATORS = {
-    "path": ("path", "path = {}"),
-    "best-environment": ("guided walks", "path = { walk = { guided = {} } }"),
-    "best-disc": ("snee, learned calls", "snee = { learned_calls = {} }"),
-    "best-directional": ("snee, learned calls", "snee = { learned_calls = {} }"),
-}
+
+
+def estimators(cell):
+    """`path` and the most efficient estimator of the cell: name in the table, and in the experiment file."""
+    body, medium, boundary, light = cell
+    path = ("path", "path = {}")
+    if light == "environment":
+        return [path, ("guided walks", "path = { walk = { guided = {} } }")]
+    # A connection takes little time on the sphere alone, and so does a guided step.
+    is_sphere = body == "sphere"
+    kind = "snee_connect" if is_sphere and boundary == "smooth" else "snee"
+    guided = ["walk = { guided = { near_lights = true } }"] if is_sphere and medium == "forward" else []
+    name = ", ".join([kind, "learned calls", *["guided walks" for _ in guided]])
+    return [path, (name, f"{kind} = {{ {', '.join(['learned_calls = {}', *guided])} }}")]
 
 
 def lumpy(level):
@@ -207,8 +214,7 @@ def race(cell, obj, args, folder):
     if not covered.any():
         sys.exit(f"{body}: no pixel sees nothing but the body")
     rows = []
-    for kind in ["path", f"best-{light}"]:
-        label, text = ESTIMATORS[kind]
+    for label, text in estimators(cell):
         _, _, seconds = estimate(text, cell[1:], obj, 64, 1, folder)
         passes = max(64, round(64 * args.seconds / seconds))
         ours, theirs = [], {rival.variant: [] for rival, _ in peers}

@@ -30,7 +30,7 @@ use super::state::{AllCalls, Connections, Slot};
 use super::subdivision::{self, Subdivided};
 use crate::estimators::bands::WalkBands;
 use crate::estimators::vertices::{Unscattered, WalkExit, WalkVertex};
-use crate::estimators::walk::{CameraWalk, Rivals};
+use crate::estimators::walk::{CameraWalk, LookingRay, Rivals};
 use crate::geometry::{Hit, Ray, Shape};
 use crate::math::lanes::{Lanes, VectorLanes};
 use crate::math::{DVec3, Frame};
@@ -123,8 +123,17 @@ impl Rivals for Connections<'_> {
         self.setup.views
     }
 
-    fn look<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>, hit: &Hit, frame: &Frame, wo: DVec3) {
+    fn look<B: WalkBands>(
+        walk: &mut CameraWalk<'_, Self, B>,
+        ray: LookingRay,
+        hit: &Hit,
+        frame: &Frame,
+        wo: DVec3,
+    ) {
+        // A walk that meets the body from outside again has no further rays.
+        walk.rivals.view((walk.look_share < 1.0).then_some(ray));
         expected::score(walk, hit, frame, wo);
+        walk.rivals.view(None);
     }
 
     fn is_expected<B: WalkBands>(

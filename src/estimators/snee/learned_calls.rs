@@ -1,4 +1,4 @@
-//! Probabilities of calls, chosen by a warm-up.
+//! Probabilities of calls, and the number of views, chosen by a warm-up.
 //!
 //! How often a technique pays depends on the body: a connection costs as much as ten steps of a walk, and in a dense medium
 //! most of them find little. A warm-up therefore traces paths on streams that no pass uses, with more calls than the options
@@ -12,11 +12,19 @@
 //! what the walk scores, S_c what call c scores, and B_c is 1 with probability f of the call's technique, all of them
 //! independent. So
 //!   E[score^2 | path] = (W + sum_c f_c S_c)^2 + sum_c f_c (1 - f_c) S_c^2,
-//! whose mean over paths is an unbiased estimate of the second moment, for every f at once. The squared mean of a pixel does not
-//! depend on f; paths come in pairs of one pixel, and the mean product of a pair is an unbiased estimate of it. The cost is
-//!   cost of walks + sum_t f_t cost of calls + cost of densities of subdivision, unless that is left out,
-//! by counted work ([`Prices`]), so that no bit depends on a clock. Chosen are the factors with the least variance times cost
-//! on a fixed ladder. A choice that only one half of the pairs prefers to the given options is noise; then these stay.
+//! whose mean over paths is an unbiased estimate of the second moment, for every f at once.
+//!
+//! Where lights are scored by expectation at several sensor rays of a walk (`expected`), let e_i be what ray i of n sees, e_1
+//! that of the walk, and X all other scores. Then the score is X + (e_1 + .. + e_v) / v with v views, and, given the pixel,
+//!   E[score^2] = E[X^2] + 2 (E[X e_1] / v + (1 - 1 / v) E[X e_i]) + E[e_i^2] / v + (1 - 1 / v) E[e_i e_j],    i > 1, j != i,
+//! because the rays are alike, and those from the second on are alike to the walk, too. Means over the n rays of the warm-up
+//! estimate all five, for every v at once.
+//!
+//! The squared mean of a pixel does not depend on f and v; paths come in pairs of one pixel, and the mean product of a pair is an
+//! unbiased estimate of it. The cost is
+//!   cost of walks + cost of views + sum_t f_t cost of calls + cost of densities of subdivision, unless that is left out,
+//! by counted work ([`Prices`]), so that no bit depends on a clock. Chosen are the factors and views with the least variance times
+//! cost on fixed ladders. A choice that only one half of the pairs prefers to the given options is noise; then these stay.
 //! Emission along flights, which no call changes, is left out of the prediction.
 //!
 //! Results are unbiased for any factors above 0. Subdivision may also have the factor 0, where BSDF and light sampling draw all
@@ -32,6 +40,7 @@ use serde::Deserialize;
 use super::{BandSetup, Snee, SneeOptions};
 use crate::estimators::connection::SolverWork;
 use crate::estimators::field::Path;
+use crate::estimators::walk::LookingRay;
 use crate::estimators::{Cost, Layout, Scores};
 use crate::geometry::Shape;
 use crate::optics::boundary::Boundary;
@@ -73,6 +82,9 @@ const MORE: f64 = 4.0;
 
 /// Factors of the warm-up's probabilities to choose from; the last only for a technique that may be left out.
 const LADDER: [f64; 7] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.0];
+
+/// Numbers of views to choose from, beside the given one.
+const VIEWS: [u32; 6] = [1, 2, 4, 8, 16, 32];
 
 /// What work costs, ns on the machine that it was measured on; only ratios matter. Printed by
 ///
@@ -123,10 +135,10 @@ impl Prices {
         if matches!(shape, Shape::Mesh(_)) { &Prices::MESH } else { &Prices::ANALYTIC }
     }
 
-    /// Of walks with this many views each, without calls.
-    fn walks(&self, scores: &Scores, views: u32) -> f64 {
+    /// Of walks with one view each, without calls.
+    fn walks(&self, scores: &Scores) -> f64 {
         let of = |cost: Cost, price: f64| scores.cost[cost as usize] as f64 * price;
-        of(Cost::Paths, self.path + f64::from(views - 1) * self.view)
+        of(Cost::Paths, self.path)
             + of(Cost::MediumEvents, self.medium_event)
             + of(Cost::BoundaryEvents, self.boundary_event)
     }
@@ -142,23 +154,67 @@ struct NotedScore {
     parts: PerTechnique,
 }
 
+/// What is seen at the sensor rays of a path, in parts of its score, where there are several.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    /// By the walk's own ray.
+    own: f64,
+    /// By the others: the sum, and the sum of squares.
+    further: f64,
+    squares: f64,
+}
+
+/// Sums over paths of products of X and e_i.
+#[derive(Clone, Copy, Debug, Default)]
+struct Products {
+    /// X X, X e_1 and X e_i.
+    rest: f64,
+    with_own: f64,
+    with_further: f64,
+}
+
+/// Sums over half of all paths.
+#[derive(Clone, Debug)]
+struct HalfSums {
+    /// Of each candidate.
+    products: Vec<Products>,
+    /// e_i e_i and e_i e_j.
+    seen: [f64; 2],
+    /// Products of the scores of pairs.
+    squared_mean: f64,
+}
+
+impl HalfSums {
+    /// Sum of second moments with the calls of a candidate and so many views.
+    fn second(&self, candidate: usize, views: u32) -> f64 {
+        let share = 1.0 / f64::from(views);
+        let others = 1.0 - share;
+        let Products { rest, with_own, with_further } = self.products[candidate];
+        let [square, product] = self.seen;
+        rest + 2.0 * (share * with_own + others * with_further) + (share * square + others * product)
+    }
+}
+
 /// What a warm-up writes down.
 #[derive(Debug)]
 pub(super) struct CallNotes {
     prices: &'static Prices,
     /// Factors of the warm-up's probabilities.
     candidates: Vec<PerTechnique>,
+    /// Views of the warm-up.
+    views: u32,
     /// Scores of the present path.
     scores: Vec<NotedScore>,
+    /// What its sensor rays see; the ray that looks, and what it has seen.
+    seen: Seen,
+    view: Option<LookingRay>,
+    seen_now: f64,
     /// Calls of the present path.
     calls: Vec<CalledTechnique>,
     is_called: bool,
     /// Of the next score.
     parts: PerTechnique,
-    /// Sums of second moments of candidates, over the paths of each half.
-    second: [Vec<f64>; 2],
-    /// The same of products of pairs.
-    squared_mean: [f64; 2],
+    halves: [HalfSums; 2],
     /// Cost of all calls, by technique.
     spent: PerTechnique,
     /// How often the density of subdivision was asked for: by calls of each technique, and by walks.
@@ -167,17 +223,21 @@ pub(super) struct CallNotes {
 }
 
 impl CallNotes {
-    fn new(prices: &'static Prices, candidates: Vec<PerTechnique>) -> CallNotes {
-        let second = vec![0.0; candidates.len()];
+    fn new(prices: &'static Prices, candidates: Vec<PerTechnique>, views: u32) -> CallNotes {
+        let products = vec![Products::default(); candidates.len()];
+        let half = HalfSums { products, seen: [0.0; 2], squared_mean: 0.0 };
         CallNotes {
             prices,
             candidates,
+            views,
             scores: Vec::new(),
+            seen: Seen::default(),
+            view: None,
+            seen_now: 0.0,
             calls: Vec::new(),
             is_called: false,
             parts: [0.0; CalledTechnique::COUNT],
-            second: [second.clone(), second],
-            squared_mean: [0.0; 2],
+            halves: [half.clone(), half],
             spent: [0.0; CalledTechnique::COUNT],
             asked: [0.0; CalledTechnique::COUNT],
             asked_by_walks: 0.0,
@@ -190,6 +250,17 @@ impl CallNotes {
         if let Some(technique) = technique {
             self.calls.push(technique);
             self.spent[technique as usize] += self.prices.call[technique as usize];
+        }
+    }
+
+    /// Scores are what this sensor ray sees from here on, or belong to the walk.
+    pub(super) fn view(&mut self, ray: Option<LookingRay>) {
+        let now = std::mem::take(&mut self.seen_now);
+        let Seen { own, further, squares } = &mut self.seen;
+        match std::mem::replace(&mut self.view, ray) {
+            Some(LookingRay::Own) => *own += now,
+            Some(LookingRay::Further) => (*further, *squares) = (*further + now, *squares + now * now),
+            None => {}
         }
     }
 
@@ -215,7 +286,9 @@ impl CallNotes {
     /// A score.
     pub(super) fn score(&mut self, value: f64) {
         let parts = std::mem::take(&mut self.parts);
-        if value.is_finite() && value != 0.0 {
+        if self.view.is_some() {
+            self.seen_now += if value.is_finite() { value } else { 0.0 };
+        } else if value.is_finite() && value != 0.0 {
             let call = self.is_called.then(|| self.calls.len() - 1);
             self.scores.push(NotedScore { call, value, parts });
         }
@@ -224,7 +297,17 @@ impl CallNotes {
     /// The path has ended; it belongs to this half of all paths. Returns its score.
     fn end_path(&mut self, half: usize) -> f64 {
         let mut by_call = vec![0.0; self.calls.len()];
-        for (factors, second) in self.candidates.iter().zip(&mut self.second[half]) {
+        // e_1, and the mean of the others.
+        let Seen { own: own_part, further: further_part, squares } = std::mem::take(&mut self.seen);
+        let views = f64::from(self.views);
+        let others = (views - 1.0).max(1.0);
+        let (own, further) = (views * own_part, views / others * further_part);
+        let all_squares = own_part * own_part + squares;
+        let all = own_part + further_part;
+        let HalfSums { products, seen: [square, product], .. } = &mut self.halves[half];
+        *square += views * all_squares;
+        *product += views / others * (all * all - all_squares);
+        for (factors, products) in self.candidates.iter().zip(products) {
             by_call.fill(0.0);
             let mut expected = 0.0;
             for NotedScore { call, value, parts } in &self.scores {
@@ -246,12 +329,14 @@ impl CallNotes {
                 expected += factor * score;
                 spread += factor * (1.0 - factor) * score * score;
             }
-            *second += expected * expected + spread;
+            products.rest += expected * expected + spread;
+            products.with_own += expected * own;
+            products.with_further += expected * further;
         }
-        let whole = self.scores.iter().map(|score| score.value).sum();
+        let rest: f64 = self.scores.iter().map(|score| score.value).sum();
         self.scores.clear();
         self.calls.clear();
-        whole
+        rest + all
     }
 }
 
@@ -260,6 +345,8 @@ impl CallNotes {
 pub(super) struct ChosenCalls {
     /// Factors of the warm-up's probabilities; `None` where the given options stay.
     factors: Option<PerTechnique>,
+    /// Number of views, where there was more than one to choose from.
+    views: Option<u32>,
     /// Efficiency over that of the given options, as predicted.
     gain: f64,
 }
@@ -305,7 +392,7 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
     let scene = &field.scene;
     let key = StreamKey::named("what calls learn from");
     let rays = scene.sensor.rays_per_pass() as u64;
-    let notes = RefCell::new(CallNotes::new(Prices::of(&scene.shape), candidates));
+    let notes = RefCell::new(CallNotes::new(Prices::of(&scene.shape), candidates, setup.views));
     let mut scores = Scores::new(Layout::new(scene));
     let pairs = paths / 2;
     for pair in 0..pairs {
@@ -324,43 +411,54 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
             snee.trace(&setup, Some(&notes), path, &mut scores);
             product *= notes.borrow_mut().end_path(half);
         }
-        notes.borrow_mut().squared_mean[half] += product;
+        notes.borrow_mut().halves[half].squared_mean += product;
     }
     let notes = notes.into_inner();
-    notes.choice(pairs, notes.prices.walks(&scores, setup.views))
+    notes.choice(pairs, notes.prices.walks(&scores))
 }
 
 impl CallNotes {
-    /// The best candidate, after so many pairs, in which walks without calls had this cost.
+    /// The best candidate and number of views, after so many pairs, in which walks without calls and with one view each had this
+    /// cost.
     fn choice(&self, pairs: u64, walks: f64) -> ChosenCalls {
         let sum = |factors: &PerTechnique, of_all: &PerTechnique| {
             factors.iter().zip(of_all).map(|(factor, all)| factor * all).sum::<f64>()
         };
-        let cost = |factors: &PerTechnique| {
+        let cost = |factors: &PerTechnique, views: u32| {
+            let looking = 2.0 * pairs as f64 * f64::from(views - 1) * self.prices.view;
             let asked = if factors[CalledTechnique::Subdivision as usize] > 0.0 {
                 self.asked_by_walks + sum(factors, &self.asked)
             } else {
                 0.0
             };
-            walks + sum(factors, &self.spent) + self.prices.density * asked
+            walks + looking + sum(factors, &self.spent) + self.prices.density * asked
         };
         // Second moments are per path, of which there are two in a pair.
-        let inefficiency = |candidate: usize, halves: &[usize]| {
-            let second: f64 = halves.iter().map(|half| self.second[*half][candidate]).sum();
-            let squared_mean: f64 = halves.iter().map(|half| self.squared_mean[*half]).sum();
+        let inefficiency = |(candidate, views): (usize, u32), halves: &[HalfSums]| {
+            let second: f64 = halves.iter().map(|half| half.second(candidate, views)).sum();
+            let squared_mean: f64 = halves.iter().map(|half| half.squared_mean).sum();
             let variance = (0.5 * second - squared_mean).max(LEAST_VARIANCE * 0.5 * second);
-            variance * cost(&self.candidates[candidate])
+            variance * cost(&self.candidates[candidate], views)
         };
-        let whole = |candidate: &usize| inefficiency(*candidate, &[0, 1]);
-        let all = 1..self.candidates.len();
-        let best = all.min_by(|a, b| whole(a).total_cmp(&whole(b)));
-        let is_better =
-            |half: usize, best: usize| inefficiency(best, &[half]) < inefficiency(0, &[half]);
-        match best.filter(|best| pairs > 0 && (0..2).all(|half| is_better(half, *best))) {
-            Some(best) => {
-                ChosenCalls { factors: Some(self.candidates[best]), gain: whole(&0) / whole(&best) }
+        let whole = |choice| inefficiency(choice, &self.halves);
+        let given = (0, self.views);
+        // A warm-up with one view does not tell what further ones would see.
+        let others = VIEWS.into_iter().filter(|views| self.views > 1 && *views != self.views);
+        let views = || std::iter::once(self.views).chain(others.clone());
+        let all = (0..self.candidates.len()).flat_map(|candidate| views().map(move |n| (candidate, n)));
+        let all = all.filter(|choice| *choice != given);
+        let best = all.min_by(|a, b| whole(*a).total_cmp(&whole(*b)));
+        let is_better = |half: &HalfSums, best| {
+            let half = std::slice::from_ref(half);
+            inefficiency(best, half) < inefficiency(given, half)
+        };
+        match best.filter(|best| pairs > 0 && self.halves.iter().all(|half| is_better(half, *best))) {
+            Some(best @ (candidate, views)) => {
+                let gain = whole(given) / whole(best);
+                let views = (self.views > 1).then_some(views);
+                ChosenCalls { factors: Some(self.candidates[candidate]), views, gain }
             }
-            None => ChosenCalls { factors: None, gain: 1.0 },
+            None => ChosenCalls { factors: None, views: None, gain: 1.0 },
         }
     }
 }
@@ -433,9 +531,15 @@ impl SneeOptions {
 }
 
 impl ChosenCalls {
-    /// The given options with these calls.
+    /// The given options with these calls and views.
     fn options(&self, given: &SneeOptions) -> SneeOptions {
-        self.factors.map_or_else(|| given.clone(), |factors| given.with_calls(MORE, factors))
+        match self.factors {
+            Some(factors) => {
+                let views = self.views.unwrap_or(given.views);
+                SneeOptions { views, ..given.with_calls(MORE, factors) }
+            }
+            None => given.clone(),
+        }
     }
 }
 
@@ -448,16 +552,18 @@ pub(super) fn notes(given: &SneeOptions, setups: &[BandSetup]) -> Option<String>
         all => all.iter().map(f64::to_string).collect::<Vec<_>>().join(", "),
     };
     let mut calls = Vec::new();
-    let mut add = |name: &str, most: &dyn Fn(&BandSetup) -> Option<f64>| {
-        let numbers: Vec<f64> = learned.iter().filter_map(|(setup, _)| most(setup)).collect();
+    let mut add = |name: &str, number: &dyn Fn(&BandSetup) -> Option<f64>| {
+        let numbers: Vec<f64> = learned.iter().filter_map(|(setup, _)| number(setup)).collect();
         if !numbers.is_empty() {
-            calls.push(format!("{name}.most = {}", list(numbers)));
+            calls.push(format!("{name} = {}", list(numbers)));
         }
     };
-    add("call", &|setup| given.strategies.subdivides().then_some(setup.options.call.most));
-    add("call_alone", &|setup| given.strategies.subdivides().then_some(setup.options.call_alone.most));
-    add("last_vertex", &|setup| setup.options.last_vertex.map(|last| last.most));
-    add("connection", &|setup| setup.specular.as_ref().map(|technique| technique.call.most));
+    let subdivides = given.strategies.subdivides();
+    add("call.most", &|setup| subdivides.then_some(setup.options.call.most));
+    add("call_alone.most", &|setup| subdivides.then_some(setup.options.call_alone.most));
+    add("last_vertex.most", &|setup| setup.options.last_vertex.map(|last| last.most));
+    add("connection.most", &|setup| setup.specular.as_ref().map(|technique| technique.call.most));
+    add("views", &|setup| setup.chosen?.views.map(f64::from));
     let gains =
         learned.iter().map(|(_, ChosenCalls { gain, .. })| (100.0 * gain).round() / 100.0).collect();
     (!learned.is_empty()).then(|| {

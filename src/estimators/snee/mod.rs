@@ -77,12 +77,13 @@ struct BandSetup {
 }
 
 impl BandSetup {
-    /// The same with the calls of these options.
+    /// The same with the calls and views of these options.
     fn calling(&self, options: SneeOptions) -> BandSetup {
         let specular = self.specular.as_ref().and_then(|Specular { solver, .. }| {
             options.connection.map(|call| Specular { call, solver: solver.clone() })
         });
-        BandSetup { options: Arc::new(options), specular, ..self.clone() }
+        let views = if self.views > 1 { options.views } else { 1 };
+        BandSetup { options: Arc::new(options), specular, views, ..self.clone() }
     }
 
     /// Whether every light that shines in the band is connected to as a whole.
@@ -162,7 +163,8 @@ impl Snee {
             };
             let is_looked_for = (options.expected_reflection || options.expected_passage)
                 && guides.iter().any(|guide| !scene.lights[guide.light].is_directional());
-            let views = if is_looked_for { options.views } else { 1 };
+            let is_smooth = matches!(scene.boundary[band], Boundary::Smooth { .. });
+            let views = if is_looked_for && is_smooth { options.views } else { 1 };
             BandSetup {
                 options: options.clone(),
                 guides: guides.into(),

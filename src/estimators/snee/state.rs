@@ -12,7 +12,7 @@ use crate::estimators::bands::WalkBands;
 use crate::estimators::connection::{Root, SolverWork};
 use crate::estimators::field::Path;
 use crate::estimators::vertices::{WalkExit, WalkVertex};
-use crate::estimators::walk::CameraWalk;
+use crate::estimators::walk::{CameraWalk, LookingRay};
 use crate::math::DVec3;
 use crate::optics::boundary::Boundary;
 use crate::sampling::discrete::choose_share;
@@ -115,6 +115,15 @@ impl<'a> Connections<'a> {
     pub(super) fn begin(&self, technique: Option<CalledTechnique>) {
         if let Some(notes) = self.notes {
             notes.borrow_mut().begin(technique);
+        }
+    }
+
+    /// What is scored next is what this sensor ray sees, one of several of the walk; what the walk itself scores where there is
+    /// none.
+    #[inline]
+    pub(super) fn view(&self, ray: Option<LookingRay>) {
+        if let Some(notes) = self.notes {
+            notes.borrow_mut().view(ray);
         }
     }
 

@@ -16,7 +16,7 @@ use super::subdivision;
 use super::testing::*;
 use super::*;
 use crate::estimators::vertices::WalkVertex;
-use crate::estimators::walk::Rivals;
+use crate::estimators::walk::{LookingRay, Rivals};
 use crate::estimators::{Layout, TransportClass, WalkDraw};
 use crate::geometry::{Ray, Shape, Side};
 use crate::math::DVec3;
@@ -549,7 +549,8 @@ fn shadowed_reflections_score_nothing() {
         let mut walk = start(&snee, 0, &pass, &mut scores, &path, course, OneBand);
         let frame = path.exit.frame;
         let DVec3 { x, y, z } = frame.to_local(path.w_l);
-        Connections::look(&mut walk, &path.exit.hit, &frame, DVec3::new(-x, -y, z));
+        let from = DVec3::new(-x, -y, z);
+        Connections::look(&mut walk, LookingRay::Own, &path.exit.hit, &frame, from);
         let score = walk.scores.observables[0];
         assert_eq!(score > 0.0, is_lit, "{score} is mirrored from {:?}", path.exit.hit.point);
     }
