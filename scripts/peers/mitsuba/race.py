@@ -50,9 +50,10 @@ def estimators(cell):
     # A connection takes little time on the sphere alone, and so does a guided step.
     is_sphere = body == "sphere"
     kind = "snee_connect" if is_sphere and boundary == "smooth" else "snee"
-    guided = ["walk = { guided = { near_lights = true } }"] if is_sphere and medium == "forward" else []
-    name = ", ".join([kind, "learned calls", *["guided walks" for _ in guided]])
-    return [path, (name, f"{kind} = {{ {', '.join(['learned_calls = {}', *guided])} }}")]
+    name, options = f"{kind}, learned calls", "learned_calls = {}"
+    if is_sphere and medium == "forward":
+        name, options = f"{name}, guided walks", f"{options}, walk = {{ guided = {{ near_lights = true }} }}"
+    return [path, (name, f"{kind} = {{ {options} }}")]
 
 
 def lumpy(level):

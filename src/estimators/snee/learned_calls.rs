@@ -154,7 +154,7 @@ struct NotedScore {
     parts: PerTechnique,
 }
 
-/// What is seen at the sensor rays of a path, in parts of its score, where there are several.
+/// What a path scores at its sensor rays, where there are several: e_i / n.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
     /// By the walk's own ray.
@@ -443,10 +443,9 @@ impl CallNotes {
         let whole = |choice| inefficiency(choice, &self.halves);
         let given = (0, self.views);
         // A warm-up with one view does not tell what further ones would see.
-        let others = VIEWS.into_iter().filter(|views| self.views > 1 && *views != self.views);
-        let views = || std::iter::once(self.views).chain(others.clone());
+        let ladder = if self.views > 1 { &VIEWS[..] } else { &[] };
+        let views = || std::iter::once(self.views).chain(ladder.iter().copied());
         let all = (0..self.candidates.len()).flat_map(|candidate| views().map(move |n| (candidate, n)));
-        let all = all.filter(|choice| *choice != given);
         let best = all.min_by(|a, b| whole(*a).total_cmp(&whole(*b)));
         let is_better = |half: &HalfSums, best| {
             let half = std::slice::from_ref(half);

@@ -205,6 +205,10 @@ fn the_chosen_number_of_views_is_taken() {
     let chosen: Vec<Option<u32>> =
         snee.setups_in_use().iter().map(|setup| setup.chosen.expect("learned").views).collect();
     assert_eq!(chosen, views.iter().copied().map(Some).collect::<Vec<_>>());
+    let rough = flux(&sphere(), ROUGH, &media, &[Lamp::Disc]);
+    let eight = SneeChoices { views: Some(8), ..Default::default() };
+    let rough = set_up(&rough, &eight, false).expect("served");
+    assert_eq!(rough.setups[0].views, 1, "behind a rough boundary no expectation is scored");
     let given = snee.setups[0].views;
     assert!(views[0] < views[1] && views[1] != given, "{views:?}");
     let note = format!("views = {}, {};", views[0], views[1]);
