@@ -162,7 +162,7 @@ fn efficiency(
         let (low, high) = ratio.interval(confidence);
         (ratio.ratio(), low, high)
     });
-    Ok((ratios, found.is_resolved(confidence), [found.a.kurtosis, found.b.kurtosis]))
+    Ok((ratios, found.is_resolved(&found.work, confidence), [found.a.kurtosis, found.b.kurtosis]))
 }
 
 /// The two-sided critical value of Student's distribution at a level.

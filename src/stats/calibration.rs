@@ -445,7 +445,7 @@ fn coverage(shape: &Distribution, runs: u64) -> Coverage {
         let half_width = found.work.half_width(0.95);
         c.at_95 += u64::from(log <= half_width);
         c.at_999 += u64::from(log <= found.work.half_width(0.999));
-        c.resolved += u64::from(found.is_resolved(0.999));
+        c.resolved += u64::from(found.is_resolved(&found.work, 0.999));
         // log F of n and n degrees of freedom is nearly normal with variance 4 / n.
         let log = found.variance.log.value.abs();
         c.by_f += u64::from(log <= 1.959_964 * (4.0 / 16383.0f64).sqrt());

@@ -16,7 +16,7 @@
 use serde::Serialize;
 
 use super::efficiency::{contest, control_ratio, mean_of};
-use super::evidence::{CONFIDENCE, Evidence, SHOWN};
+use super::evidence::{Evidence, SHOWN};
 use super::means::{QuantityMean, evidence_of_means};
 use super::verdict::known;
 use super::weights;
@@ -194,9 +194,9 @@ fn row(stored: &Stored, subject: &RowSubject, level: f64) -> EfficiencyRow {
     if is_bounded {
         return EfficiencyRow { at_least, ..row };
     }
+    let resolved = contest.is_resolved();
     let efficiency = contest.efficiency;
     let (low, high) = contest.ratio.interval(SHOWN);
-    let resolved = efficiency.is_resolved(CONFIDENCE);
     EfficiencyRow {
         at_least: at_least.filter(|_| !resolved),
         efficiency_ratio: known(efficiency.work.ratio()),

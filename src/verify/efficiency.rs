@@ -15,8 +15,9 @@
 //!
 //! Before any number is quoted
 //!   the two means agree: the test that an `agree` claim would make. An objection to it voids the claim;
-//!   E is resolved: it moved by no more than its 99.9 % interval when the passes doubled, and no pass
-//!   may hold more than 5 % of an arm's sum of squares; by CPU time, the blocks are parts of a run that
+//!   E is resolved: when the passes doubled, the ratio of the variances moved by no more than its 99.9 %
+//!   interval, and E by no more than the one that is quoted, and no pass may hold more than 5 % of an
+//!   arm's sum of squares; by CPU time, the blocks are parts of a run that
 //!   interleaved the arms of the cell, A B .. B A (`run::workers`), the interval includes the effect of the
 //!   machine that the control shows (`stats::efficiency`), and for the baseline and its own control arm the
 //!   99.9 % intervals of both E and the cost ratio contain 1, or the ratios are within 5 % of it. Parts that
@@ -69,6 +70,13 @@ pub(crate) struct Contest {
     /// What the ratio is at least, with [`SHOWN`] confidence from below and above together, where only
     /// the tail of the baseline is not resolved.
     pub at_least: Option<f64>,
+}
+
+impl Contest {
+    /// Whether the ratio may be quoted.
+    pub(super) fn is_resolved(&self) -> bool {
+        self.efficiency.is_resolved(&self.ratio, CONFIDENCE)
+    }
 }
 
 /// Compares two quantities of a record.
@@ -319,12 +327,15 @@ fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<Effici
     }
     let efficiency = &contest.efficiency;
     let kurtosis = (efficiency.b.kurtosis, efficiency.a.kurtosis);
-    if !efficiency.is_resolved(CONFIDENCE) {
+    if !contest.is_resolved() {
+        let interval = |ratio: &LogRatio| ratio.half_width(CONFIDENCE);
         return Err(format!(
-            "not resolved: ln of the ratio moved by {:.2} when the passes doubled, interval +-{:.2}; one pass may \
-             hold {:.1} % of a variance{}",
-            efficiency.moved,
-            efficiency.work.half_width(CONFIDENCE),
+            "not resolved: when the passes doubled, ln of the ratio moved by {:.2}, interval +-{:.2}, and ln of \
+             the ratio of the variances by {:.2}, interval +-{:.2}; one pass may hold {:.1} % of a variance{}",
+            efficiency.moved.work,
+            interval(&contest.ratio),
+            efficiency.moved.variance,
+            interval(&efficiency.variance),
             100.0 * efficiency.a.largest_pass.1.max(efficiency.b.largest_pass.1),
             kurtosis_words(kurtosis, 3)
         ));

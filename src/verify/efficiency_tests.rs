@@ -6,7 +6,9 @@ use super::*;
 use crate::results::record::{
     Against, Claim, ClaimKind, Comparison, ExpectedOutcome, Observable, StatedBias,
 };
-use crate::results::sample::{claim, pairs, quantity, set_observables, set_spread, stored, uniform};
+use crate::results::sample::{
+    PASSES, claim, pairs, quantity, set_observables, set_spread, stored, uniform,
+};
 use crate::results::store::observables_path;
 use crate::results::timing::{Batches, Timing};
 
@@ -238,6 +240,31 @@ fn what_the_control_shows_is_in_the_interval() {
         set_control(&mut s, [1.0, again]);
         let v = by_cpu(s, bound);
         assert_eq!(v.outcome, outcome, "{again}: {v:?}");
+    }
+}
+
+/// `snee` takes 1/3 of the time in the second half: not resolved, unless the control shows that the machine
+/// does such things; then the interval says that nothing is known. A variance that grows 16 times in the second
+/// half is not resolved, whatever the control shows.
+#[test]
+fn a_ratio_that_moves_with_the_machine_is_within_the_control() {
+    let moved = |name: &str, batch: usize| {
+        noisy(name, batch) * if name == "snee" && batch >= BATCHES / 2 { 1.0 / 3.0 } else { 1.0 }
+    };
+    for again in [1.001, 1.3] {
+        let mut s = timed(scored(0.1, 0.05), moved);
+        set_control(&mut s, [1.0, again]);
+        let v = by_cpu(s, 1.5);
+        match again > 1.1 {
+            true => assert_eq!(v.outcome, Outcome::Underpowered, "{v:?}"),
+            false => assert_invalid(&v, "not resolved"),
+        }
+        let mut s = timed(scored(0.1, 0.05), noisy);
+        set_observables(&mut s, "snee", |i, _, _| {
+            1.0 + if i < PASSES / 2 { 0.0125 } else { 0.05 } * uniform(i + 9000).signum()
+        });
+        set_control(&mut s, [1.0, again]);
+        assert_invalid(&by_cpu(s, 1.5), "not resolved");
     }
 }
 
