@@ -3,7 +3,7 @@
 
     scripts/ply_to_closed_obj.py scan.ply body.obj
 
-Python 3.8 or later, standard library only. ASCII PLY only; polygons are cut into fans of triangles.
+Python 3.8 or later, standard library only. PLY as text or binary; polygons are cut into fans of triangles.
 What it does, in this order, with counts on standard output:
 
 1. takes vertices at one position as one, as the loader does;
@@ -20,8 +20,14 @@ limb. A patch may cut through the body; a run then counts `lost_ray`. Lengths st
 `longest_side_mm` in an experiment scales them.
 """
 
+import struct
 import sys
 from collections import defaultdict
+
+
+TYPES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d",
+         "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f",
+         "float64": "d"}
 
 
 def read_ply(path):
@@ -29,28 +35,53 @@ def read_ply(path):
     with open(path, "rb") as file:
         if file.readline().strip() != b"ply":
             sys.exit(f"{path}: not a PLY file")
-        elements = []
+        elements, order = [], None
         for raw in file:
             words = raw.decode("ascii", "replace").split()
             if not words:
                 continue
-            if words[0] == "format" and words[1] != "ascii":
-                sys.exit(f"{path}: format {words[1]}; only ASCII PLY is read")
+            if words[0] == "format":
+                order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}.get(words[1])
             elif words[0] == "element":
                 elements.append((words[1], int(words[2]), []))
             elif words[0] == "property":
-                elements[-1][2].append(words[-1])
+                # Name, its type, and for a list that of its length.
+                is_list = words[1] == "list"
+                elements[-1][2].append((words[-1], words[-2], words[2] if is_list else None))
             elif words[0] == "end_header":
                 break
+        if order is None:
+            sys.exit(f"{path}: a PLY file of no known format")
+        properties = {name: {of[0] for of in properties} for name, _, properties in elements}
+        if not {"x", "y", "z"} <= properties.get("vertex", set()):
+            sys.exit(f"{path}: no vertices with x, y and z")
+        if not {"vertex_indices", "vertex_index"} & properties.get("face", set()):
+            sys.exit(f"{path}: no faces with vertex_indices: a cloud of points is no surface")
+
+        def number(of):
+            form = order + TYPES[of]
+            return struct.unpack(form, file.read(struct.calcsize(form)))[0]
+
+        def row(properties):
+            words = iter(file.readline().split() if not order else [])
+            value = number if order else (lambda of: float(next(words)))
+            found = {}
+            for name, of, length in properties:
+                found[name] = value(of) if length is None else [value(of) for _ in range(int(value(length)))]
+            return found
+
         vertices, faces = [], []
         for name, count, properties in elements:
-            for _ in range(count):
-                words = file.readline().split()
+            for index in range(count):
+                try:
+                    found = row(properties)
+                except (struct.error, StopIteration, ValueError, KeyError):
+                    sys.exit(f"{path}: element `{name}`, row {index + 1} of {count}: cut short, or not what the head states")
                 if name == "vertex":
-                    at = [properties.index(axis) for axis in "xyz"]
-                    vertices.append(tuple(float(words[i]) for i in at))
+                    vertices.append((found["x"], found["y"], found["z"]))
                 elif name == "face":
-                    faces.append([int(word) for word in words[1 : 1 + int(words[0])]])
+                    corners = found.get("vertex_indices") or found["vertex_index"]
+                    faces.append([int(corner) for corner in corners])
     return vertices, faces
 
 
@@ -178,7 +209,8 @@ def main():
             file.write("f {} {} {}\n".format(*(i + 1 for i in triangle)))
     print(f"{target}: {len(vertices)} vertices, {len(triangles)} triangles")
     print(f"  faces dropped: {dropped} not manifold, {lost} outside the largest part")
-    print(f"  holes closed: {len(rims)}, with rims of {sorted(rims)} sides")
+    largest = ", ".join(str(sides) for sides in sorted(rims, reverse=True)[:8])
+    print(f"  holes closed: {len(rims)}" + (f", the largest with rims of {largest} sides" if rims else ""))
 
 
 if __name__ == "__main__":
