@@ -1,8 +1,8 @@
 //! A hierarchy over the triangles of a mesh, with the bounds of their points and normals: which of them
 //! may refract the light of a query.
 
-use super::bounds::{Bounds, PreparedQuery};
-use super::eight::EightBounds;
+use super::bounds::Bounds;
+use super::eight::{EightBounds, EightQuery, Frame};
 use super::patch::Facet;
 use super::throughput::Query;
 use crate::geometry::Mesh;
@@ -39,10 +39,16 @@ pub(super) struct ConeTree {
     /// The same eight by eight, for points; the root is the last.
     wide: Vec<WideNode>,
     facets: Vec<(Bounds, Facet)>,
+    frame: Frame,
 }
 
 /// Facets of a leaf.
 const LEAF: usize = 4;
+
+/// What a place counts against a normal where parts are split. Half a body away, at the distance R, a part of the size r turns
+/// h = eta w - w_L by eta r / (R |h|), and |h| is about 0.3 where eta is 1.3. On a bunny of 100 k flat triangles a query looks at
+/// 397, 247, 162, 138 and 152 nodes with 1, 2, 4, 8 and 16.
+const PLACE: f64 = 8.0;
 
 impl ConeTree {
     pub(super) fn new(mesh: &Mesh) -> ConeTree {
@@ -56,26 +62,27 @@ impl ConeTree {
         let mut nodes = Vec::with_capacity(facets.len());
         let size = mesh.bounds().radius;
         ConeTree::build(&mut nodes, &mut facets, 0, size);
+        let frame = Frame { middle: mesh.bounds().center, size };
         let mut wide = Vec::with_capacity(facets.len() / 4);
-        ConeTree::widen(&mut wide, &facets, 0);
-        ConeTree { nodes, wide, facets }
+        ConeTree::widen(&mut wide, &facets, 0, &frame);
+        ConeTree { nodes, wide, facets, frame }
     }
 
     /// Adds the node of these facets, the first of which has this index, and returns its index.
-    fn widen(wide: &mut Vec<WideNode>, facets: &[(Bounds, Facet)], first: u32) -> u32 {
+    fn widen(wide: &mut Vec<WideNode>, facets: &[(Bounds, Facet)], first: u32, frame: &Frame) -> u32 {
         let node = if facets.len() <= 8 {
             let bounds: Vec<Bounds> = facets.iter().map(|(bounds, _)| *bounds).collect();
-            WideNode { bounds: EightBounds::new(&bounds), parts: WideParts::Facets(first) }
+            WideNode { bounds: EightBounds::new(&bounds, frame), parts: WideParts::Facets(first) }
         } else {
             let slices = eighths(facets);
             let of = |slice: &[(Bounds, Facet)]| ConeTree::bounds(slice.iter().map(|(_, facet)| facet));
             let bounds: Vec<Bounds> = slices.iter().map(|slice| of(slice)).collect();
             let (mut nodes, mut first) = ([0; 8], first);
             for (node, slice) in nodes.iter_mut().zip(slices) {
-                *node = ConeTree::widen(wide, slice, first);
+                *node = ConeTree::widen(wide, slice, first, frame);
                 first += slice.len() as u32;
             }
-            WideNode { bounds: EightBounds::new(&bounds), parts: WideParts::Nodes(nodes) }
+            WideNode { bounds: EightBounds::new(&bounds, frame), parts: WideParts::Nodes(nodes) }
         };
         wide.push(node);
         wide.len() as u32 - 1
@@ -100,8 +107,9 @@ impl ConeTree {
         if facets.len() <= LEAF {
             return;
         }
-        let key =
-            |b: &Bounds, axis: usize| if axis < 3 { b.center[axis] / size } else { b.axis[axis - 3] };
+        let key = |b: &Bounds, axis: usize| {
+            if axis < 3 { PLACE * b.center[axis] / size } else { b.axis[axis - 3] }
+        };
         let spread = |axis: usize| {
             let keys = facets.iter().map(|(b, _)| key(b, axis));
             let (low, high) =
@@ -221,8 +229,8 @@ impl<V: FnMut(&Facet)> Vectorized for FacetSearch<'_, V> {
 
     #[inline(always)]
     fn call(self) -> u64 {
-        let FacetSearch { tree: ConeTree { wide, facets, .. }, query, mut visit } = self;
-        let asked = PreparedQuery::new(query);
+        let FacetSearch { tree: ConeTree { wide, facets, frame, .. }, query, mut visit } = self;
+        let asked = EightQuery::new(query, frame);
         let mut looked = 0;
         let mut open = Vec::with_capacity(64);
         open.push(wide.len() as u32 - 1);

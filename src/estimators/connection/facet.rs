@@ -55,13 +55,16 @@ const MARGIN: f64 = 1e-6;
 /// Height below a facet, in parts of its shorter edge, up to which its conic may not tell the root from x.
 const NEARLY_ON: f64 = 1e-4;
 
+/// Sine of the angle between H and N below which a triangle is solved, whatever else: more than what counts as a root.
+const CLOSE: f64 = 1e-7;
+
 /// Newton steps from the middle of a part.
 const ITERATIONS: u32 = 50;
 
 /// What the search for roots has met.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::estimators) struct SolverWork {
-    /// Nodes of a hierarchy that were looked at.
+    /// Nodes of a hierarchy that were looked at, and triangles that were ruled out without being solved.
     pub nodes: u64,
     /// Triangles, or starts of a walk, that were solved for roots.
     pub solves: u64,
@@ -94,8 +97,8 @@ fn shaded_plane_root(query: &Query, point: DVec3, normal: DVec3, shading: DVec3)
 
 /// Offers every root on the facet to `found`.
 pub(super) fn roots(query: &Query, facet: &Facet, work: &mut SolverWork, found: &mut impl FnMut(Root)) {
-    work.solves += 1;
     let Some((n, m)) = facet.shading else {
+        work.solves += 1;
         if let Some(point) = plane_root(query, facet.corner, facet.normal) {
             let place = facet.place(point);
             let patch = SurfacePatch::plane(point, FaceId(facet.index), facet.normal);
@@ -107,8 +110,13 @@ pub(super) fn roots(query: &Query, facet: &Facet, work: &mut SolverWork, found: 
         }
         return;
     };
-    let mut places = FacetRoots { query, facet, work, found, seen: Vec::new() };
     let whole = Linear { p: facet.corner - query.x, e: facet.edges, n, m };
+    if whole.has_no_root(query) {
+        work.nodes += 1;
+        return;
+    }
+    work.solves += 1;
+    let mut places = FacetRoots { query, facet, work, found, seen: Vec::new() };
     places.search(&whole, [0.0; 2], [[1.0, 0.0], [0.0, 1.0]], CUTS);
     places.search_above();
 }
@@ -126,6 +134,46 @@ impl Linear {
     /// Values at the corners.
     fn corners(base: DVec3, change: [DVec3; 2]) -> [DVec3; 3] {
         [base, base + change[0], base + change[1]]
+    }
+
+    /// Whether it is shown to hold no root, without solving for any.
+    ///
+    /// A root has H x N = 0 with H = eta w - w_L and w = P / |P|. Over the triangle, with barycentric coordinates l_i, N is
+    /// sum l_i N_i, and w is sum l_i w_i to within M R^2 / 2: R is the radius of a circle about the triangle, and M bounds the
+    /// second derivative of w, which along a unit vector of sine s to w is s sqrt(4 - 3 s^2) / |P|^2 <= 2 / (sqrt 3 |P|^2). So
+    ///   H x N = sum_ij l_i l_j H_i x N_j, to within eta M R^2 / 2 max |N_i|,
+    /// is a convex combination of the six H_i x N_i and (H_i x N_j + H_j x N_i) / 2. Where these lie beyond that bound in one
+    /// direction, it does not vanish. Directions that are tried: that of their sum, and, since all six lie near a plane across N
+    /// and the mixed ones near the middles of the edges of H_i x N_i, across these edges.
+    fn has_no_root(&self, query: &Query) -> bool {
+        let corners = Linear::corners(self.p, self.e);
+        let normals = Linear::corners(self.n, self.m);
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let radius2 = corners.iter().map(|p| p.distance_squared(middle)).fold(0.0, f64::max);
+        let nearest = middle.length() - radius2.sqrt();
+        // Also where x is on the facet.
+        if nearest <= 0.0 {
+            return false;
+        }
+        let h = corners.map(|p| p * (query.eta / p.length()) - query.w_l);
+        let longest = |of: &[DVec3; 3]| of.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+        let bent = query.eta * radius2 / (3f64.sqrt() * nearest * nearest);
+        let bound = longest(&normals) * (bent + CLOSE * longest(&h));
+        let mixed = |i: usize, j: usize| (h[i].cross(normals[j]) + h[j].cross(normals[i])) * 0.5;
+        let products = [mixed(0, 0), mixed(1, 1), mixed(2, 2), mixed(0, 1), mixed(1, 2), mixed(2, 0)];
+        let is_beyond = |direction: DVec3| {
+            let least = products.iter().map(|p| p.dot(direction)).fold(f64::INFINITY, f64::min);
+            least > bound * direction.length()
+        };
+        let across = |i: usize, j: usize, third: usize| {
+            let normal = (normals[0] + normals[1] + normals[2]).cross(products[j] - products[i]);
+            if normal.dot(products[third] - products[i]) < 0.0 { -normal } else { normal }
+        };
+        is_beyond(products.into_iter().sum())
+            || [(0, 1, 2), (1, 2, 0), (2, 0, 1)].into_iter().any(|(i, j, k)| {
+                // The third corner lies on one side; the origin has to on the other.
+                is_beyond(across(i, j, k))
+            })
     }
 
     /// The part with the corner `at` and these sides, in this one's coordinates.

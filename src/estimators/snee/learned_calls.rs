@@ -119,20 +119,26 @@ impl Prices {
         node: 0.0,
         solve: 250.0,
     };
-    /// On 20,480 triangles.
-    const MESH: Prices = Prices {
+    /// On 20,480 triangles, flat ones, which have closed solutions.
+    const FLAT: Prices = Prices {
         path: 1000.0,
         view: 1500.0,
         medium_event: 170.0,
         boundary_event: 700.0,
-        call: [6500.0, 6900.0, 2000.0],
+        call: [6500.0, 6900.0, 4000.0],
         density: 1300.0,
-        node: 120.0,
-        solve: 700.0,
+        node: 45.0,
+        solve: 150.0,
     };
+    /// The same with interpolated normals.
+    const INTERPOLATED: Prices = Prices { solve: 3000.0, ..Prices::FLAT };
 
     fn of(shape: &Shape) -> &'static Prices {
-        if matches!(shape, Shape::Mesh(_)) { &Prices::MESH } else { &Prices::ANALYTIC }
+        match shape {
+            Shape::Mesh(mesh) if mesh.normals().is_some() => &Prices::INTERPOLATED,
+            Shape::Mesh(_) => &Prices::FLAT,
+            _ => &Prices::ANALYTIC,
+        }
     }
 
     /// Of walks with one view each, without calls.

@@ -402,8 +402,15 @@ fn two_bounces_learn_nothing() {
 #[ignore = "a measurement"]
 fn what_calls_cost() {
     const PATHS: u64 = 4000;
-    let mesh = procedural::bumpy_sphere(1.0, 5, 0.1, 6.0, true).expect("closed");
-    for (name, shape) in [("sphere", sphere()), ("20,480 triangles", Arc::new(Shape::Mesh(mesh)))] {
+    let mesh = |interpolated| {
+        Arc::new(Shape::Mesh(procedural::bumpy_sphere(1.0, 5, 0.1, 6.0, interpolated).expect("closed")))
+    };
+    let bodies = [
+        ("sphere", sphere()),
+        ("20,480 flat triangles", mesh(false)),
+        ("20,480 interpolated triangles", mesh(true)),
+    ];
+    for (name, shape) in bodies {
         for (kind, boundary, connects) in [("rough", ROUGH, false), ("smooth", SMOOTH, true)] {
             let scene = flux(&shape, boundary, &[medium(10.0, 0.98, 0.0)], &[Lamp::Disc]);
             let snee = set_up(&scene, &SneeChoices::default(), connects).expect("served");
