@@ -373,6 +373,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let dir = self.bands.draw_turn(&self.medium, &self.ray, &mut self.stream);
         let drawn_before = self.bands.density();
         self.bands.turn(&self.scene.medium, origin, arrival, dir);
+        R::turned(self, dir, self.bands.density() / drawn_before);
         if self.matched() {
             let guided = self.bands.density() / drawn_before;
             self.drawn = DirectionDraw::Competing(self.medium.phase.pdf(arrival.dot(dir)) * guided);
@@ -394,6 +395,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
         if hit.is_none() {
             self.score_escape();
+        } else {
+            self.rivals.come_back();
         }
         hit
     }
@@ -483,12 +486,15 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
 
     /// Scores every light in the direction of a path that leaves the scene.
     fn score_escape(&mut self) {
+        if self.rivals.is_muted() {
+            return;
+        }
         let class = self.history.class();
         for (index, light) in self.scene.lights.iter().enumerate() {
             let (radiance, pdf) = light.eval(self.band, self.ray.dir);
             if radiance > 0.0 && !R::is_expected(self, self.unscattered, index, self.ray.dir) {
                 let rivals = self.rival_densities(index, self.ray.dir);
-                let walks = self.bands.density();
+                let walks = self.bands.density() * (1.0 + R::chains(self));
                 let [bsdf, by_light] = self.taking_part();
                 if bsdf == 0.0 {
                     continue;
@@ -604,6 +610,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     }
 }
 
+#[path = "walk_chain.rs"]
+mod chain;
 #[path = "walk_flights.rs"]
 mod flights;
 #[path = "walk_lanes.rs"]

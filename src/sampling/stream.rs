@@ -25,6 +25,10 @@ pub enum Purpose {
     Cloud = 6,
     /// Positions on the sensor at which lights are scored by expectation.
     View = 7,
+    /// Directions that photons teach, and the walks that follow them.
+    Chain = 8,
+    /// Numbers of light samples on these.
+    ChainLight = 9,
 }
 
 /// The key of one (experiment, cell, bands, estimator, stage).

@@ -2,7 +2,7 @@
 //! may refract the light of a query.
 
 use super::bounds::Bounds;
-use super::eight::{EightBounds, EightQuery, Frame};
+use super::eight::{BodyFrame, EightBounds, EightQuery};
 use super::patch::Facet;
 use super::throughput::Query;
 use crate::geometry::Mesh;
@@ -39,7 +39,7 @@ pub(super) struct ConeTree {
     /// The same eight by eight, for points; the root is the last.
     wide: Vec<WideNode>,
     facets: Vec<(Bounds, Facet)>,
-    frame: Frame,
+    frame: BodyFrame,
 }
 
 /// Facets of a leaf.
@@ -62,14 +62,19 @@ impl ConeTree {
         let mut nodes = Vec::with_capacity(facets.len());
         let size = mesh.bounds().radius;
         ConeTree::build(&mut nodes, &mut facets, 0, size);
-        let frame = Frame { middle: mesh.bounds().center, size };
+        let frame = BodyFrame { middle: mesh.bounds().center, size };
         let mut wide = Vec::with_capacity(facets.len() / 4);
         ConeTree::widen(&mut wide, &facets, 0, &frame);
         ConeTree { nodes, wide, facets, frame }
     }
 
     /// Adds the node of these facets, the first of which has this index, and returns its index.
-    fn widen(wide: &mut Vec<WideNode>, facets: &[(Bounds, Facet)], first: u32, frame: &Frame) -> u32 {
+    fn widen(
+        wide: &mut Vec<WideNode>,
+        facets: &[(Bounds, Facet)],
+        first: u32,
+        frame: &BodyFrame,
+    ) -> u32 {
         let node = if facets.len() <= 8 {
             let bounds: Vec<Bounds> = facets.iter().map(|(bounds, _)| *bounds).collect();
             WideNode { bounds: EightBounds::new(&bounds, frame), parts: WideParts::Facets(first) }

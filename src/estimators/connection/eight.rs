@@ -38,7 +38,7 @@ pub(super) struct EightBounds {
 
 /// Where coordinates are relative to, and how large they get.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
+pub(super) struct BodyFrame {
     pub middle: DVec3,
     /// The farthest that a point of the body is from the middle.
     pub size: f64,
@@ -61,7 +61,7 @@ pub(super) struct EightQuery {
 }
 
 impl EightQuery {
-    pub(super) fn new(query: &Query, frame: &Frame) -> EightQuery {
+    pub(super) fn new(query: &Query, frame: &BodyFrame) -> EightQuery {
         let Query { x, w_l, eta, slopes } = *query;
         let single = |v: DVec3| v.to_array().map(|c| c as f32);
         let tilt = 1.0 / (1.0 + slopes.length_squared()).sqrt();
@@ -85,7 +85,7 @@ fn chord(cos: f64) -> f32 {
 impl EightBounds {
     /// # Panics
     /// With more than eight parts.
-    pub(super) fn new(parts: &[Bounds], frame: &Frame) -> EightBounds {
+    pub(super) fn new(parts: &[Bounds], frame: &BodyFrame) -> EightBounds {
         assert!(parts.len() <= 8, "eight lanes");
         let of = |part: &dyn Fn(&Bounds) -> f32| {
             let mut lanes = [0.0; 8];
@@ -205,7 +205,7 @@ mod tests {
         for round in 0..60_000 {
             let size = [1e-4, 0.01, 0.1, 0.7][round % 4];
             let middle = [DVec3::ZERO, DVec3::new(1e4, -3e3, 70.0)][round / 2 % 2];
-            let frame = Frame { middle, size: 2.0 };
+            let frame = BodyFrame { middle, size: 2.0 };
             let slopes = if round % 5 == 0 { DVec2::new(0.2, -0.1) } else { DVec2::ZERO };
             let eta = [1.4, 0.7, 1.001][round / 7 % 3];
             let x = middle + direction(&mut stream) * stream.draw();

@@ -21,6 +21,7 @@
 //!   throughput * albedo * f_k L / (p_B + p_L + sum of rivals / U),
 //! whichever technique it comes from.
 
+use super::chains;
 use super::end::{End, Leg, Middle};
 use super::expected;
 use super::last_vertex::{self, GuidedEnd};
@@ -78,6 +79,24 @@ impl Rivals for Connections<'_> {
             }
         }
         walk.rivals.begin(None);
+        chains::follow(walk);
+    }
+
+    #[inline]
+    fn turned<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>, dir: DVec3, drawn: f64) {
+        if let Some(chains) = &mut walk.rivals.chains {
+            chains.start(walk.ray, dir, drawn);
+        }
+    }
+
+    #[inline]
+    fn chains<B: WalkBands>(walk: &CameraWalk<'_, Self, B>) -> f64 {
+        chains::density(walk)
+    }
+
+    #[inline]
+    fn is_muted(&self) -> bool {
+        self.chains.as_ref().is_some_and(|chains| chains.is_muted)
     }
 
     /// A lower bound of the distance of the specular guess, which most calls fail by.
@@ -117,6 +136,14 @@ impl Rivals for Connections<'_> {
 
     fn depart<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>) {
         walk.rivals.count = 0;
+        walk.rivals.come_back();
+    }
+
+    #[inline]
+    fn come_back(&mut self) {
+        if let Some(chains) = &mut self.chains {
+            chains.come_back();
+        }
     }
 
     fn views(&self) -> u32 {

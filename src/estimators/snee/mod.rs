@@ -14,6 +14,7 @@
 //! the exit are missing. `snee_connect` adds specular connections (`specular`), which find these paths, too.
 
 mod bidirectional;
+mod chains;
 mod connections;
 mod end;
 mod expected;
@@ -22,6 +23,7 @@ mod guide;
 mod last_vertex;
 mod learned_calls;
 mod options;
+mod photons;
 mod probe;
 mod snee_connect;
 mod specular;
@@ -49,6 +51,7 @@ use crate::scene::{Light, Scene};
 
 use guide::Guide;
 use learned_calls::{CallNotes, ChosenCalls};
+use photons::PhotonMap;
 use specular::Specular;
 use state::Connections;
 
@@ -57,6 +60,7 @@ pub use end::Call;
 pub use last_vertex::LastVertex;
 pub use learned_calls::LearnedCalls;
 pub use options::{EdgeTechnique, JointKind, SneeChoices, SneeOptions, SneePreset, Strategies};
+pub use photons::Photons;
 pub use probe::ProbeShares;
 pub use specular::ConnectionCall;
 pub use two_bounce::TwoBounce;
@@ -72,6 +76,8 @@ struct BandSetup {
     specular: Option<Specular>,
     /// Number of sensor rays per walk at which lights are scored by expectation; 1 where none is.
     views: u32,
+    /// Directions of light that comes by a chain.
+    photons: Option<Arc<PhotonMap>>,
     /// What has been learned of its calls.
     chosen: Option<ChosenCalls>,
 }
@@ -134,6 +140,9 @@ impl Snee {
         if options.share_bands {
             check_shared(&scene)?;
         }
+        if options.photons.is_some() && scene.shape.bounds().is_none() {
+            return Err(Error::input_help("photons need a finite body", "leave out `photons`"));
+        }
         let options = Arc::new(options);
         let is_connected =
             options.connection.is_some() && scene.boundary.iter().any(specular::is_served);
@@ -165,7 +174,12 @@ impl Snee {
                 && guides.iter().any(|guide| !scene.lights[guide.light].is_directional());
             let is_smooth = matches!(scene.boundary[band], Boundary::Smooth { .. });
             let views = if is_looked_for && is_smooth { options.views } else { 1 };
+            let photons = match (options.photons, scene.shape.bounds()) {
+                (Some(photons), Some(bounds)) => PhotonMap::new(&scene, &bounds, band, &guides, photons),
+                _ => None,
+            };
             BandSetup {
+                photons: photons.map(Arc::new),
                 options: options.clone(),
                 guides: guides.into(),
                 sigma,
@@ -245,6 +259,13 @@ impl Estimator for Snee {
             let setup = &setups[band];
             if setup.guides.is_empty() {
                 trace_passes(field, band, keys, scores, |_| Unrivalled);
+            } else if setup.photons.is_some() {
+                // Walks that are traced side by side do not state how they turn.
+                for (key, scores) in keys.iter().zip(&mut *scores) {
+                    for index in 0..rays {
+                        self.trace(setup, None, Path { field, band, index, key }, scores);
+                    }
+                }
             } else {
                 let connections = |path: &Path| Connections::of_path(setup, path);
                 trace_passes(field, band, keys, scores, connections);
@@ -266,7 +287,10 @@ impl Estimator for Snee {
 
     fn held_bytes(&self) -> usize {
         let technique = self.setups.iter().find_map(|setup| setup.specular.as_ref());
-        self.walks.heap_bytes() + technique.map_or(0, |technique| technique.solver.heap_bytes())
+        let photons = self.setups.iter().filter_map(|setup| setup.photons.as_ref());
+        self.walks.heap_bytes()
+            + technique.map_or(0, |technique| technique.solver.heap_bytes())
+            + photons.map(|map| map.heap_bytes()).sum::<usize>()
     }
 
     fn notes(&self) -> Vec<String> {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::end::Call;
 use super::last_vertex::LastVertex;
 use super::learned_calls::LearnedCalls;
+use super::photons::Photons;
 use super::probe::ProbeShares;
 use super::specular::ConnectionCall;
 use crate::error::{Error, Result};
@@ -49,6 +50,8 @@ pub struct SneeOptions {
     pub share_bands: bool,
     /// The warm-up that chooses the probabilities of calls, if there is one.
     pub learned_calls: Option<LearnedCalls>,
+    /// The photons that guide to light that comes by a chain, if there are any.
+    pub photons: Option<Photons>,
 }
 
 /// Which techniques make the paths whose last two medium vertices follow each other.
@@ -140,6 +143,11 @@ pub struct SneeChoices {
     ///
     /// Without it, the given numbers are used.
     pub learned_calls: Option<LearnedCalls>,
+    /// Photons that are traced before the passes, and guide to light that reaches a medium vertex through internal
+    /// reflections or another part of the body.
+    ///
+    /// Without it, only the walk finds such light.
+    pub photons: Option<Photons>,
 }
 
 /// A set of options with a name.
@@ -231,6 +239,7 @@ impl SneePreset {
                 least_concentration: 1.0,
                 share_bands: false,
                 learned_calls: None,
+                photons: None,
             },
             SneePreset::Guided => SneeOptions {
                 roulette: Roulette::default(),
@@ -249,6 +258,7 @@ impl SneePreset {
                 least_concentration: 10.0,
                 share_bands: false,
                 learned_calls: None,
+                photons: None,
             },
         }
     }
@@ -276,6 +286,7 @@ impl SneeChoices {
             least_concentration: self.least_concentration.unwrap_or(preset.least_concentration),
             share_bands: self.bands == BandWalks::Shared,
             learned_calls: self.learned_calls,
+            photons: self.photons.filter(|photons| photons.most > 0.0),
             ..preset
         };
         if let Some(strategies) = &self.strategies {
@@ -307,6 +318,12 @@ impl SneeChoices {
             return Err(Error::input_help(
                 "snee: bands that share walks share plain ones: what guides a walk differs from band to band",
                 "leave out `walk`, or use `bands = \"alone\"`",
+            ));
+        }
+        if options.share_bands && options.photons.is_some() {
+            return Err(Error::input_help(
+                "snee: photons guide the walks of one band; bands that share walks have none",
+                "leave out `photons`, or use `bands = \"alone\"`",
             ));
         }
         let Strategies { bsdf, light, .. } = options.strategies;

@@ -9,7 +9,7 @@
 //! | light reaches the last medium vertex | parallel light | disc of directions |
 //! |---|---|---|
 //! | by one refraction | complete | complete |
-//! | by a refraction and internal reflections, or through another part of a body that is not convex | missing | left to the walk |
+//! | by a refraction and internal reflections, or through another part of a body that is not convex | missing | left to the walk and to `photons` |
 
 use std::sync::Arc;
 

@@ -8,6 +8,7 @@ use super::end::Call;
 use super::guess::Guess;
 use super::guide::Guide;
 use super::learned_calls::{CallNotes, CalledTechnique};
+use super::photons::Chains;
 use crate::estimators::bands::WalkBands;
 use crate::estimators::connection::{Root, SolverWork};
 use crate::estimators::field::Path;
@@ -65,6 +66,8 @@ pub(super) struct Connections<'a> {
     pub is_edge_alone: bool,
     /// Cached visibility between the vertex before the last and the last exit.
     seen: Option<(DVec3, bool)>,
+    /// What photons ask of a path, where they guide.
+    pub chains: Option<Box<Chains>>,
     /// Memory for the roots of a connection.
     pub roots: Vec<Root>,
     /// What the techniques add to the sum of densities that was formed last, in the order of [`CalledTechnique`].
@@ -88,7 +91,9 @@ impl<'a> Connections<'a> {
     pub(super) fn of_path(setup: &'a BandSetup, path: &Path) -> Connections<'a> {
         let stream = path.key.stream(path.index as u64, Purpose::Connection);
         let boundary = &path.field.scene.boundary[path.band];
-        Connections { all_calls: AllCalls::of(setup, boundary), ..Connections::new(setup, stream) }
+        let chains = setup.photons.as_ref().map(|_| Box::new(Chains::of_path(path)));
+        let all_calls = AllCalls::of(setup, boundary);
+        Connections { all_calls, chains, ..Connections::new(setup, stream) }
     }
 
     pub(super) fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
@@ -104,6 +109,7 @@ impl<'a> Connections<'a> {
             count: 0,
             is_edge_alone: false,
             seen: None,
+            chains: None,
             roots: Vec::new(),
             parts: [0.0; CalledTechnique::COUNT],
             notes: None,

@@ -39,6 +39,7 @@ fn guided() -> SneeOptions {
         least_concentration: 10.0,
         share_bands: false,
         learned_calls: None,
+        photons: None,
     }
 }
 

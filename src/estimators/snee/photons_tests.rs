@@ -1,0 +1,162 @@
+//! Directions have their density, and means are those without photons.
+
+use std::sync::Arc;
+
+use super::super::testing::{Lamp, ROUGH, SMOOTH, body, medium, point_inside, ring, sphere};
+use super::super::{Snee, SneeChoices, TwoBounce};
+use super::*;
+use crate::estimators::{Estimator, Layout, Scores, TransportClass, WalkDraw};
+use crate::geometry::{Shape, procedural};
+use crate::sampling::stream::PassKey;
+use crate::scene::Sensor;
+use crate::scene::sensor::BodyFlux;
+
+fn bumps(interpolated: bool) -> Arc<Shape> {
+    Arc::new(Shape::Mesh(procedural::bumpy_sphere(1.0, 3, 0.2, 5.0, interpolated).expect("closed")))
+}
+
+fn photons(paths: u64, most: f64) -> SneeChoices {
+    SneeChoices { photons: Some(Photons { paths, most }), ..SneeChoices::default() }
+}
+
+/// The flux out of a body, one path a pass.
+fn flux(shape: &Arc<Shape>, boundary: Boundary, lamps: &[Lamp]) -> Arc<Scene> {
+    let media = [medium(1.0, 0.9, 0.0), medium(0.7, 0.8, 0.7)];
+    let bounds = shape.bounds().expect("finite");
+    let mut scene = Arc::into_inner(body(shape, boundary, &media, lamps)).expect("not shared");
+    scene.sensor =
+        Sensor::BodyFlux(BodyFlux { bounds, frame: Frame::about(DVec3::Z), bins: 1, paths: 1 });
+    Arc::new(scene)
+}
+
+fn set_up(scene: &Arc<Scene>, choices: &SneeChoices, connects: bool) -> Snee {
+    if connects {
+        Snee::connected(scene.clone(), choices.connected().expect("options")).expect("served")
+    } else {
+        Snee::new(scene.clone(), choices.options().expect("options")).expect("served")
+    }
+}
+
+/// Moments of sampled directions are those of the density, by as many uniform directions; and the density's integral is the
+/// probability of drawing one.
+#[test]
+fn directions_have_their_density() {
+    const DRAWS: u32 = 40_000;
+    for (name, shape, boundary) in
+        [("rough ring", ring(), ROUGH), ("smooth bumps", bumps(false), SMOOTH)]
+    {
+        let scene = flux(&shape, boundary, &[Lamp::WideDisc, Lamp::Disc]);
+        let snee = set_up(&scene, &photons(4096, 0.8), false);
+        let map = snee.setups[0].photons.as_ref().expect("photons");
+        let mut stream =
+            StreamKey::named("directions_have_their_density").pass(0).stream(0, Purpose::Walk);
+        let mut done = 0;
+        while done < 12 {
+            let Some(x) = point_inside(&scene, &mut stream) else { continue };
+            if map.grids.iter().all(|grid| grid.at(x).is_empty()) {
+                continue;
+            }
+            done += 1;
+            let axis = square_to_cap(2.0, stream.draw2());
+            // 1, w . a and (w . a)^2.
+            let powers = |w: DVec3| [1.0, w.dot(axis), w.dot(axis) * w.dot(axis)];
+            let (mut drawn, mut expected) = ([[0.0; 3]; 2], [[0.0; 3]; 2]);
+            let add = |sums: &mut [[f64; 3]; 2], weight: f64, w: DVec3| {
+                for (i, power) in powers(w).into_iter().enumerate() {
+                    sums[0][i] += weight * power;
+                    sums[1][i] += weight * power * weight * power;
+                }
+            };
+            for _ in 0..DRAWS {
+                if let Some(w) = map.sample(x, &mut stream) {
+                    add(&mut drawn, map.most, w);
+                }
+                let w = square_to_cap(2.0, stream.draw2());
+                add(&mut expected, map.density(x, w) / pdf_cap(2.0), w);
+            }
+            for i in 0..3 {
+                let n = f64::from(DRAWS);
+                let [a, b] = [drawn, expected].map(|sums| sums[0][i] / n);
+                let spread = |sums: [[f64; 3]; 2], mean: f64| (sums[1][i] / n - mean * mean) / n;
+                let error = (spread(drawn, a) + spread(expected, b)).max(0.0).sqrt();
+                assert!((a - b).abs() < 5.0 * error + 1e-12, "{name} {x} {i}: {a} and {b} +- {error}");
+            }
+        }
+    }
+}
+
+/// What a path scores of light that scatters once and is reflected inside, and of all that scatters, in both bands.
+fn scattered(snee: &Snee, key: &PassKey, scores: &mut Scores) -> [f64; 4] {
+    scores.clear();
+    snee.pass(&[0, 1], key, scores);
+    let of = |class: TransportClass, band: usize| scores.observables[2 * (1 + class as usize) + band];
+    let all = |band: usize| scores.observables[band] - of(TransportClass::Surface, band);
+    [of(TransportClass::SingleInternal, 0), all(0), of(TransportClass::SingleInternal, 1), all(1)]
+}
+
+/// Two unlike lights, two bands of which one scatters forwards, flat and interpolated normals, bodies that are not convex, rough
+/// and smooth, plain and guided walks. Photons change no walk, so that with them and without a path differs in its chains
+/// alone: half of the light that scatters once and is reflected inside, in media this thin.
+#[test]
+fn means_stay() {
+    let guided = WalkDraw::Guided { share: 0.8, nodes: 8, least_depth: Some(0.0), near_lights: true };
+    let plain = WalkDraw::Plain {};
+    let shaded = || Arc::new(Shape::Mesh(procedural::torus(0.7, 0.3, [24, 12], true).expect("closed")));
+    let two = &[Lamp::WideDisc, Lamp::Sun][..];
+    for (name, shape, boundary, lamps, walk, passes) in [
+        ("smooth ring", ring(), SMOOTH, two, plain, 160_000),
+        ("rough ring", ring(), ROUGH, two, plain, 120_000),
+        ("rough ring, guided", ring(), ROUGH, two, guided, 60_000),
+        ("smooth shaded ring, guided", shaded(), SMOOTH, two, guided, 60_000),
+    ] {
+        let connects = boundary.is_delta();
+        let scene = flux(&shape, boundary, lamps);
+        let given = SneeChoices { walk, ..SneeChoices::default() };
+        let with = SneeChoices { walk, ..photons(1 << 14, 0.9) };
+        let [given, with] = [given, with].map(|choices| set_up(&scene, &choices, connects));
+        let key = StreamKey::named(&format!("photons, means_stay {name}"));
+        let mut scores = Scores::new(Layout::new(&scene));
+        let mut sums = [[0.0; 3]; 4];
+        for pass in 0..passes {
+            let key = key.pass(pass);
+            let given = scattered(&given, &key, &mut scores);
+            let with = scattered(&with, &key, &mut scores);
+            for (sums, (a, b)) in sums.iter_mut().zip(given.into_iter().zip(with)) {
+                *sums = [sums[0] + a, sums[1] + (b - a), sums[2] + (b - a) * (b - a)];
+            }
+        }
+        let n = passes as f64;
+        for (quantity, [a, change, squares]) in sums.into_iter().enumerate() {
+            let (a, change) = (a / n, change / n);
+            let error = ((squares / n - change * change) / n).sqrt();
+            println!("{name}, {quantity}: {a:.4}, photons change it by {change:.4} +- {error:.4}");
+            assert!(
+                change.abs() < 4.0 * error,
+                "{name}, {quantity}: {a} changes by {change} +- {error}"
+            );
+            assert!(
+                error < 0.1 * a,
+                "{name}, {quantity}: the error {error} of {a} is too large to tell"
+            );
+        }
+    }
+}
+
+/// Where photons find no chain nothing is drawn; what they do not serve is refused, with what to do.
+#[test]
+fn what_photons_do_not_serve() {
+    let sun = flux(&sphere(), SMOOTH, &[Lamp::Sun]);
+    let snee = set_up(&sun, &photons(4096, 1.0), true);
+    assert!(snee.setups.iter().all(|setup| setup.photons.is_none()), "no walk meets parallel light");
+    let refused = |choices: &str| {
+        let choices: SneeChoices = toml::from_str(choices).expect("words");
+        choices.options().expect_err("refused").to_string()
+    };
+    let shared = refused("photons = {}\nbands = \"shared\"");
+    assert!(shared.contains("one band") && shared.contains("alone"), "{shared}");
+    let options = photons(4096, 1.0).options().expect("options");
+    let scene = flux(&sphere(), ROUGH, &[Lamp::Disc]);
+    assert!(TwoBounce::new(scene, options).is_err());
+    let none: SneeChoices = toml::from_str("photons = { most = 0 }").expect("words");
+    assert_eq!(none.options().expect("options").photons, None);
+}
