@@ -174,12 +174,8 @@ impl Snee {
                 && guides.iter().any(|guide| !scene.lights[guide.light].is_directional());
             let is_smooth = matches!(scene.boundary[band], Boundary::Smooth { .. });
             let views = if is_looked_for && is_smooth { options.views } else { 1 };
-            let photons = match (options.photons, scene.shape.bounds()) {
-                (Some(photons), Some(bounds)) => PhotonMap::new(&scene, &bounds, band, &guides, photons),
-                _ => None,
-            };
             BandSetup {
-                photons: photons.map(Arc::new),
+                photons: None,
                 options: options.clone(),
                 guides: guides.into(),
                 sigma,
@@ -190,7 +186,12 @@ impl Snee {
             }
         };
         let count = if options.share_bands { 1 } else { scene.bands() };
-        let setups: Vec<BandSetup> = (0..count).map(setup).collect();
+        let mut setups: Vec<BandSetup> = (0..count).map(setup).collect();
+        if let (Some(photons), Some(bounds)) = (options.photons, scene.shape.bounds()) {
+            let guides: Vec<_> = setups.iter().map(|setup| setup.guides.clone()).collect();
+            let maps = PhotonMap::of_bands(&scene, &bounds, &guides, photons);
+            setups.iter_mut().zip(maps).for_each(|(setup, map)| setup.photons = map);
+        }
         let mut walks =
             TaughtField::new(scene.clone(), options.roulette, options.walk, Finder::Connections);
         if !options.walk.is_near_lights() {
@@ -287,10 +288,13 @@ impl Estimator for Snee {
 
     fn held_bytes(&self) -> usize {
         let technique = self.setups.iter().find_map(|setup| setup.specular.as_ref());
-        let photons = self.setups.iter().filter_map(|setup| setup.photons.as_ref());
+        // Bands share maps.
+        let mut photons: Vec<_> =
+            self.setups.iter().filter_map(|setup| setup.photons.as_ref()).collect();
+        photons.dedup_by(|a, b| Arc::ptr_eq(a, b));
         self.walks.heap_bytes()
             + technique.map_or(0, |technique| technique.solver.heap_bytes())
-            + photons.map(|map| map.heap_bytes()).sum::<usize>()
+            + photons.into_iter().map(|map| map.heap_bytes()).sum::<usize>()
     }
 
     fn notes(&self) -> Vec<String> {

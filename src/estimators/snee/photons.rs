@@ -18,6 +18,7 @@
 //! small it is wider (c_n), as the bandwidth of a density estimate.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -38,7 +39,7 @@ use crate::scene::Scene;
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Photons {
-    /// Number of photons, per band.
+    /// Number of photons, for all bands with the same boundary.
     #[serde(default = "paths")]
     #[schemars(range(min = 64, max = 16777216))]
     pub paths: u64,
@@ -137,8 +138,34 @@ impl Chains {
 }
 
 impl PhotonMap {
+    /// The maps of all bands with these guides. Bands with the same boundary share one, by the photons of the band with the least
+    /// extinction, which fly farthest; the weights hold for any map.
+    pub(super) fn of_bands(
+        scene: &Scene,
+        bounds: &BoundingSphere,
+        guides: &[Arc<[Guide]>],
+        options: Photons,
+    ) -> Vec<Option<Arc<PhotonMap>>> {
+        let is_alike = |a: usize, b: usize| {
+            scene.boundary[a] == scene.boundary[b] && guides[a].is_empty() == guides[b].is_empty()
+        };
+        let mut maps: Vec<Option<Arc<PhotonMap>>> = Vec::new();
+        for band in 0..guides.len() {
+            let map = match (0..band).find(|&earlier| is_alike(earlier, band)) {
+                Some(earlier) => maps[earlier].clone(),
+                None => (band..guides.len())
+                    .filter(|&other| is_alike(band, other))
+                    .min_by(|&a, &b| scene.medium[a].sigma_t.total_cmp(&scene.medium[b].sigma_t))
+                    .and_then(|least| PhotonMap::new(scene, bounds, least, &guides[least], options))
+                    .map(Arc::new),
+            };
+            maps.push(map);
+        }
+        maps
+    }
+
     /// Of the lights that the guides are of; nothing where no chain can be found from inside.
-    pub(super) fn new(
+    fn new(
         scene: &Scene,
         bounds: &BoundingSphere,
         band: usize,

@@ -142,6 +142,21 @@ fn means_stay() {
     }
 }
 
+/// Bands with one boundary share a map, whatever their media; with another index they have their own.
+#[test]
+fn bands_share_maps() {
+    let scene = flux(&ring(), SMOOTH, &[Lamp::WideDisc]);
+    let shared = set_up(&scene, &photons(4096, 0.5), true);
+    let maps = |snee: &Snee| [0, 1].map(|band| snee.setups[band].photons.clone().expect("a map"));
+    let [a, b] = maps(&shared);
+    assert!(Arc::ptr_eq(&a, &b));
+    let mut scene = Arc::into_inner(flux(&ring(), SMOOTH, &[Lamp::WideDisc])).expect("not shared");
+    scene.boundary[1] = Boundary::Smooth { eta: 1.45 };
+    let apart = set_up(&Arc::new(scene), &photons(4096, 0.5), true);
+    let [a, b] = maps(&apart);
+    assert!(!Arc::ptr_eq(&a, &b) && apart.held_bytes() > shared.held_bytes() + b.heap_bytes() / 2);
+}
+
 /// Where photons find no chain nothing is drawn; what they do not serve is refused, with what to do.
 #[test]
 fn what_photons_do_not_serve() {
