@@ -80,7 +80,7 @@ def read_ply(path):
                 if name == "vertex":
                     vertices.append((found["x"], found["y"], found["z"]))
                 elif name == "face":
-                    corners = found.get("vertex_indices") or found["vertex_index"]
+                    corners = found.get("vertex_indices", found.get("vertex_index"))
                     faces.append([int(corner) for corner in corners])
     return vertices, faces
 

@@ -369,16 +369,24 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     /// A new direction at a medium vertex.
     #[inline]
     fn turn(&mut self) {
-        let Ray { origin, dir: arrival } = self.ray;
+        let arrival = self.ray.dir;
         let dir = self.bands.draw_turn(&self.medium, &self.ray, &mut self.stream);
+        let drawn = self.set_out(dir);
+        if self.matched() {
+            self.drawn = DirectionDraw::Competing(self.medium.phase.pdf(arrival.dot(dir)) * drawn);
+        }
+    }
+
+    /// Leaves the medium vertex in a direction; returns the density with which the walk draws it, over that of the phase function.
+    #[inline]
+    fn set_out(&mut self, dir: DVec3) -> f64 {
+        let Ray { origin, dir: arrival } = self.ray;
         let drawn_before = self.bands.density();
         self.bands.turn(&self.scene.medium, origin, arrival, dir);
-        R::turned(self, dir, self.bands.density() / drawn_before);
-        if self.matched() {
-            let guided = self.bands.density() / drawn_before;
-            self.drawn = DirectionDraw::Competing(self.medium.phase.pdf(arrival.dot(dir)) * guided);
-        }
+        let drawn = self.bands.density() / drawn_before;
+        R::turned(self, dir, drawn);
         self.ray.dir = dir;
+        drawn
     }
 
     /// Multiplies the path's weight by `factor`, or ends the path by roulette.

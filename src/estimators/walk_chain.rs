@@ -1,6 +1,6 @@
 //! An extra direction at a medium vertex, followed to the next scattering event.
 
-use super::{Anomaly, CameraWalk, Hit, Ray, Rivals, Side, flights};
+use super::{Anomaly, CameraWalk, Hit, Rivals, Side, flights};
 use crate::estimators::bands::WalkBands;
 use crate::math::DVec3;
 use crate::sampling::stream::Stream;
@@ -25,15 +25,6 @@ impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
         (self.throughput, self.survival, self.look_share) = weights;
         (self.history, self.measure) = events;
         self.bands = bands;
-    }
-
-    /// Leaves the medium vertex in a direction.
-    pub(super) fn set_out(&mut self, dir: DVec3) {
-        let Ray { origin, dir: arrival } = self.ray;
-        let drawn_before = self.bands.density();
-        self.bands.turn(&self.scene.medium, origin, arrival, dir);
-        R::turned(self, dir, self.bands.density() / drawn_before);
-        self.ray.dir = dir;
     }
 
     fn follow_to_event(&mut self) -> Option<()> {

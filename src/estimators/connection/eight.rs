@@ -196,12 +196,12 @@ mod tests {
         (ct > 0.0 && cl2 > 0.0).then(|| w * eta - facet * (eta * ct - cl2.sqrt()))
     }
 
-    /// No part with a root is ruled out, and hardly more is kept than by angles in double precision: narrow and wide cones, far,
+    /// No part with a root is ruled out: narrow and wide cones, far,
     /// near and around the point, both sides of refraction, smooth and tilted, near the origin and far from it.
     #[test]
     fn a_part_with_a_root_is_kept() {
         let mut stream = stream("a_part_with_a_root_is_kept");
-        let (mut roots, mut held, mut ruled_out, mut kept) = (0, 0, 0, 0);
+        let mut roots = 0;
         for round in 0..60_000 {
             let size = [1e-4, 0.01, 0.1, 0.7][round % 4];
             let middle = [DVec3::ZERO, DVec3::new(1e4, -3e3, 70.0)][round / 2 % 2];
@@ -214,10 +214,8 @@ mod tests {
                 (0..1 + round % 8).map(|_| Part::draw(middle, size, spread, &mut stream)).collect();
             let bounds: Vec<Bounds> = parts.iter().map(Part::bounds).collect();
             let eight = EightBounds::new(&bounds, &frame);
-            let keeps = |w_l: DVec3| {
-                let query = Query { x, w_l, eta, slopes };
-                (eight.may_hold(&EightQuery::new(&query, &frame)), query)
-            };
+            let keeps =
+                |w_l: DVec3| eight.may_hold(&EightQuery::new(&Query { x, w_l, eta, slopes }, &frame));
             for (lane, part) in parts.iter().enumerate() {
                 let (point, normal) = part.at(&mut stream);
                 let across = normal.cross(direction(&mut stream)).normalize();
@@ -226,25 +224,43 @@ mod tests {
                 // Normals of more than a hemisphere say nothing about those between.
                 if bounds[lane].cos > 0.0 {
                     roots += 1;
-                    assert_eq!(keeps(w_l).0 >> lane & 1, 1, "{round} {lane}");
+                    assert_eq!(keeps(w_l) >> lane & 1, 1, "{round} {lane}");
                 }
             }
-            let (keeps, query) = keeps(direction(&mut stream));
-            assert_eq!(u32::from(keeps) >> parts.len(), 0, "no part beyond the last");
-            for (lane, bounds) in bounds.iter().enumerate() {
-                match (bounds.may_hold(&query), keeps >> lane & 1 == 1) {
-                    (true, _) => held += 1,
-                    (false, is_kept) => {
-                        ruled_out += 1;
-                        kept += u32::from(is_kept);
-                    }
-                }
-            }
+            assert_eq!(
+                u32::from(keeps(direction(&mut stream))) >> parts.len(),
+                0,
+                "no part beyond the last"
+            );
         }
-        println!(
-            "{roots} roots; {held} held by angles, {ruled_out} ruled out, of which {kept} are kept"
-        );
-        assert!(roots > 10_000 && held > 1000 && ruled_out > 1000, "{roots} {held} {ruled_out}");
-        assert!(2 * kept < held, "{kept} of {held}");
+        assert!(roots > 200_000, "{roots}");
+    }
+
+    /// Chords add up to no less than angles, and for small ones to the same, but for their squares and for rounding: of small parts
+    /// hardly more are kept than by angles in double precision, for light about that of a root.
+    #[test]
+    fn hardly_more_is_kept_than_by_angles() {
+        const SIZE: f64 = 0.01;
+        let mut stream = stream("hardly_more_is_kept_than_by_angles");
+        let frame = BodyFrame { middle: DVec3::ZERO, size: 2.0 };
+        let (mut held, mut kept) = (0, 0);
+        for _ in 0..40_000 {
+            let part = Part::draw(DVec3::ZERO, SIZE, SIZE, &mut stream);
+            let bounds = part.bounds();
+            let x = direction(&mut stream) * (0.5 * stream.draw());
+            let (point, normal) = part.at(&mut stream);
+            let Some(w_l) = light((point - x).normalize(), normal, 1.4) else { continue };
+            let w_l = (w_l + direction(&mut stream) * (5.0 * SIZE * stream.draw())).normalize();
+            let query = Query { x, w_l, eta: 1.4, slopes: DVec2::ZERO };
+            let asked = EightQuery::new(&query, &frame);
+            let is_kept = EightBounds::new(&[bounds], &frame).may_hold(&asked) == 1;
+            let is_held = bounds.may_hold(&query);
+            held += u32::from(is_held);
+            kept += u32::from(is_kept);
+            assert!(is_kept || !is_held, "{query:?}");
+        }
+        println!("{held} held by angles, {kept} kept");
+        // Angles of some SIZE / 0.5 in all: their squares, and 1e-5 of rounding over SIZE.
+        assert!(held > 3000 && f64::from(kept) < 1.005 * f64::from(held), "{held} {kept}");
     }
 }

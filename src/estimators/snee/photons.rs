@@ -1,6 +1,6 @@
 //! Directions that photons teach, for light that reaches a medium vertex by a chain: through a refraction and internal
 //! reflections, or through another part of a body that is not convex. Neither a connection nor a guess finds such light, and a
-//! walk meets a small light by it once in 1e5 paths, with the whole radiance of the light.
+//! walk meets a small light by it only by chance, with the whole radiance of the light.
 //!
 //! Before the passes, photons are traced from the lights to their first scattering event (Jensen 1995, "Importance driven path
 //! tracing using the photon map"). Of every flight inside after two or more events at the boundary, the voxels of a grid that it
