@@ -289,6 +289,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                 Some(hit) => {
                     let drawn_before = self.bands.density();
                     self.bands.flight(&self.scene.medium, hit.t, false);
+                    self.rivals.reach(hit.t);
                     if let (DirectionDraw::Competing(pdf), true) = (self.drawn, self.matched()) {
                         let through = transmittance(self.medium.sigma_t, hit.t);
                         let guided = self.bands.density() / drawn_before;
@@ -383,10 +384,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let Ray { origin, dir: arrival } = self.ray;
         let drawn_before = self.bands.density();
         self.bands.turn(&self.scene.medium, origin, arrival, dir);
-        let drawn = self.bands.density() / drawn_before;
-        R::turned(self, dir, drawn);
+        R::turn(self, dir, drawn_before);
         self.ray.dir = dir;
-        drawn
+        self.bands.density() / drawn_before
     }
 
     /// Multiplies the path's weight by `factor`, or ends the path by roulette.
@@ -403,8 +403,6 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
         if hit.is_none() {
             self.score_escape();
-        } else {
-            self.rivals.come_back();
         }
         hit
     }
@@ -494,15 +492,12 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
 
     /// Scores every light in the direction of a path that leaves the scene.
     fn score_escape(&mut self) {
-        if self.rivals.is_muted() {
-            return;
-        }
         let class = self.history.class();
         for (index, light) in self.scene.lights.iter().enumerate() {
             let (radiance, pdf) = light.eval(self.band, self.ray.dir);
             if radiance > 0.0 && !R::is_expected(self, self.unscattered, index, self.ray.dir) {
                 let rivals = self.rival_densities(index, self.ray.dir);
-                let walks = self.bands.density() * (1.0 + R::chains(self));
+                let walks = self.bands.density() * (1.0 + R::extra_turns(self));
                 let [bsdf, by_light] = self.taking_part();
                 if bsdf == 0.0 {
                     continue;
@@ -618,8 +613,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     }
 }
 
-#[path = "walk_chain.rs"]
-mod chain;
+#[path = "walk_extra.rs"]
+mod extra;
 #[path = "walk_flights.rs"]
 mod flights;
 #[path = "walk_lanes.rs"]

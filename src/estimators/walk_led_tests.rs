@@ -28,6 +28,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     pub(in crate::estimators) fn lead_out(&mut self, exit: &WalkExit) {
         let length = self.head_for(exit.hit.point, true);
         self.bands.flight(&self.scene.medium, length, false);
+        self.rivals.reach(length);
         self.ray.origin = exit.hit.point;
         self.from = Some(exit.hit.face);
         self.exit = Some(*exit);
@@ -37,7 +38,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let leg = point - self.ray.origin;
         let dir = leg.normalize();
         if turns {
-            self.bands.turn(&self.scene.medium, self.ray.origin, self.ray.dir, dir);
+            self.set_out(dir);
         }
         self.ray.dir = dir;
         leg.length()

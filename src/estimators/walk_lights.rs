@@ -5,7 +5,7 @@ use super::*;
 impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
     /// Samples a light from a rough surface vertex.
     pub(super) fn connect_from_surface(&mut self, hit: &Hit, frame: &Frame, wo: DVec3) {
-        if self.choice.iter().all(|&share| share == 0.0) || self.rivals.is_muted() {
+        if self.choice.iter().all(|&share| share == 0.0) {
             return;
         }
         let u = self.light_stream.draw3();
@@ -105,7 +105,7 @@ impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
             return;
         }
         let rivals = self.rival_densities(index, wi);
-        let walks = self.bands.density() * (1.0 + R::chains(self));
+        let walks = self.bands.density() * (1.0 + R::extra_turns(self));
         let (density, sum) = match pdf {
             Some(pdf) => {
                 let density = choice * pdf;

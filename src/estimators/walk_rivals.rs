@@ -41,26 +41,20 @@ pub(in crate::estimators) trait Rivals: Sized {
     /// Called after the walk was refracted or reflected into the body; its ray is the next flight.
     fn depart<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>);
 
-    /// Called when the walk, or a rival by [`CameraWalk::follow_chain`], leaves a medium vertex towards `dir`, before the
-    /// walk's ray follows; `drawn` is the density with which the walk draws it, over that of the phase function.
+    /// Called when the walk, or a rival by [`CameraWalk::follow_extra`], leaves a medium vertex towards `dir`, before the
+    /// walk's ray follows; `walks` is the density of the walk up to the vertex, as [`WalkBands::density`].
     #[inline(always)]
-    fn turned<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _dir: DVec3, _drawn: f64) {}
+    fn turn<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _dir: DVec3, _walks: f64) {}
 
-    /// Called where a path that has left the body meets it again.
+    /// Called where a flight inside meets the boundary, `t` mm from where it began.
     #[inline(always)]
-    fn come_back(&mut self) {}
+    fn reach(&mut self, _t: f64) {}
 
-    /// Density, over the walk's own, with which rivals draw the direction that the walk left its latest medium vertex in, for
-    /// paths that have met the boundary twice since.
+    /// Density, over the walk's own, with which rivals draw the direction that the path left its latest medium vertex in, and
+    /// follow it as the walk does.
     #[inline(always)]
-    fn chains<B: WalkBands>(_: &CameraWalk<'_, Self, B>) -> f64 {
+    fn extra_turns<B: WalkBands>(_: &CameraWalk<'_, Self, B>) -> f64 {
         0.0
-    }
-
-    /// Whether what is met is not scored, because the path belongs to another technique.
-    #[inline(always)]
-    fn is_muted(&self) -> bool {
-        false
     }
 
     /// Number of sensor rays per walk at which [`Self::look`] scores lights; the walk continues with one of them.

@@ -26,9 +26,9 @@ pub enum Purpose {
     /// Positions on the sensor at which lights are scored by expectation.
     View = 7,
     /// Directions that photons teach, and the walks that follow them.
-    Chain = 8,
+    ExtraTurn = 8,
     /// Numbers of light samples on these.
-    ChainLight = 9,
+    ExtraTurnLight = 9,
 }
 
 /// The key of one (experiment, cell, bands, estimator, stage).

@@ -19,15 +19,16 @@
 //!
 //! Since value / density = f U / (U sum) for each technique, every sample scores
 //!   throughput * albedo * f_k L / (p_B + p_L + sum of rivals / U),
-//! whichever technique it comes from.
+//! whichever technique it comes from. Where photons guide, p_B and p_L are
+//! 1 + q p / (p_w T) times as large ([`super::photons`]).
 
-use super::chains;
 use super::end::{End, Leg, Middle};
 use super::expected;
+use super::extra_turns;
 use super::last_vertex::{self, GuidedEnd};
 use super::learned_calls::CalledTechnique;
 use super::specular;
-use super::state::{AllCalls, Connections, Slot};
+use super::state::{AllCalls, Connections, PathTurn, Slot};
 use super::subdivision::{self, Subdivided};
 use crate::estimators::bands::WalkBands;
 use crate::estimators::vertices::{Unscattered, WalkExit, WalkVertex};
@@ -79,24 +80,31 @@ impl Rivals for Connections<'_> {
             }
         }
         walk.rivals.begin(None);
-        chains::follow(walk);
+        extra_turns::follow(walk);
     }
 
     #[inline]
-    fn turned<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>, dir: DVec3, drawn: f64) {
-        if let Some(chains) = &mut walk.rivals.chains {
-            chains.start(walk.ray, dir, drawn);
+    fn turn<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>, dir: DVec3, walks: f64) {
+        let Ray { origin: point, dir: arrival } = walk.ray;
+        if let Some(extra_turns) = &mut walk.rivals.extra_turns {
+            let vertex = WalkVertex { point, arrival, walks };
+            extra_turns.latest = Some(PathTurn { vertex, dir, length: None });
         }
     }
 
     #[inline]
-    fn chains<B: WalkBands>(walk: &CameraWalk<'_, Self, B>) -> f64 {
-        chains::density(walk)
+    fn reach(&mut self, t: f64) {
+        if let Some(PathTurn { length, .. }) =
+            self.extra_turns.as_mut().and_then(|turns| turns.latest.as_mut())
+        {
+            length.get_or_insert(t);
+        }
     }
 
     #[inline]
-    fn is_muted(&self) -> bool {
-        self.chains.as_ref().is_some_and(|chains| chains.is_muted)
+    fn extra_turns<B: WalkBands>(walk: &CameraWalk<'_, Self, B>) -> f64 {
+        let latest = walk.rivals.extra_turns.as_ref().and_then(|turns| turns.latest);
+        latest.map_or(0.0, |turn| extra_turns::density(walk, &turn) / walk.bands.density())
     }
 
     /// A lower bound of the distance of the specular guess, which most calls fail by.
@@ -136,14 +144,6 @@ impl Rivals for Connections<'_> {
 
     fn depart<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>) {
         walk.rivals.count = 0;
-        walk.rivals.come_back();
-    }
-
-    #[inline]
-    fn come_back(&mut self) {
-        if let Some(chains) = &mut self.chains {
-            chains.come_back();
-        }
     }
 
     fn views(&self) -> u32 {
@@ -236,9 +236,11 @@ pub(super) fn score_guided<B: WalkBands>(
     }
     let mut bands = walk.bands.clone();
     bands.turn(&walk.scene.medium, x_j.point, x_j.arrival, leg.dir);
+    let by_photons =
+        extra_turns::density(walk, &PathTurn { vertex: x_j, dir: leg.dir, length: Some(leg.length) });
     bands.flight(&walk.scene.medium, leg.length, false);
     let rivals = by_last + by_connection + by_subdivision;
-    let sum = bands.density() * end.unidirectional + rivals;
+    let sum = (bands.density() + by_photons) * end.unidirectional + rivals;
     walk.rivals.parts = [by_subdivision, by_last, by_connection];
     walk.rivals.weigh(sum);
     let score = walk.throughput * end.value / sum;
@@ -264,12 +266,15 @@ pub(super) fn score_subdivided<B: WalkBands>(
     let drawn = WalkVertex { point: *x_j, arrival: middle.to_j.dir, walks: bands.density() };
     walk.rivals.hold(Slot::Drawn, drawn);
     bands.turn(media, *x_j, middle.to_j.dir, middle.to_k.dir);
+    let Leg { dir, length } = middle.to_k;
+    let by_photons = extra_turns::density(walk, &PathTurn { vertex: drawn, dir, length: Some(length) });
     bands.flight(media, middle.to_k.length, false);
     let by_subdivision = subdivision::density(walk, Slot::Latest, middle, exit, &end);
     let by_last = last_vertex::density(walk, Slot::Drawn, &middle.to_k, &end);
     let by_connection = specular::density(walk, Slot::Drawn, &middle.to_k, exit, &end);
     let survival = walk.bands.survival(&walk.medium);
-    let sum = bands.density() * end.unidirectional + (by_subdivision + by_last + by_connection);
+    let rivals = by_last + by_connection + by_subdivision;
+    let sum = (bands.density() + by_photons) * end.unidirectional + rivals;
     let value = walk.throughput * survival * end.value / sum;
     if value == 0.0 || walk.is_shadowed(exit.hit.point, exit.hit.face, *w_l) {
         return;

@@ -118,7 +118,7 @@ fn see<B: WalkBands>(walk: &mut CameraWalk<'_, Connections<'_>, B>, view: &View,
             continue;
         }
         let (radiance, _) = walk.scene.lights[guide.light].eval(walk.band, towards);
-        let drawn = bands.density() * (1.0 + Connections::chains(walk));
+        let drawn = bands.density() * (1.0 + Connections::extra_turns(walk));
         let value = walk.throughput * walk.look_share * factor * radiance / drawn;
         walk.score_with(bands, walk.history.class(), guide.light, value);
     }

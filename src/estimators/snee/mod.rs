@@ -14,10 +14,10 @@
 //! the exit are missing. `snee_connect` adds specular connections (`specular`), which find these paths, too.
 
 mod bidirectional;
-mod chains;
 mod connections;
 mod end;
 mod expected;
+mod extra_turns;
 mod guess;
 mod guide;
 mod last_vertex;
@@ -76,7 +76,7 @@ struct BandSetup {
     specular: Option<Specular>,
     /// Number of sensor rays per walk at which lights are scored by expectation; 1 where none is.
     views: u32,
-    /// Directions of light that comes by a chain.
+    /// Directions against light.
     photons: Option<Arc<PhotonMap>>,
     /// What has been learned of its calls.
     chosen: Option<ChosenCalls>,

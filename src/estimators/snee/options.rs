@@ -50,7 +50,7 @@ pub struct SneeOptions {
     pub share_bands: bool,
     /// The warm-up that chooses the probabilities of calls, if there is one.
     pub learned_calls: Option<LearnedCalls>,
-    /// The photons that guide to light that comes by a chain, if there are any.
+    /// The photons that guide to light, if there are any.
     pub photons: Option<Photons>,
 }
 
@@ -143,10 +143,8 @@ pub struct SneeChoices {
     ///
     /// Without it, the given numbers are used.
     pub learned_calls: Option<LearnedCalls>,
-    /// Photons that are traced before the passes, and guide to light that reaches a medium vertex through internal
-    /// reflections or another part of the body.
-    ///
-    /// Without it, only the walk finds such light.
+    /// Photons that are traced before the passes, and guide to light where nothing else finds it: behind the facets of a scan, and
+    /// where it comes through internal reflections or another part of the body.
     pub photons: Option<Photons>,
 }
 

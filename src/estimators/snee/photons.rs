@@ -1,21 +1,28 @@
-//! Directions that photons teach, for light that reaches a medium vertex by a chain: through a refraction and internal
-//! reflections, or through another part of a body that is not convex. Neither a connection nor a guess finds such light, and a
-//! walk meets a small light by it only by chance, with the whole radiance of the light.
+//! Directions that photons teach.
 //!
-//! Before the passes, photons are traced from the lights to their first scattering event (Jensen 1995, "Importance driven path
-//! tracing using the photon map"). Of every flight inside after two or more events at the boundary, the voxels of a grid that it
-//! crosses take down the direction against it. At a medium vertex x in a voxel with n such directions d_i, an extra direction w is
-//! drawn from
-//!   p(w | x) = 1/n sum_i [w . d_i >= c_n] / (2 pi (1 - c_n))
-//! (of two grids: a coarse one has directions where the fine one has few), with probability q, and followed as the walk would
-//! follow it, to the next scattering event. Where it meets lights after it has met the boundary twice, it scores. The walk
-//! draws the same w with density p_w(w), and everything after it is drawn alike, so that by the balance heuristic over both the
-//! scores of a chain that began with w are divided by
-//!   1 + q p(w | x) / p_w(w),
-//! whichever of the two drew it. p may be any function of x and w: photons make no result biased.
+//! A walk meets a small light by chance, and then scores its whole radiance. A guess of where light enters fails among the facets
+//! of a scan, and neither a guess nor a connection finds light that reaches a medium vertex by a chain: through a refraction and
+//! internal reflections, or through another part of a body that is not convex.
 //!
-//! The cap about a direction is as wide as the lights, the boundary's lobes and the differences between facets are; where n is
-//! small it is wider (c_n), as the bandwidth of a density estimate.
+//! Before the passes, photons are traced from the lights (Jensen 1995, "Importance driven path tracing using the photon map").
+//! The voxels of a grid that their flights inside cross take down the directions against them, up to the first scattering event.
+//! Flights after one refraction have their own grids, so that they do not drown those of chains. At a medium vertex x in a voxel
+//! with n directions d_i, an extra direction w is drawn from
+//!   p(w | x) = 1/n sum_i sum_c s_c [w . d_i >= 1 - c] / (2 pi c)
+//! with probability q(x), and followed to the boundary, and beyond it as the walk would follow it, to the next scattering event; c are
+//! the heights of a narrow and a wide cap, with shares s_c. (Of two grids: a coarse one has directions where the fine one has few.)
+//! The walk draws the same w with density p_w(w) and reaches the boundary with probability T, the transmittance up to there;
+//! everything after that is drawn alike, so that by the balance heuristic over both the densities of what BSDF and light sampling find
+//! after w become
+//!   1 + q p(w | x) / (p_w(w) T)
+//! times as large, whichever of the two drew w, and whatever other techniques they are weighed against. q and p may be any
+//! functions of x and w: photons make no result biased. (Where the walk is guided, T is its own probability of passing; its later
+//! flights differ from those after an extra direction, too, so that densities are formed as all others, over that of the medium.)
+//!
+//! Caps are as wide as the lights, the boundary's lobes and the differences between facets are; where n is small they are wider,
+//! as the bandwidth of a density estimate. q is proportional to the number of photons that have crossed the voxel, up to a largest
+//! and, for chains, down to a least value: most vertices receive little light, and following an extra direction takes as long as
+//! several steps of the walk.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -25,11 +32,10 @@ use serde::Deserialize;
 
 use super::guide::Guide;
 use crate::estimators::crossing::other;
-use crate::estimators::field::Path;
 use crate::geometry::{BoundingSphere, Ray, Side};
 use crate::math::{DVec3, Frame, cos};
 use crate::optics::boundary::{Boundary, Event};
-use crate::sampling::discrete::choose_share;
+use crate::sampling::discrete::{choose, choose_share};
 use crate::sampling::distance::sample_exponential;
 use crate::sampling::stream::{Purpose, Stream, StreamKey};
 use crate::sampling::warp::{pdf_cap, square_to_cap};
@@ -43,7 +49,9 @@ pub struct Photons {
     #[serde(default = "paths")]
     #[schemars(range(min = 64, max = 16777216))]
     pub paths: u64,
-    /// Probability with which a medium vertex draws a direction, where photons have passed near it.
+    /// Probability with which a medium vertex draws a direction, where many photons have passed near it.
+    ///
+    /// Where there are fewer, it is smaller.
     #[serde(default = "most")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub most: f64,
@@ -54,30 +62,64 @@ fn paths() -> u64 {
 }
 
 fn most() -> f64 {
-    0.5
+    1.0
 }
 
-/// Voxels along a side of the grids, and the share of draws from each: where few photons have passed, more have in a larger voxel.
-const GRIDS: [(usize, f64); 2] = [(64, 0.75), (16, 0.25)];
+/// Voxels along a side of the finer grids.
+const FINE: usize = 64;
 
-/// Half the angle of a cap beyond what the lights and the boundary spread, rad: directions differ from facet to facet.
-const LEAST_CAP: f64 = 0.03;
+/// Voxels along a side of the grids, and the share of draws from each: where few photons have passed, more have in a larger voxel.
+const GRIDS: [(usize, f64); 2] = [(FINE, 0.75), (16, 0.25)];
 
 /// Directions that fill a voxel: where there are fewer, caps about them are as much larger in area.
 const ENOUGH: usize = 32;
 
+/// What is kept of the flights of a kind.
+#[derive(Clone, Copy)]
+struct Keep {
+    /// Directions of a voxel.
+    directions: u32,
+    /// The share of all photons that has to cross a fine voxel for a draw to be certain there; in a coarse one it is as much larger
+    /// as the sides of the voxel are larger in area.
+    certain: f64,
+    /// The least probability of a draw.
+    least: f64,
+}
+
+/// Light after one refraction is found by other techniques, too; nothing else finds that of chains.
+const AFTER_ONE_REFRACTION: Keep = Keep { directions: 64, certain: 1.0 / 2048.0, least: 0.0 };
+
+const OF_CHAINS: Keep = Keep { directions: 256, certain: 1.0 / 8192.0, least: 0.1 };
+
+/// Flights of chains are drawn as if extinction were this much smaller: light along long chords is weak, but where no photon has
+/// passed, a walk that finds it has no smaller weight for that.
+const STRETCH: f64 = 2.0;
+
 /// Events at the boundary after which a photon is no longer followed.
 const MOST_EVENTS: u32 = 16;
+
+/// Heights 1 - cos of a narrow and a wide cap.
+type Caps = [f64; 2];
+
+/// Share of the narrow cap.
+const NARROW: f64 = 0.75;
 
 /// Directions against the flights of photons.
 #[derive(Debug)]
 pub(super) struct PhotonMap {
-    /// The probability of drawing a direction at all.
-    pub most: f64,
+    /// The probability of drawing a direction of a kind at all.
+    most: f64,
+    after_one_refraction: PhotonGrids,
+    of_chains: PhotonGrids,
+    /// The caps about the directions of a voxel with 0, 1, 2 .. of them, and of all with more than are listed.
+    caps: Vec<Caps>,
+}
+
+/// Directions of one kind of flight.
+#[derive(Debug)]
+pub(super) struct PhotonGrids {
     /// As in [`GRIDS`].
     grids: Vec<DirectionGrid>,
-    /// 1 - cos of half the angle of the caps about the directions of a voxel with 0, 1, 2 .. of them, and of all with more.
-    heights: Vec<f64>,
 }
 
 /// Directions voxel by voxel.
@@ -88,53 +130,21 @@ struct DirectionGrid {
     scale: f64,
     /// Voxels along a side.
     count: usize,
-    /// Where the directions of a voxel begin; one more than there are voxels.
-    starts: Vec<u32>,
-    directions: Vec<[f32; 3]>,
+    /// As [`Self::voxel`] counts them.
+    voxels: Vec<Voxel>,
+    /// Voxel by voxel.
+    directions: Vec<DVec3>,
 }
 
-/// A direction in which a path has left a medium vertex.
+/// What is known of a voxel, side by side: most draws end here.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ChainStart {
-    pub x: DVec3,
-    pub arrival: DVec3,
-    pub dir: DVec3,
-    /// The walk's density of it over that of the phase function.
-    pub turn: f64,
-    /// Whether the path has met the boundary again after that point of it at which it could leave for the light.
-    pub is_chain: bool,
-}
-
-/// State of a path that photons guide.
-#[derive(Clone, Debug)]
-pub(super) struct Chains {
-    /// Of directions with what follows, and of the light samples there.
-    pub streams: [Stream; 2],
-    /// Since the latest medium vertex.
-    pub start: Option<ChainStart>,
-    /// A direction that was drawn is followed, and is no chain yet: nothing is scored.
-    pub is_muted: bool,
-}
-
-impl Chains {
-    pub(super) fn of_path(path: &Path) -> Chains {
-        let stream = |purpose| path.key.stream(path.index as u64, purpose);
-        let streams = [stream(Purpose::Chain), stream(Purpose::ChainLight)];
-        Chains { streams, start: None, is_muted: false }
-    }
-
-    /// A path with this vertex and arrival leaves towards `dir`.
-    pub(super) fn start(&mut self, Ray { origin: x, dir: arrival }: Ray, dir: DVec3, turn: f64) {
-        self.start = Some(ChainStart { x, arrival, dir, turn, is_chain: false });
-    }
-
-    /// It comes into the body, or meets it again from outside.
-    pub(super) fn come_back(&mut self) {
-        self.is_muted = false;
-        if let Some(start) = &mut self.start {
-            start.is_chain = true;
-        }
-    }
+struct Voxel {
+    /// With which probability one of its directions is drawn, over [`PhotonMap::most`].
+    chance: f32,
+    /// Where its directions begin.
+    start: u32,
+    /// How many it has.
+    count: u32,
 }
 
 impl PhotonMap {
@@ -164,7 +174,7 @@ impl PhotonMap {
         maps
     }
 
-    /// Of the lights that the guides are of; nothing where no chain can be found from inside.
+    /// Of the lights that the guides are of; nothing where a walk can meet none of them.
     fn new(
         scene: &Scene,
         bounds: &BoundingSphere,
@@ -180,52 +190,79 @@ impl PhotonMap {
             Boundary::Rough { facets, .. } => facets.alpha,
             _ => 0.0,
         };
-        let spread = LEAST_CAP + 1.2 * widest + 2.0 * roughness;
-        let height = |n: usize| {
+        // Half the angles, rad: the directions of photons already spread as the light does. What is added is for facets.
+        let spreads = [0.01 + 0.3 * widest + roughness, 0.03 + 1.2 * widest + 2.0 * roughness];
+        let caps = |n: usize| {
             let wider = (ENOUGH as f64 / n.max(1) as f64).sqrt();
-            1.0 - cos((wider * spread).min(PI))
+            spreads.map(|spread| 1.0 - cos((wider * spread).min(PI)))
         };
-        let mut flights = Vec::new();
+        let mut flights = PhotonFlights::default();
         let key = StreamKey::named("what photons teach");
         for photon in 0..options.paths {
             let mut stream = key.pass(photon).stream(band as u64, Purpose::Walk);
             trace(scene, bounds, band, &guides, &mut stream, &mut flights);
         }
-        let grids: Vec<DirectionGrid> =
-            GRIDS.iter().map(|(count, _)| DirectionGrid::new(bounds, *count, &flights)).collect();
-        let heights = (0..=ENOUGH).map(height).collect();
-        (!flights.is_empty()).then_some(PhotonMap { most: options.most, grids, heights })
+        let PhotonFlights { after_one_refraction, of_chains } = flights;
+        let is_any = !(after_one_refraction.is_empty() && of_chains.is_empty());
+        let of = |flights: &[Flight], keep: Keep| PhotonGrids::new(bounds, options.paths, flights, keep);
+        is_any.then(|| PhotonMap {
+            most: options.most,
+            after_one_refraction: of(&after_one_refraction, AFTER_ONE_REFRACTION),
+            of_chains: of(&of_chains, OF_CHAINS),
+            caps: (0..=ENOUGH).map(caps).collect(),
+        })
     }
 
-    /// The directions of a grid at a point, and 1 - cos of half the angle of the caps about them.
-    fn at<'a>(&self, grid: &'a DirectionGrid, x: DVec3) -> (&'a [[f32; 3]], f64) {
-        let directions = grid.at(x);
-        (directions, self.heights[directions.len().min(ENOUGH)])
+    /// Of each kind of flight.
+    pub(super) fn kinds(&self) -> [&PhotonGrids; 2] {
+        [&self.after_one_refraction, &self.of_chains]
     }
 
-    /// A direction at x, where photons have passed near it.
-    pub(super) fn sample(&self, x: DVec3, stream: &mut Stream) -> Option<DVec3> {
+    /// The caps about these directions, which are those of a voxel.
+    fn caps(&self, voxel: &Voxel) -> Caps {
+        self.caps[(voxel.count as usize).min(ENOUGH)]
+    }
+
+    /// Draws a direction of a kind at x, perhaps.
+    pub(super) fn sample(&self, kind: &PhotonGrids, x: DVec3, stream: &mut Stream) -> Option<DVec3> {
         let (grid, _) = choose_share(GRIDS.iter().map(|(_, share)| *share), stream.draw())?;
-        let (directions, height) = self.at(&self.grids[grid], x);
-        let [u, v, w] = stream.draw3();
+        let grid = &kind.grids[grid];
+        let voxel = grid.at(x)?;
+        if stream.draw() >= self.most * f64::from(voxel.chance) {
+            return None;
+        }
+        let directions = grid.directions(voxel);
+        let (is_narrow, u) = choose(stream.draw(), NARROW);
         let index = ((u * directions.len() as f64) as usize).min(directions.len().checked_sub(1)?);
-        Some(Frame::about(unit(directions[index])).to_world(square_to_cap(height, [v, w])))
+        let [narrow, wide] = self.caps(voxel);
+        let local = square_to_cap(if is_narrow { narrow } else { wide }, stream.draw2());
+        Some(Frame::about(directions[index]).to_world(local))
     }
 
-    /// The density of [`Self::sample`] per solid angle, with the probability of drawing at all.
+    /// The density of [`Self::sample`] per solid angle, of both kinds, with the probability of drawing at all.
     pub(super) fn density(&self, x: DVec3, dir: DVec3) -> f64 {
         let of_grid = |(grid, (_, share)): (&DirectionGrid, &(usize, f64))| {
-            let (directions, height) = self.at(grid, x);
-            let near = directions.iter().filter(|d| unit(**d).dot(dir) >= 1.0 - height).count();
-            if near == 0 { 0.0 } else { share * pdf_cap(height) * near as f64 / directions.len() as f64 }
+            let Some(voxel) = grid.at(x).filter(|voxel| voxel.count > 0) else { return 0.0 };
+            let (directions, [narrow, wide]) = (grid.directions(voxel), self.caps(voxel));
+            let mut near = [0_u32; 2];
+            for direction in directions {
+                let cos = direction.dot(dir);
+                near[0] += u32::from(cos >= 1.0 - narrow);
+                near[1] += u32::from(cos >= 1.0 - wide);
+            }
+            let [near_narrow, near_wide] = near.map(f64::from);
+            let sum =
+                NARROW * pdf_cap(narrow) * near_narrow + (1.0 - NARROW) * pdf_cap(wide) * near_wide;
+            share * f64::from(voxel.chance) * sum / f64::from(voxel.count)
         };
-        self.most * self.grids.iter().zip(&GRIDS).map(of_grid).sum::<f64>()
+        let of_kind = |kind: &PhotonGrids| kind.grids.iter().zip(&GRIDS).map(of_grid).sum::<f64>();
+        self.most * self.kinds().into_iter().map(of_kind).sum::<f64>()
     }
 
     /// Memory behind it, bytes.
     pub(super) fn heap_bytes(&self) -> usize {
-        let of = |grid: &DirectionGrid| size_of_val(&*grid.starts) + size_of_val(&*grid.directions);
-        self.grids.iter().map(of).sum()
+        let of = |grid: &DirectionGrid| size_of_val(&*grid.voxels) + size_of_val(&*grid.directions);
+        self.kinds().into_iter().flat_map(|kind| &kind.grids).map(of).sum()
     }
 }
 
@@ -235,14 +272,20 @@ struct Flight {
     length: f64,
 }
 
-/// Follows one photon to its first scattering event; its flights inside after two events at the boundary are those of a chain.
+#[derive(Default)]
+struct PhotonFlights {
+    after_one_refraction: Vec<Flight>,
+    of_chains: Vec<Flight>,
+}
+
+/// Follows one photon to its first scattering event.
 fn trace(
     scene: &Scene,
     bounds: &BoundingSphere,
     band: usize,
     guides: &[&Guide],
     stream: &mut Stream,
-    flights: &mut Vec<Flight>,
+    flights: &mut PhotonFlights,
 ) -> Option<()> {
     let (boundary, medium) = (&scene.boundary[band], &scene.medium[band]);
     let (index, _) = choose_share(guides.iter().map(|guide| guide.choice), stream.draw())?;
@@ -251,14 +294,18 @@ fn trace(
     let mut ray = bounds.beam(light.wi, stream.draw2());
     let (mut side, mut from) = (Side::Outside, None);
     for events in 0..MOST_EVENTS {
-        let t = match side {
+        let free = match side {
             Side::Inside => sample_exponential(medium.sigma_t, stream.draw()),
             Side::Outside => f64::INFINITY,
         };
-        let hit = scene.shape.intersect(&ray, side, from, t);
-        if side == Side::Inside && events > 1 {
-            let length = hit.map_or(t, |hit| hit.t);
-            flights.push(Flight { ray, length });
+        let hit = scene.shape.intersect(&ray, side, from, STRETCH * free);
+        if side == Side::Inside {
+            let reach = hit.map_or(f64::INFINITY, |hit| hit.t);
+            let (flights, free) = match events {
+                1 => (&mut flights.after_one_refraction, free),
+                _ => (&mut flights.of_chains, STRETCH * free),
+            };
+            flights.push(Flight { ray, length: free.min(reach) });
         }
         let hit = hit?;
         let frame = Frame::about(hit.shading_normal);
@@ -277,28 +324,54 @@ fn trace(
     None
 }
 
+impl PhotonGrids {
+    fn new(bounds: &BoundingSphere, photons: u64, flights: &[Flight], keep: Keep) -> PhotonGrids {
+        let grid =
+            |(count, _): &(usize, f64)| DirectionGrid::new(bounds, *count, photons, flights, keep);
+        PhotonGrids { grids: GRIDS.iter().map(grid).collect() }
+    }
+}
+
 impl DirectionGrid {
-    fn new(bounds: &BoundingSphere, count: usize, flights: &[Flight]) -> DirectionGrid {
+    fn new(
+        bounds: &BoundingSphere,
+        count: usize,
+        photons: u64,
+        flights: &[Flight],
+        keep: Keep,
+    ) -> DirectionGrid {
         let low = bounds.center - DVec3::splat(bounds.radius);
         let scale = count as f64 / (2.0 * bounds.radius);
-        let (starts, directions) = (vec![0; count * count * count + 1], Vec::new());
-        let mut grid = DirectionGrid { low, scale, count, starts, directions };
-        let mut noted = Vec::new();
-        for flight in flights {
-            let back = (-flight.ray.dir).to_array().map(|c| c as f32);
-            grid.cross(flight, |voxel| noted.push((voxel, back)));
+        let none = Voxel { chance: 0.0, start: 0, count: 0 };
+        let voxels = vec![none; count * count * count];
+        let mut grid = DirectionGrid { low, scale, count, voxels, directions: Vec::new() };
+        // Voxel and flight: there are fewer of each than a u32 counts.
+        let mut crossed: Vec<[u32; 2]> = Vec::new();
+        for (index, flight) in flights.iter().enumerate() {
+            grid.cross(flight, |voxel| crossed.push([voxel as u32, index as u32]));
         }
-        for (voxel, _) in &noted {
-            grid.starts[voxel + 1] += 1;
+        for [voxel, _] in &crossed {
+            grid.voxels[*voxel as usize].count += 1;
         }
-        for voxel in 1..grid.starts.len() {
-            grid.starts[voxel] += grid.starts[voxel - 1];
+        let sides = FINE as f64 / count as f64;
+        let certain = photons as f64 * keep.certain * sides * sides;
+        let mut end = 0;
+        for voxel in &mut grid.voxels {
+            if voxel.count > 0 {
+                voxel.chance = (f64::from(voxel.count) / certain).clamp(keep.least, 1.0) as f32;
+            }
+            voxel.start = end;
+            end += voxel.count.min(keep.directions);
+            voxel.count = 0;
         }
-        let mut next = grid.starts.clone();
-        grid.directions = vec![[0.0; 3]; noted.len()];
-        for (voxel, direction) in noted {
-            grid.directions[next[voxel] as usize] = direction;
-            next[voxel] += 1;
+        grid.directions = vec![DVec3::ZERO; end as usize];
+        // Photons come in no order: the first ones of a voxel are as good as any.
+        for [voxel, flight] in crossed {
+            let Voxel { start, count, .. } = &mut grid.voxels[voxel as usize];
+            if *count < keep.directions {
+                grid.directions[(*start + *count) as usize] = -flights[flight as usize].ray.dir;
+                *count += 1;
+            }
         }
         grid
     }
@@ -324,16 +397,14 @@ impl DirectionGrid {
         }
     }
 
-    /// The directions of the voxel of a point.
-    fn at(&self, x: DVec3) -> &[[f32; 3]] {
-        self.voxel(x).map_or(&[], |voxel| {
-            &self.directions[self.starts[voxel] as usize..self.starts[voxel + 1] as usize]
-        })
+    /// The voxel of a point.
+    fn at(&self, x: DVec3) -> Option<&Voxel> {
+        self.voxel(x).map(|voxel| &self.voxels[voxel])
     }
-}
 
-fn unit(direction: [f32; 3]) -> DVec3 {
-    DVec3::from(direction.map(f64::from)).normalize()
+    fn directions(&self, voxel: &Voxel) -> &[DVec3] {
+        &self.directions[voxel.start as usize..][..voxel.count as usize]
+    }
 }
 
 #[cfg(test)]

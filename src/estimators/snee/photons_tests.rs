@@ -53,7 +53,12 @@ fn directions_have_their_density() {
         let mut done = 0;
         while done < 12 {
             let Some(x) = point_inside(&scene, &mut stream) else { continue };
-            if map.grids.iter().all(|grid| grid.at(x).is_empty()) {
+            if map
+                .kinds()
+                .into_iter()
+                .flat_map(|kind| &kind.grids)
+                .all(|grid| grid.at(x).is_none_or(|voxel| voxel.count == 0))
+            {
                 continue;
             }
             done += 1;
@@ -61,18 +66,19 @@ fn directions_have_their_density() {
             // 1, w . a and (w . a)^2.
             let powers = |w: DVec3| [1.0, w.dot(axis), w.dot(axis) * w.dot(axis)];
             let (mut drawn, mut expected) = ([[0.0; 3]; 2], [[0.0; 3]; 2]);
-            let add = |sums: &mut [[f64; 3]; 2], weight: f64, w: DVec3| {
-                for (i, power) in powers(w).into_iter().enumerate() {
-                    sums[0][i] += weight * power;
-                    sums[1][i] += weight * power * weight * power;
+            let add = |sums: &mut [[f64; 3]; 2], values: [f64; 3]| {
+                for (i, value) in values.into_iter().enumerate() {
+                    sums[0][i] += value;
+                    sums[1][i] += value * value;
                 }
             };
             for _ in 0..DRAWS {
-                if let Some(w) = map.sample(x, &mut stream) {
-                    add(&mut drawn, map.most, w);
-                }
+                let [a, b] =
+                    map.kinds().map(|kind| map.sample(kind, x, &mut stream).map_or([0.0; 3], powers));
+                add(&mut drawn, [0, 1, 2].map(|i| a[i] + b[i]));
                 let w = square_to_cap(2.0, stream.draw2());
-                add(&mut expected, map.density(x, w) / pdf_cap(2.0), w);
+                let density = map.density(x, w) / pdf_cap(2.0);
+                add(&mut expected, powers(w).map(|power| density * power));
             }
             for i in 0..3 {
                 let n = f64::from(DRAWS);
@@ -85,18 +91,20 @@ fn directions_have_their_density() {
     }
 }
 
-/// What a path scores of light that scatters once and is reflected inside, and of all that scatters, in both bands.
-fn scattered(snee: &Snee, key: &PassKey, scores: &mut Scores) -> [f64; 4] {
+/// What a path scores of light that scatters once, without a reflection inside and with one, and of all that scatters, in both
+/// bands.
+fn scattered(snee: &Snee, key: &PassKey, scores: &mut Scores) -> [f64; 6] {
     scores.clear();
     snee.pass(&[0, 1], key, scores);
     let of = |class: TransportClass, band: usize| scores.observables[2 * (1 + class as usize) + band];
     let all = |band: usize| scores.observables[band] - of(TransportClass::Surface, band);
-    [of(TransportClass::SingleInternal, 0), all(0), of(TransportClass::SingleInternal, 1), all(1)]
+    let [once, inside] = [TransportClass::Single, TransportClass::SingleInternal];
+    [of(once, 0), of(inside, 0), all(0), of(once, 1), of(inside, 1), all(1)]
 }
 
 /// Two unlike lights, two bands of which one scatters forwards, flat and interpolated normals, bodies that are not convex, rough
-/// and smooth, plain and guided walks. Photons change no walk, so that with them and without a path differs in its chains
-/// alone: half of the light that scatters once and is reflected inside, in media this thin.
+/// and smooth, plain and guided walks. Photons change no walk, so that with them and without a path differs in the ends of its
+/// paths alone.
 #[test]
 fn means_stay() {
     let guided = WalkDraw::Guided { share: 0.8, nodes: 8, least_depth: Some(0.0), near_lights: true };
@@ -116,7 +124,7 @@ fn means_stay() {
         let [given, with] = [given, with].map(|choices| set_up(&scene, &choices, connects));
         let key = StreamKey::named(&format!("photons, means_stay {name}"));
         let mut scores = Scores::new(Layout::new(&scene));
-        let mut sums = [[0.0; 3]; 4];
+        let mut sums = [[0.0; 3]; 6];
         for pass in 0..passes {
             let key = key.pass(pass);
             let given = scattered(&given, &key, &mut scores);

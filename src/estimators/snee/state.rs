@@ -8,7 +8,6 @@ use super::end::Call;
 use super::guess::Guess;
 use super::guide::Guide;
 use super::learned_calls::{CallNotes, CalledTechnique};
-use super::photons::Chains;
 use crate::estimators::bands::WalkBands;
 use crate::estimators::connection::{Root, SolverWork};
 use crate::estimators::field::Path;
@@ -47,6 +46,32 @@ pub(super) struct AllCalls<'a> {
     pub calls: [Option<Call>; 2],
 }
 
+/// A direction in which a path leaves a medium vertex, and meets the boundary.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PathTurn {
+    pub vertex: WalkVertex,
+    pub dir: DVec3,
+    /// From the vertex to the boundary, mm; `None` until it is met.
+    pub length: Option<f64>,
+}
+
+/// State of a path that photons guide.
+#[derive(Clone, Debug)]
+pub(super) struct ExtraTurns {
+    /// Of directions with what follows, and of the light samples there.
+    pub streams: [Stream; 2],
+    /// At the latest medium vertex.
+    pub latest: Option<PathTurn>,
+}
+
+impl ExtraTurns {
+    pub(super) fn of_path(path: &Path) -> ExtraTurns {
+        let stream = |purpose| path.key.stream(path.index as u64, purpose);
+        let streams = [stream(Purpose::ExtraTurn), stream(Purpose::ExtraTurnLight)];
+        ExtraTurns { streams, latest: None }
+    }
+}
+
 /// State that a walk carries for connections.
 pub(super) struct Connections<'a> {
     pub setup: &'a BandSetup,
@@ -66,8 +91,8 @@ pub(super) struct Connections<'a> {
     pub is_edge_alone: bool,
     /// Cached visibility between the vertex before the last and the last exit.
     seen: Option<(DVec3, bool)>,
-    /// What photons ask of a path, where they guide.
-    pub chains: Option<Box<Chains>>,
+    /// Where photons guide.
+    pub extra_turns: Option<Box<ExtraTurns>>,
     /// Memory for the roots of a connection.
     pub roots: Vec<Root>,
     /// What the techniques add to the sum of densities that was formed last, in the order of [`CalledTechnique`].
@@ -91,9 +116,9 @@ impl<'a> Connections<'a> {
     pub(super) fn of_path(setup: &'a BandSetup, path: &Path) -> Connections<'a> {
         let stream = path.key.stream(path.index as u64, Purpose::Connection);
         let boundary = &path.field.scene.boundary[path.band];
-        let chains = setup.photons.as_ref().map(|_| Box::new(Chains::of_path(path)));
+        let extra_turns = setup.photons.as_ref().map(|_| Box::new(ExtraTurns::of_path(path)));
         let all_calls = AllCalls::of(setup, boundary);
-        Connections { all_calls, chains, ..Connections::new(setup, stream) }
+        Connections { all_calls, extra_turns, ..Connections::new(setup, stream) }
     }
 
     pub(super) fn new(setup: &'a BandSetup, stream: Stream) -> Connections<'a> {
@@ -109,7 +134,7 @@ impl<'a> Connections<'a> {
             count: 0,
             is_edge_alone: false,
             seen: None,
-            chains: None,
+            extra_turns: None,
             roots: Vec::new(),
             parts: [0.0; CalledTechnique::COUNT],
             notes: None,

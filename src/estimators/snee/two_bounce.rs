@@ -50,7 +50,7 @@ impl TwoBounce {
             return Err(Error::input("two_bounce has no walk to guide; leave out `walk`"));
         }
         if options.photons.is_some() {
-            return Err(Error::input("two_bounce has no chains to find; leave out `photons`"));
+            return Err(Error::input("two_bounce has no photons; leave out `photons`"));
         }
         if options.learned_calls.is_some() {
             return Err(Error::input("two_bounce has no walk to learn from; leave out `learned_calls`"));

@@ -11,7 +11,7 @@
 use super::connections::{score_guided, score_subdivided};
 use super::end::{End, Leg, Middle};
 use super::last_vertex::{self, GuidedEnd};
-use super::state::Slot;
+use super::state::{ExtraTurns, Slot};
 use super::subdivision;
 use super::testing::*;
 use super::*;
@@ -297,7 +297,9 @@ fn start<'a, B: super::super::bands::WalkBands>(
 ) -> Walk<'a, B> {
     let on = Path { field: snee.walks.field(), band, index: 0, key };
     let start = if course.vertices == 1 { path.x_i } else { path.start };
-    let connections = Connections::new(&snee.setups[0], key.stream(0, Purpose::Connection));
+    let mut connections = Connections::new(&snee.setups[0], key.stream(0, Purpose::Connection));
+    connections.extra_turns =
+        snee.setups[0].photons.as_ref().map(|_| Box::new(ExtraTurns::of_path(&on)));
     CameraWalk::led(on, scores, connections, bands, start)
 }
 
@@ -346,8 +348,9 @@ fn shared_walks_score_alike() {
 }
 
 /// Of a guided walk, per technique the density of the walk up to where the technique takes over, over that of a plain
-/// walk: at the end of the path, at x_i for subdivision, at x_j for the last vertex. From the steps' own densities.
-fn guided_over_plain(snee: &Snee, path: &FixedPath, course: Course) -> [f64; 5] {
+/// walk: at the end of the path, at x_i for subdivision, at x_j for the last vertex. From the steps' own densities. What BSDF and
+/// light sampling find, they find as often again after directions that photons teach: by how much, is given beside.
+fn guided_over_plain(snee: &Snee, path: &FixedPath, course: Course) -> ([f64; 5], f64) {
     let guidance = snee.walks.field().guidance(0).expect("guided");
     let sigma_t = snee.walks.field().scene.medium[0].sigma_t;
     let start = if course.vertices == 1 { path.x_i } else { path.start };
@@ -355,6 +358,7 @@ fn guided_over_plain(snee: &Snee, path: &FixedPath, course: Course) -> [f64; 5] 
     let points: Vec<DVec3> =
         [start].into_iter().chain(between).chain([path.x_j, path.exit.hit.point]).collect();
     let mut ratios = vec![1.0];
+    let mut by_photons = 0.0;
     for step in points.windows(3) {
         let [from, at, to] = [step[0], step[1], step[2]];
         let [arrival, dir] = [(at - from).normalize(), (to - at).normalize()];
@@ -366,25 +370,31 @@ fn guided_over_plain(snee: &Snee, path: &FixedPath, course: Course) -> [f64; 5] 
         let flown =
             if is_last { heading.passage_ratio(sigma_t, t) } else { heading.flight_ratio(sigma_t, t) };
         ratios.push(ratios[ratios.len() - 1] * flown);
+        if let (Some(map), true) = (&snee.setups[0].photons, is_last) {
+            let phase = snee.walks.field().scene.medium[0].phase.pdf(arrival.dot(dir));
+            by_photons = map.density(at, dir) / (phase * transmittance(sigma_t, t) * flown);
+        }
     }
     let [.., at_j, at_end] = ratios[..] else { panic!("two steps at least") };
     let at_i = if course.vertices > 1 { ratios[ratios.len() - 3] } else { f64::NAN };
-    [at_end, at_end, at_i, at_i, at_j]
+    let at_end = at_end * (1.0 + by_photons);
+    ([at_end, at_end, at_i, at_i, at_j], by_photons)
 }
 
-/// The same of guided walks, whose densities are those of the guide.
+/// The same of guided walks, whose densities are those of the guide, without photons and with them.
 #[test]
 fn weights_with_guided_walks_sum_to_one() {
     let key = StreamKey::named("weights_with_guided_walks_sum_to_one");
     let mut stream = key.pass(0).stream(0, Purpose::Sensor);
-    let mut seen = [0u32; 5];
-    for (shape, g) in [(sphere(), 0.0), (ring(), 0.6)] {
+    let mut seen = [0u32; 6];
+    let photons = Some(Photons { paths: 1 << 14, most: 0.9 });
+    for (shape, g, photons) in [(sphere(), 0.0, None), (ring(), 0.6, None), (ring(), 0.6, photons)] {
         let media = [medium(4.0, 0.9, g)];
         for boundary in [ROUGH, SMOOTH] {
             let [.., (_, options), _] = presets();
             let walk =
                 WalkDraw::Guided { share: 0.8, nodes: 16, least_depth: Some(0.0), near_lights: true };
-            let guided = SneeOptions { walk, ..options.clone() };
+            let guided = SneeOptions { walk, photons, ..options.clone() };
             for lamp in [Lamp::WideDisc, Lamp::Sun] {
                 let reference = one_end(&shape, boundary, &media, lamp, &options);
                 let scene = body(&shape, boundary, &media, &[lamp]);
@@ -398,7 +408,8 @@ fn weights_with_guided_walks_sum_to_one() {
                     done += 1;
                     for course in COURSES {
                         let densities = alone(&reference, &path, course.0);
-                        let over_plain = guided_over_plain(&snee, &path, course.0);
+                        let (over_plain, by_photons) = guided_over_plain(&snee, &path, course.0);
+                        seen[5] += u32::from(by_photons > 0.1);
                         let mut scores = Scores::new(Layout::new(&scene));
                         let pass = key.pass(1);
                         let bands = GuidedBand::new(guidance, &media[0]);

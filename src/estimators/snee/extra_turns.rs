@@ -1,0 +1,40 @@
+//! Directions that photons teach, as a walk draws and weighs them: see [`super::photons`].
+
+use super::state::{Connections, ExtraTurns, PathTurn};
+use crate::estimators::bands::WalkBands;
+use crate::estimators::vertices::WalkVertex;
+use crate::estimators::walk::CameraWalk;
+use crate::sampling::distance::transmittance;
+
+/// Draws directions at the walk's latest vertex, and follows them to the next scattering event.
+pub(super) fn follow<B: WalkBands>(walk: &mut CameraWalk<'_, Connections<'_>, B>) {
+    let setup = walk.rivals.setup;
+    let (Some(map), Some(turns)) = (&setup.photons, &mut walk.rivals.extra_turns) else { return };
+    let latest = turns.latest;
+    let mut streams = turns.streams.clone();
+    for directions in map.kinds() {
+        let Some(dir) = map.sample(directions, walk.ray.origin, &mut streams[0]) else { continue };
+        let count = walk.rivals.count;
+        walk.follow_extra(dir, &mut streams);
+        walk.rivals.count = count;
+    }
+    if let Some(turns) = &mut walk.rivals.extra_turns {
+        **turns = ExtraTurns { streams, latest };
+    }
+}
+
+/// The least transmittance that is told from none: below it, densities over it might overflow.
+const LEAST: f64 = 1e-200;
+
+/// The density with which photons make the walk turn and reach the boundary, q p(w | x), over U as in [`super::connections`], times
+/// the density of the walk up to the turn; 0 where no photons guide.
+pub(super) fn density<B: WalkBands>(walk: &CameraWalk<'_, Connections<'_>, B>, turn: &PathTurn) -> f64 {
+    let &PathTurn { vertex: WalkVertex { point, arrival, walks }, dir, length } = turn;
+    let (Some(map), Some(length)) = (&walk.rivals.setup.photons, length) else { return 0.0 };
+    let density = map.density(point, dir);
+    if density == 0.0 {
+        return 0.0;
+    }
+    let through = transmittance(walk.medium.sigma_t, length).max(LEAST);
+    density * walks / (walk.medium.phase.pdf(arrival.dot(dir)) * through)
+}
