@@ -289,7 +289,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                 Some(hit) => {
                     let drawn_before = self.bands.density();
                     self.bands.flight(&self.scene.medium, hit.t, false);
-                    self.rivals.reach(hit.t);
+                    self.rivals.reached(hit.t);
                     if let (DirectionDraw::Competing(pdf), true) = (self.drawn, self.matched()) {
                         let through = transmittance(self.medium.sigma_t, hit.t);
                         let guided = self.bands.density() / drawn_before;
@@ -384,7 +384,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         let Ray { origin, dir: arrival } = self.ray;
         let drawn_before = self.bands.density();
         self.bands.turn(&self.scene.medium, origin, arrival, dir);
-        R::turn(self, dir, drawn_before);
+        R::turned(self, dir, drawn_before);
         self.ray.dir = dir;
         self.bands.density() / drawn_before
     }

@@ -66,7 +66,7 @@ impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
             return None;
         };
         self.bands.flight(&self.scene.medium, hit.t, false);
-        self.rivals.reach(hit.t);
+        self.rivals.reached(hit.t);
         self.measure.fly(&self.ray, hit.t);
         Some(hit)
     }

@@ -28,7 +28,7 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     pub(in crate::estimators) fn lead_out(&mut self, exit: &WalkExit) {
         let length = self.head_for(exit.hit.point, true);
         self.bands.flight(&self.scene.medium, length, false);
-        self.rivals.reach(length);
+        self.rivals.reached(length);
         self.ray.origin = exit.hit.point;
         self.from = Some(exit.hit.face);
         self.exit = Some(*exit);

@@ -44,14 +44,14 @@ pub(in crate::estimators) trait Rivals: Sized {
     /// Called when the walk, or a rival by [`CameraWalk::follow_extra`], leaves a medium vertex towards `dir`, before the
     /// walk's ray follows; `walks` is the density of the walk up to the vertex, as [`WalkBands::density`].
     #[inline(always)]
-    fn turn<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _dir: DVec3, _walks: f64) {}
+    fn turned<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _dir: DVec3, _walks: f64) {}
 
     /// Called where a flight inside meets the boundary, `t` mm from where it began.
     #[inline(always)]
-    fn reach(&mut self, _t: f64) {}
+    fn reached(&mut self, _t: f64) {}
 
-    /// Density, over the walk's own, with which rivals draw the direction that the path left its latest medium vertex in, and
-    /// follow it as the walk does.
+    /// Density, over the walk's own, with which rivals leave the latest medium vertex in the path's direction and follow it to
+    /// where the path is now.
     #[inline(always)]
     fn extra_turns<B: WalkBands>(_: &CameraWalk<'_, Self, B>) -> f64 {
         0.0

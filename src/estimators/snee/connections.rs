@@ -84,7 +84,7 @@ impl Rivals for Connections<'_> {
     }
 
     #[inline]
-    fn turn<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>, dir: DVec3, walks: f64) {
+    fn turned<B: WalkBands>(walk: &mut CameraWalk<'_, Self, B>, dir: DVec3, walks: f64) {
         let Ray { origin: point, dir: arrival } = walk.ray;
         if let Some(extra_turns) = &mut walk.rivals.extra_turns {
             let vertex = WalkVertex { point, arrival, walks };
@@ -93,7 +93,7 @@ impl Rivals for Connections<'_> {
     }
 
     #[inline]
-    fn reach(&mut self, t: f64) {
+    fn reached(&mut self, t: f64) {
         if let Some(PathTurn { length, .. }) =
             self.extra_turns.as_mut().and_then(|turns| turns.latest.as_mut())
         {

@@ -12,8 +12,8 @@ pub(super) fn follow<B: WalkBands>(walk: &mut CameraWalk<'_, Connections<'_>, B>
     let (Some(map), Some(turns)) = (&setup.photons, &mut walk.rivals.extra_turns) else { return };
     let latest = turns.latest;
     let mut streams = turns.streams.clone();
-    for directions in map.kinds() {
-        let Some(dir) = map.sample(directions, walk.ray.origin, &mut streams[0]) else { continue };
+    for kind in map.kinds() {
+        let Some(dir) = map.sample(kind, walk.ray.origin, &mut streams[0]) else { continue };
         let count = walk.rivals.count;
         walk.follow_extra(dir, &mut streams);
         walk.rivals.count = count;

@@ -16,8 +16,8 @@
 //! after w become
 //!   1 + q p(w | x) / (p_w(w) T)
 //! times as large, whichever of the two drew w, and whatever other techniques they are weighed against. q and p may be any
-//! functions of x and w: photons make no result biased. (Where the walk is guided, T is its own probability of passing; its later
-//! flights differ from those after an extra direction, too, so that densities are formed as all others, over that of the medium.)
+//! functions of x and w: photons make no result biased. (A guided walk has its own probability of
+//! reaching the boundary and draws later flights by its guide, so that all densities are formed over those of a plain walk.)
 //!
 //! Caps are as wide as the lights, the boundary's lobes and the differences between facets are; where n is small they are wider,
 //! as the bandwidth of a density estimate. q is proportional to the number of photons that have crossed the voxel, up to a largest
@@ -91,8 +91,8 @@ const AFTER_ONE_REFRACTION: Keep = Keep { directions: 64, certain: 1.0 / 2048.0,
 
 const OF_CHAINS: Keep = Keep { directions: 256, certain: 1.0 / 8192.0, least: 0.1 };
 
-/// Flights of chains are drawn as if extinction were this much smaller: light along long chords is weak, but where no photon has
-/// passed, a walk that finds it has no smaller weight for that.
+/// Flights of chains are drawn with this much less extinction. Long chords carry little light, but a walk that meets the light along
+/// one that no photon has taken scores the whole radiance.
 const STRETCH: f64 = 2.0;
 
 /// Events at the boundary after which a photon is no longer followed.
@@ -107,7 +107,7 @@ const NARROW: f64 = 0.75;
 /// Directions against the flights of photons.
 #[derive(Debug)]
 pub(super) struct PhotonMap {
-    /// The probability of drawing a direction of a kind at all.
+    /// The probability of drawing a direction of a kind where many photons have passed.
     most: f64,
     after_one_refraction: PhotonGrids,
     of_chains: PhotonGrids,
@@ -218,12 +218,12 @@ impl PhotonMap {
         [&self.after_one_refraction, &self.of_chains]
     }
 
-    /// The caps about these directions, which are those of a voxel.
+    /// The caps about the directions of a voxel.
     fn caps(&self, voxel: &Voxel) -> Caps {
         self.caps[(voxel.count as usize).min(ENOUGH)]
     }
 
-    /// Draws a direction of a kind at x, perhaps.
+    /// A direction of a kind at x, if one is drawn.
     pub(super) fn sample(&self, kind: &PhotonGrids, x: DVec3, stream: &mut Stream) -> Option<DVec3> {
         let (grid, _) = choose_share(GRIDS.iter().map(|(_, share)| *share), stream.draw())?;
         let grid = &kind.grids[grid];
@@ -345,7 +345,7 @@ impl DirectionGrid {
         let none = Voxel { chance: 0.0, start: 0, count: 0 };
         let voxels = vec![none; count * count * count];
         let mut grid = DirectionGrid { low, scale, count, voxels, directions: Vec::new() };
-        // Voxel and flight: there are fewer of each than a u32 counts.
+        // Voxel and flight, of which there are fewer than a u32 counts: at most 2^24 photons with 16 flights each.
         let mut crossed: Vec<[u32; 2]> = Vec::new();
         for (index, flight) in flights.iter().enumerate() {
             grid.cross(flight, |voxel| crossed.push([voxel as u32, index as u32]));

@@ -165,7 +165,7 @@ fn bands_share_maps() {
     assert!(!Arc::ptr_eq(&a, &b) && apart.held_bytes() > shared.held_bytes() + b.heap_bytes() / 2);
 }
 
-/// Where photons find no chain nothing is drawn; what they do not serve is refused, with what to do.
+/// Where no walk can meet the lights there is no map; what they do not serve is refused, with what to do.
 #[test]
 fn what_photons_do_not_serve() {
     let sun = flux(&sphere(), SMOOTH, &[Lamp::Sun]);
