@@ -35,7 +35,7 @@ use crate::scene::sensor::PathMeasure;
 #[cfg(test)]
 pub(super) use lanes::may_fly_side_by_side;
 pub(super) use lanes::{passes_at_once, trace_passes};
-pub(super) use rivals::{LookingRay, Rivals, Unrivalled};
+pub(super) use rivals::{LookingRay, Meeting, Rivals, Unrivalled};
 
 /// How the path's current direction was drawn, as light sampling sees it.
 #[derive(Clone, Copy)]
@@ -401,8 +401,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
     fn fly_outside(&mut self) -> Option<Hit> {
         self.scores.count(Cost::Rays);
         let hit = self.scene.shape.intersect(&self.ray, Side::Outside, self.from, f64::INFINITY);
-        if hit.is_none() {
-            self.score_escape();
+        match &hit {
+            Some(hit) => self.rivals.reached(hit.t),
+            None => self.score_escape(),
         }
         hit
     }

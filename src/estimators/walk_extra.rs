@@ -1,17 +1,23 @@
-//! An extra direction at a medium vertex, followed to the next scattering event.
+//! An extra direction at a medium vertex, followed to lights.
 
-use super::{Anomaly, CameraWalk, Cost, Hit, Rivals, Side, flights};
+use super::{Anomaly, CameraWalk, Cost, Hit, Meeting, Rivals, Side, flights};
 use crate::estimators::bands::WalkBands;
 use crate::math::DVec3;
 use crate::sampling::distance::sample_exponential;
 use crate::sampling::stream::Stream;
+use crate::scene::Light;
 
 impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
-    /// Follows the path from its medium vertex in the direction `dir` until it scatters, ends or leaves, and scores on the way
-    /// as the walk does, with numbers of `streams` in place of the walk's and its light samples'; then the path is again where it
-    /// was. It reaches the boundary with probability 1; later flights are those of the medium, also where the walk is guided.
-    /// Emission is not scored: the walk's own flight does that.
-    pub(in crate::estimators) fn follow_extra(&mut self, dir: DVec3, streams: &mut [Stream; 2]) {
+    /// Follows the path from its medium vertex in the direction `dir`, and scores lights as the walk does, with numbers of `streams`
+    /// in place of the walk's and its light samples'; then the path is again where it was. It reaches the boundary for certain. It
+    /// ends at its first meeting with the boundary, or goes on for later ones until it scatters, ends or leaves. Later flights are
+    /// those of the medium, also where the walk is guided. Emission is not scored: the walk's own flight does that.
+    pub(in crate::estimators) fn follow_extra(
+        &mut self,
+        dir: DVec3,
+        meeting: Meeting,
+        streams: &mut [Stream; 2],
+    ) {
         let path = (self.ray, self.from, self.exit, self.unscattered, self.drawn);
         let weights = (self.throughput, self.survival, self.look_share);
         let events = (self.history, self.measure);
@@ -20,7 +26,10 @@ impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
         std::mem::swap(&mut self.stream, own);
         std::mem::swap(&mut self.light_stream, own_light);
         self.set_out(dir);
-        self.follow_to_event();
+        match meeting {
+            Meeting::First => self.find_lights_once(),
+            Meeting::Later => self.find_lights(),
+        };
         std::mem::swap(&mut self.stream, own);
         std::mem::swap(&mut self.light_stream, own_light);
         (self.ray, self.from, self.exit, self.unscattered, self.drawn) = path;
@@ -29,23 +38,33 @@ impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
         self.bands = bands;
     }
 
-    fn follow_to_event(&mut self) -> Option<()> {
-        self.scores.count(Cost::Rays);
-        let hit = self.scene.shape.leave(&self.ray);
-        let mut hit = self.reach_boundary(hit, f64::INFINITY)?;
+    fn find_lights_once(&mut self) -> Option<()> {
+        let hit = self.leave_body()?;
+        let side = self.cross(&hit, Side::Inside)?;
+        let shines = |light: &Light| light.eval(self.band, self.ray.dir).0 > 0.0;
+        if side == Side::Outside && self.scene.lights.iter().any(shines) {
+            self.fly_outside();
+        }
+        None
+    }
+
+    fn find_lights(&mut self) -> Option<()> {
+        let mut from = self.leave_body()?;
+        let mut side = Side::Inside;
         loop {
-            let side = self.cross(&hit, Side::Inside)?;
-            hit = match side {
-                Side::Inside => self.go_in(&hit)?,
-                Side::Outside => {
-                    let mut outer = self.fly_outside()?;
-                    while self.cross(&outer, Side::Outside)? == Side::Outside {
-                        outer = self.fly_outside()?;
-                    }
-                    self.go_in(&outer)?
-                }
+            side = self.cross(&from, side)?;
+            from = match side {
+                Side::Inside => self.go_in(&from)?,
+                Side::Outside => self.fly_outside()?,
             };
         }
+    }
+
+    /// Where a flight from the medium vertex that does not scatter meets the boundary.
+    fn leave_body(&mut self) -> Option<Hit> {
+        self.scores.count(Cost::Rays);
+        let hit = self.scene.shape.leave(&self.ray);
+        self.reach_boundary(hit, f64::INFINITY)
     }
 
     fn go_in(&mut self, entry: &Hit) -> Option<Hit> {

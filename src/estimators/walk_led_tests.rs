@@ -34,6 +34,12 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
         self.exit = Some(*exit);
     }
 
+    /// Flies on from an exit, outside; whether it meets the body again.
+    pub(in crate::estimators) fn lead_on(&mut self, dir: DVec3) -> bool {
+        self.ray.dir = dir;
+        self.fly_outside().is_some()
+    }
+
     fn head_for(&mut self, point: DVec3, turns: bool) -> f64 {
         let leg = point - self.ray.origin;
         let dir = leg.normalize();

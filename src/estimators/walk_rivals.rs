@@ -16,6 +16,15 @@ pub(in crate::estimators) enum LookingRay {
     Further,
 }
 
+/// After a turn at a medium vertex, which meeting with the boundary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::estimators) enum Meeting {
+    /// The next.
+    First,
+    /// One after that.
+    Later,
+}
+
 /// Techniques beside unidirectional sampling.
 pub(in crate::estimators) trait Rivals: Sized {
     /// Nothing happens at a medium vertex.
@@ -46,7 +55,7 @@ pub(in crate::estimators) trait Rivals: Sized {
     #[inline(always)]
     fn turned<B: WalkBands>(_: &mut CameraWalk<'_, Self, B>, _dir: DVec3, _walks: f64) {}
 
-    /// Called where a flight inside meets the boundary, `t` mm from where it began.
+    /// Called where a flight meets the boundary, inside or outside, `t` mm from where it began.
     #[inline(always)]
     fn reached(&mut self, _t: f64) {}
 

@@ -88,16 +88,14 @@ impl Rivals for Connections<'_> {
         let Ray { origin: point, dir: arrival } = walk.ray;
         if let Some(extra_turns) = &mut walk.rivals.extra_turns {
             let vertex = WalkVertex { point, arrival, walks };
-            extra_turns.latest = Some(PathTurn { vertex, dir, length: None });
+            extra_turns.latest = Some(PathTurn::new(vertex, dir, None));
         }
     }
 
     #[inline]
     fn reached(&mut self, t: f64) {
-        if let Some(PathTurn { length, .. }) =
-            self.extra_turns.as_mut().and_then(|turns| turns.latest.as_mut())
-        {
-            length.get_or_insert(t);
+        if let Some(turn) = self.extra_turns.as_mut().and_then(|turns| turns.latest.as_mut()) {
+            turn.reach(t);
         }
     }
 
@@ -236,8 +234,8 @@ pub(super) fn score_guided<B: WalkBands>(
     }
     let mut bands = walk.bands.clone();
     bands.turn(&walk.scene.medium, x_j.point, x_j.arrival, leg.dir);
-    let by_photons =
-        extra_turns::density(walk, &PathTurn { vertex: x_j, dir: leg.dir, length: Some(leg.length) });
+    let turn = PathTurn::new(x_j, leg.dir, Some(leg.length));
+    let by_photons = extra_turns::density(walk, &turn);
     bands.flight(&walk.scene.medium, leg.length, false);
     let rivals = by_last + by_connection + by_subdivision;
     let sum = (bands.density() + by_photons) * end.unidirectional + rivals;
@@ -267,7 +265,7 @@ pub(super) fn score_subdivided<B: WalkBands>(
     walk.rivals.hold(Slot::Drawn, drawn);
     bands.turn(media, *x_j, middle.to_j.dir, middle.to_k.dir);
     let Leg { dir, length } = middle.to_k;
-    let by_photons = extra_turns::density(walk, &PathTurn { vertex: drawn, dir, length: Some(length) });
+    let by_photons = extra_turns::density(walk, &PathTurn::new(drawn, dir, Some(length)));
     bands.flight(media, middle.to_k.length, false);
     let by_subdivision = subdivision::density(walk, Slot::Latest, middle, exit, &end);
     let by_last = last_vertex::density(walk, Slot::Drawn, &middle.to_k, &end);

@@ -9,13 +9,15 @@
 //! Flights after one refraction have their own grids, so that they do not drown those of chains. At a medium vertex x in a voxel
 //! with n directions d_i, an extra direction w is drawn from
 //!   p(w | x) = 1/n sum_i sum_c s_c [w . d_i >= 1 - c] / (2 pi c)
-//! with probability q(x), and followed to the boundary, and beyond it as the walk would follow it, to the next scattering event; c are
-//! the heights of a narrow and a wide cap, with shares s_c. (Of two grids: a coarse one has directions where the fine one has few.)
+//! with probability q(x), and followed to the boundary; c are the heights of a narrow and a wide cap, with shares s_c. (Of two grids:
+//! a coarse one has directions where the fine one has few.) A direction after one refraction ends at its first meeting with the
+//! boundary, and finds lights from there alone; one of chains goes on as the walk would, to the next scattering event.
 //! The walk draws the same w with density p_w(w) and reaches the boundary with probability T, the transmittance up to there;
 //! everything after that is drawn alike, so that by the balance heuristic over both the densities of what BSDF and light sampling find
 //! after w become
 //!   1 + q p(w | x) / (p_w(w) T)
-//! times as large, whichever of the two drew w, and whatever other techniques they are weighed against. q and p may be any
+//! times as large, whichever of the two drew w, and whatever other techniques they are weighed against; q p is the sum over both kinds
+//! for lights that are found from the first meeting, and that of chains for lights beyond it. q and p may be any
 //! functions of x and w: photons make no result biased. (A guided walk has its own probability of
 //! reaching the boundary and draws later flights by its guide, so that all densities are formed over those of a plain walk.)
 //!
@@ -32,6 +34,7 @@ use serde::Deserialize;
 
 use super::guide::Guide;
 use crate::estimators::crossing::other;
+use crate::estimators::walk::Meeting;
 use crate::geometry::{BoundingSphere, Ray, Side};
 use crate::math::{DVec3, Frame, cos};
 use crate::optics::boundary::{Boundary, Event};
@@ -213,9 +216,12 @@ impl PhotonMap {
         })
     }
 
-    /// Of each kind of flight.
-    pub(super) fn kinds(&self) -> [&PhotonGrids; 2] {
-        [&self.after_one_refraction, &self.of_chains]
+    /// Directions in which a path finds lights from this meeting with the boundary.
+    pub(super) fn of(&self, meeting: Meeting) -> &PhotonGrids {
+        match meeting {
+            Meeting::First => &self.after_one_refraction,
+            Meeting::Later => &self.of_chains,
+        }
     }
 
     /// The caps about the directions of a voxel.
@@ -223,10 +229,10 @@ impl PhotonMap {
         self.caps[(voxel.count as usize).min(ENOUGH)]
     }
 
-    /// A direction of a kind at x, if one is drawn.
-    pub(super) fn sample(&self, kind: &PhotonGrids, x: DVec3, stream: &mut Stream) -> Option<DVec3> {
+    /// A direction at x for this meeting, if one is drawn.
+    pub(super) fn sample(&self, meeting: Meeting, x: DVec3, stream: &mut Stream) -> Option<DVec3> {
         let (grid, _) = choose_share(GRIDS.iter().map(|(_, share)| *share), stream.draw())?;
-        let grid = &kind.grids[grid];
+        let grid = &self.of(meeting).grids[grid];
         let voxel = grid.at(x)?;
         if stream.draw() >= self.most * f64::from(voxel.chance) {
             return None;
@@ -239,8 +245,9 @@ impl PhotonMap {
         Some(Frame::about(directions[index]).to_world(local))
     }
 
-    /// The density of [`Self::sample`] per solid angle, of both kinds, with the probability of drawing at all.
-    pub(super) fn density(&self, x: DVec3, dir: DVec3) -> f64 {
+    /// The density per solid angle of all samples that find lights from this meeting, with the probability of drawing one at all.
+    /// What is drawn for the first meeting ends there; what is drawn for later ones has met the boundary a first time, too.
+    pub(super) fn density(&self, meeting: Meeting, x: DVec3, dir: DVec3) -> f64 {
         let of_grid = |(grid, (_, share)): (&DirectionGrid, &(usize, f64))| {
             let Some(voxel) = grid.at(x).filter(|voxel| voxel.count > 0) else { return 0.0 };
             let (directions, [narrow, wide]) = (grid.directions(voxel), self.caps(voxel));
@@ -255,14 +262,23 @@ impl PhotonMap {
                 NARROW * pdf_cap(narrow) * near_narrow + (1.0 - NARROW) * pdf_cap(wide) * near_wide;
             share * f64::from(voxel.chance) * sum / f64::from(voxel.count)
         };
-        let of_kind = |kind: &PhotonGrids| kind.grids.iter().zip(&GRIDS).map(of_grid).sum::<f64>();
-        self.most * self.kinds().into_iter().map(of_kind).sum::<f64>()
+        let of = |grids: &PhotonGrids| grids.grids.iter().zip(&GRIDS).map(of_grid).sum::<f64>();
+        let of_chains = of(&self.of_chains);
+        self.most
+            * match meeting {
+                Meeting::First => of_chains + of(&self.after_one_refraction),
+                Meeting::Later => of_chains,
+            }
     }
 
     /// Memory behind it, bytes.
     pub(super) fn heap_bytes(&self) -> usize {
         let of = |grid: &DirectionGrid| size_of_val(&*grid.voxels) + size_of_val(&*grid.directions);
-        self.kinds().into_iter().flat_map(|kind| &kind.grids).map(of).sum()
+        [&self.after_one_refraction, &self.of_chains]
+            .into_iter()
+            .flat_map(|kind| &kind.grids)
+            .map(of)
+            .sum()
     }
 }
 

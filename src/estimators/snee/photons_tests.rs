@@ -2,11 +2,18 @@
 
 use std::sync::Arc;
 
+use super::super::state::{Connections, ExtraTurns};
 use super::super::testing::{Lamp, ROUGH, SMOOTH, body, medium, point_inside, ring, sphere};
 use super::super::{Snee, SneeChoices, TwoBounce};
 use super::*;
+use crate::estimators::bands::OneBand;
+use crate::estimators::field::Path;
+use crate::estimators::vertices::WalkExit;
+use crate::estimators::walk::{CameraWalk, Rivals};
 use crate::estimators::{Estimator, Layout, Scores, TransportClass, WalkDraw};
 use crate::geometry::{Shape, procedural};
+use crate::optics::medium::Medium;
+use crate::sampling::distance::transmittance;
 use crate::sampling::stream::PassKey;
 use crate::scene::Sensor;
 use crate::scene::sensor::BodyFlux;
@@ -38,7 +45,7 @@ fn set_up(scene: &Arc<Scene>, choices: &SneeChoices, connects: bool) -> Snee {
 }
 
 /// Moments of sampled directions are those of the density, by as many uniform directions; and the density's integral is the
-/// probability of drawing one.
+/// mean number of directions. For lights from the first meeting with the boundary and for those beyond it.
 #[test]
 fn directions_have_their_density() {
     const DRAWS: u32 = 40_000;
@@ -51,14 +58,10 @@ fn directions_have_their_density() {
         let mut stream =
             StreamKey::named("directions_have_their_density").pass(0).stream(0, Purpose::Walk);
         let mut done = 0;
-        while done < 12 {
+        while done < 24 {
+            let meeting = if done % 2 == 0 { Meeting::First } else { Meeting::Later };
             let Some(x) = point_inside(&scene, &mut stream) else { continue };
-            if map
-                .kinds()
-                .into_iter()
-                .flat_map(|kind| &kind.grids)
-                .all(|grid| grid.at(x).is_none_or(|voxel| voxel.count == 0))
-            {
+            if map.of(meeting).grids.iter().all(|grid| grid.at(x).is_none_or(|voxel| voxel.count == 0)) {
                 continue;
             }
             done += 1;
@@ -73,11 +76,13 @@ fn directions_have_their_density() {
                 }
             };
             for _ in 0..DRAWS {
-                let [a, b] =
-                    map.kinds().map(|kind| map.sample(kind, x, &mut stream).map_or([0.0; 3], powers));
-                add(&mut drawn, [0, 1, 2].map(|i| a[i] + b[i]));
+                let [once, on] = [Meeting::First, Meeting::Later]
+                    .map(|drawn| map.sample(drawn, x, &mut stream).map_or([0.0; 3], powers));
+                // What goes on has met the boundary a first time, too.
+                let finding = if meeting == Meeting::First { 1.0 } else { 0.0 };
+                add(&mut drawn, [0, 1, 2].map(|i| finding * once[i] + on[i]));
                 let w = square_to_cap(2.0, stream.draw2());
-                let density = map.density(x, w) / pdf_cap(2.0);
+                let density = map.density(meeting, x, w) / pdf_cap(2.0);
                 add(&mut expected, powers(w).map(|power| density * power));
             }
             for i in 0..3 {
@@ -85,7 +90,10 @@ fn directions_have_their_density() {
                 let [a, b] = [drawn, expected].map(|sums| sums[0][i] / n);
                 let spread = |sums: [[f64; 3]; 2], mean: f64| (sums[1][i] / n - mean * mean) / n;
                 let error = (spread(drawn, a) + spread(expected, b)).max(0.0).sqrt();
-                assert!((a - b).abs() < 5.0 * error + 1e-12, "{name} {x} {i}: {a} and {b} +- {error}");
+                assert!(
+                    (a - b).abs() < 5.0 * error + 1e-12,
+                    "{name} {meeting:?} {x} {i}: {a} and {b} +- {error}"
+                );
             }
         }
     }
@@ -147,6 +155,56 @@ fn means_stay() {
                 "{name}, {quantity}: the error {error} of {a} is too large to tell"
             );
         }
+    }
+}
+
+/// A path is weighed against both kinds of photons at its first meeting with the boundary, and against those of chains beyond it:
+/// after a reflection inside, and after a flight outside.
+#[test]
+fn light_beyond_the_first_meeting_is_left_to_chains() {
+    let name = "light_beyond_the_first_meeting_is_left_to_chains";
+    let scene = flux(&ring(), ROUGH, &[Lamp::WideDisc]);
+    let snee = set_up(&scene, &photons(1 << 14, 0.7), false);
+    let map = snee.setups[0].photons.as_ref().expect("photons");
+    let key = StreamKey::named(name).pass(0);
+    let mut stream = key.stream(0, Purpose::Sensor);
+    let on = Path { field: snee.walks.field(), band: 0, index: 0, key: &key };
+    let (mut inside, mut outside) = (0, 0);
+    while inside.min(outside) < 20 {
+        let [start, x] = [(); 2].map(|()| point_inside(&scene, &mut stream));
+        let (Some(start), Some(x)) = (start, x) else { continue };
+        let meeting = if inside % 2 == 0 { Meeting::First } else { Meeting::Later };
+        let Some(dir) = map.sample(meeting, x, &mut stream) else { continue };
+        if map.density(Meeting::First, x, dir) <= map.density(Meeting::Later, x, dir) {
+            continue;
+        }
+        let Some(hit) = scene.shape.leave(&Ray { origin: x, dir }) else { continue };
+        let frame = Frame::about(hit.shading_normal);
+        let exit = WalkExit { hit, frame, wo: frame.to_local(-dir) };
+        let mut scores = Scores::new(Layout::new(&scene));
+        let mut rivals = Connections::new(&snee.setups[0], key.stream(0, Purpose::Connection));
+        rivals.extra_turns = Some(Box::new(ExtraTurns::of_path(&on)));
+        let mut walk = CameraWalk::led(on, &mut scores, rivals, OneBand, start);
+        walk.lead_to(x, false);
+        walk.lead_out(&exit);
+        let turns = (x - start).normalize().dot(dir);
+        let Medium { phase, sigma_t, .. } = scene.medium[0];
+        let drawn = phase.pdf(turns) * transmittance(sigma_t, hit.t);
+        let is_weighed = |walk: &CameraWalk<'_, Connections<'_>, OneBand>, meeting: Meeting| {
+            let (a, b) = (Connections::extra_turns(walk) * drawn, map.density(meeting, x, dir));
+            assert!((a - b).abs() <= 1e-9 * b, "{meeting:?} {x} {dir}: {a} and {b}");
+        };
+        is_weighed(&walk, Meeting::First);
+        let towards = square_to_cap(2.0, stream.draw2());
+        if towards.dot(hit.normal) < 0.0 {
+            inside += 1;
+            walk.rivals.reached(0.1);
+        } else if walk.lead_on(towards) {
+            outside += 1;
+        } else {
+            continue;
+        }
+        is_weighed(&walk, Meeting::Later);
     }
 }
 

@@ -12,7 +12,7 @@ use crate::estimators::bands::WalkBands;
 use crate::estimators::connection::{Root, SolverWork};
 use crate::estimators::field::Path;
 use crate::estimators::vertices::{WalkExit, WalkVertex};
-use crate::estimators::walk::{CameraWalk, LookingRay};
+use crate::estimators::walk::{CameraWalk, LookingRay, Meeting};
 use crate::math::DVec3;
 use crate::optics::boundary::Boundary;
 use crate::sampling::discrete::choose_share;
@@ -52,7 +52,29 @@ pub(super) struct PathTurn {
     pub vertex: WalkVertex,
     pub dir: DVec3,
     /// From the vertex to the boundary, mm; `None` until it is met.
-    pub length: Option<f64>,
+    length: Option<f64>,
+    /// The latest meeting with the boundary.
+    meeting: Meeting,
+}
+
+impl PathTurn {
+    /// A turn; `length` from its vertex to the boundary, where that has been met.
+    pub(super) fn new(vertex: WalkVertex, dir: DVec3, length: Option<f64>) -> PathTurn {
+        PathTurn { vertex, dir, length, meeting: Meeting::First }
+    }
+
+    /// The path has met the boundary, `t` mm from where the flight began.
+    pub(super) fn reach(&mut self, t: f64) {
+        match self.length {
+            None => self.length = Some(t),
+            Some(_) => self.meeting = Meeting::Later,
+        }
+    }
+
+    /// The distance from its vertex to the boundary, and the latest meeting; `None` until there is one.
+    pub(super) fn meeting(&self) -> Option<(f64, Meeting)> {
+        self.length.map(|length| (length, self.meeting))
+    }
 }
 
 /// State of a path that photons guide.

@@ -16,7 +16,7 @@ use super::subdivision;
 use super::testing::*;
 use super::*;
 use crate::estimators::vertices::WalkVertex;
-use crate::estimators::walk::{LookingRay, Rivals};
+use crate::estimators::walk::{LookingRay, Meeting, Rivals};
 use crate::estimators::{Layout, TransportClass, WalkDraw};
 use crate::geometry::{Ray, Shape, Side};
 use crate::math::DVec3;
@@ -372,7 +372,8 @@ fn guided_over_plain(snee: &Snee, path: &FixedPath, course: Course) -> ([f64; 5]
         ratios.push(ratios[ratios.len() - 1] * flown);
         if let (Some(map), true) = (&snee.setups[0].photons, is_last) {
             let phase = snee.walks.field().scene.medium[0].phase.pdf(arrival.dot(dir));
-            by_photons = map.density(at, dir) / (phase * transmittance(sigma_t, t) * flown);
+            by_photons =
+                map.density(Meeting::First, at, dir) / (phase * transmittance(sigma_t, t) * flown);
         }
     }
     let [.., at_j, at_end] = ratios[..] else { panic!("two steps at least") };
