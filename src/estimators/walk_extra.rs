@@ -41,6 +41,7 @@ impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
     fn find_lights_once(&mut self) -> Option<()> {
         let hit = self.leave_body()?;
         let side = self.cross(&hit, Side::Inside)?;
+        // Where no light lies ahead, a flight could only lead to a later meeting.
         let shines = |light: &Light| light.eval(self.band, self.ray.dir).0 > 0.0;
         if side == Side::Outside && self.scene.lights.iter().any(shines) {
             self.fly_outside();

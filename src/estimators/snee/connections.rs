@@ -88,7 +88,7 @@ impl Rivals for Connections<'_> {
         let Ray { origin: point, dir: arrival } = walk.ray;
         if let Some(extra_turns) = &mut walk.rivals.extra_turns {
             let vertex = WalkVertex { point, arrival, walks };
-            extra_turns.latest = Some(PathTurn::new(vertex, dir, None));
+            extra_turns.latest = Some(PathTurn { vertex, dir, met: None });
         }
     }
 
@@ -234,7 +234,7 @@ pub(super) fn score_guided<B: WalkBands>(
     }
     let mut bands = walk.bands.clone();
     bands.turn(&walk.scene.medium, x_j.point, x_j.arrival, leg.dir);
-    let turn = PathTurn::new(x_j, leg.dir, Some(leg.length));
+    let turn = PathTurn::to_boundary(x_j, leg.dir, leg.length);
     let by_photons = extra_turns::density(walk, &turn);
     bands.flight(&walk.scene.medium, leg.length, false);
     let rivals = by_last + by_connection + by_subdivision;
@@ -265,7 +265,7 @@ pub(super) fn score_subdivided<B: WalkBands>(
     walk.rivals.hold(Slot::Drawn, drawn);
     bands.turn(media, *x_j, middle.to_j.dir, middle.to_k.dir);
     let Leg { dir, length } = middle.to_k;
-    let by_photons = extra_turns::density(walk, &PathTurn::new(drawn, dir, Some(length)));
+    let by_photons = extra_turns::density(walk, &PathTurn::to_boundary(drawn, dir, length));
     bands.flight(media, middle.to_k.length, false);
     let by_subdivision = subdivision::density(walk, Slot::Latest, middle, exit, &end);
     let by_last = last_vertex::density(walk, Slot::Drawn, &middle.to_k, &end);

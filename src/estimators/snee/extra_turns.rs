@@ -29,10 +29,8 @@ const LEAST: f64 = 1e-200;
 /// The density with which photons make the walk turn and reach the boundary, q p(w | x), over U as in [`super::connections`], times
 /// the density of the walk up to the turn; 0 where no photons guide.
 pub(super) fn density<B: WalkBands>(walk: &CameraWalk<'_, Connections<'_>, B>, turn: &PathTurn) -> f64 {
-    let PathTurn { vertex: WalkVertex { point, arrival, walks }, dir, .. } = *turn;
-    let (Some(map), Some((length, meeting))) = (&walk.rivals.setup.photons, turn.meeting()) else {
-        return 0.0;
-    };
+    let &PathTurn { vertex: WalkVertex { point, arrival, walks }, dir, met } = turn;
+    let (Some(map), Some((length, meeting))) = (&walk.rivals.setup.photons, met) else { return 0.0 };
     let density = map.density(meeting, point, dir);
     if density == 0.0 {
         return 0.0;

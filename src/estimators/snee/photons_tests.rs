@@ -159,7 +159,7 @@ fn means_stay() {
 }
 
 /// A path is weighed against both kinds of photons at its first meeting with the boundary, and against those of chains beyond it:
-/// after a reflection inside, and after a flight outside.
+/// after a flight outside, and where a flight inside is said to have met the boundary again.
 #[test]
 fn light_beyond_the_first_meeting_is_left_to_chains() {
     let name = "light_beyond_the_first_meeting_is_left_to_chains";

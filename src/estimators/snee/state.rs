@@ -51,29 +51,22 @@ pub(super) struct AllCalls<'a> {
 pub(super) struct PathTurn {
     pub vertex: WalkVertex,
     pub dir: DVec3,
-    /// From the vertex to the boundary, mm; `None` until it is met.
-    length: Option<f64>,
-    /// The latest meeting with the boundary.
-    meeting: Meeting,
+    /// The distance from the vertex to the boundary, mm, and the latest meeting; `None` until the boundary is met.
+    pub met: Option<(f64, Meeting)>,
 }
 
 impl PathTurn {
-    /// A turn; `length` from its vertex to the boundary, where that has been met.
-    pub(super) fn new(vertex: WalkVertex, dir: DVec3, length: Option<f64>) -> PathTurn {
-        PathTurn { vertex, dir, length, meeting: Meeting::First }
+    /// A turn that leads to the boundary, `length` mm away.
+    pub(super) fn to_boundary(vertex: WalkVertex, dir: DVec3, length: f64) -> PathTurn {
+        PathTurn { vertex, dir, met: Some((length, Meeting::First)) }
     }
 
     /// The path has met the boundary, `t` mm from where the flight began.
     pub(super) fn reach(&mut self, t: f64) {
-        match self.length {
-            None => self.length = Some(t),
-            Some(_) => self.meeting = Meeting::Later,
-        }
-    }
-
-    /// The distance from its vertex to the boundary, and the latest meeting; `None` until there is one.
-    pub(super) fn meeting(&self) -> Option<(f64, Meeting)> {
-        self.length.map(|length| (length, self.meeting))
+        self.met = match self.met {
+            None => Some((t, Meeting::First)),
+            Some((length, _)) => Some((length, Meeting::Later)),
+        };
     }
 }
 
