@@ -75,14 +75,14 @@ pub(super) fn last(lanes: &[Lane]) -> u64 {
 /// The passes [from, from + length) of the longest lane and the same part of every other, in the order
 /// A B .. B A, except for passes that are done already; and whether none of them was. A single last pass is not
 /// split over both directions of the order.
-pub(super) fn turn(lanes: &[Lane], from: u64, length: u64, has_control: bool) -> (Vec<Span>, bool) {
+pub(super) fn turn(lanes: &[Lane], from: u64, length: u64, runs_twice: bool) -> (Vec<Span>, bool) {
     let longest = lanes.iter().map(|lane| lane.passes).max().unwrap_or(0);
     let [middle, end] = [length.div_ceil(2), length].map(|passes| longest.min(from + passes));
     let span = |lane: &Lane, (from, to): (u64, u64), second: Second| {
         let part = u128::from(lane.passes);
         let at = |pass: u64| (u128::from(pass) * part / u128::from(longest)) as u64;
         let keep_level = batch_level(lane.passes);
-        let twice = (has_control && lane.job == lanes[0].job).then_some(second);
+        let twice = (runs_twice && lane.job == lanes[0].job).then_some(second);
         Span { job: lane.job, start: at(from), end: at(to), keep_level, twice }
     };
     let there = lanes.iter().map(|lane| (lane, span(lane, (from, middle), Second::After)));

@@ -65,6 +65,8 @@ pub(crate) struct Contest {
     pub efficiency: Efficiency,
     /// The efficiency ratio with the error that the clock's control shows.
     pub ratio: LogRatio,
+    /// That error; 0 by counters.
+    pub machine: f64,
     /// Whether the arms were interleaved, and timed with a control; always true by counters.
     pub is_interleaved: bool,
     /// What the ratio is at least, with [`SHOWN`] confidence from below and above together, where only
@@ -107,6 +109,7 @@ pub(crate) fn contest(
     let at_least = efficiency.at_least(&b, values, &machine, 0.5 * (1.0 + SHOWN));
     Ok(Contest {
         ratio: efficiency.work.with_control(&machine),
+        machine: machine.std_error,
         is_interleaved: measure == CostMeasure::Counters || control.is_some(),
         at_least,
         efficiency,
@@ -127,8 +130,8 @@ fn machine_of(stored: &Stored, own: Option<f64>) -> Estimate {
     own.map_or(Estimate::known(0.0, 0.0), |own| machine(own, &all().collect::<Vec<_>>()))
 }
 
-/// The time of passes that were run a second time over that of their first run, in the arm of the cell
-/// that has them: the logarithm of the control's ratio to itself. Where control arms show more, theirs.
+/// The time of the control over that of its baseline, as a logarithm: of control arms, and of passes that were
+/// run a second time. Where a cell has several, the one that shows most.
 fn control_log(stored: &Stored, cell: usize) -> Option<f64> {
     let runs = &stored.record.cells.get(cell)?.runs;
     let batches = stored.timing.as_ref()?.batches.get(&stored.record.cells[cell].label)?;
@@ -144,8 +147,7 @@ fn control_log(stored: &Stored, cell: usize) -> Option<f64> {
         let (first, second) = parts(&arm(run.control_of.as_ref()?)?, &arm(&run.estimator)?);
         ratio_log(per_pass(&first), per_pass(&second))
     });
-    let own = ratio_log(first, second)?;
-    Some(of_arms.fold(own, |most, log| if log.abs() > most.abs() { log } else { most }))
+    of_arms.chain(ratio_log(first, second)).max_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
 /// Time of a pass. Arms may have different numbers of them.
@@ -356,6 +358,7 @@ fn weigh(stored: &Stored, claim: &EfficiencyClaim, fails: bool) -> Result<Effici
     let relative = |x: f64| if scale > 0.0 { x / scale } else { x };
     Ok(EfficiencyTest {
         ratio,
+        machine: contest.machine,
         bound,
         factor,
         kurtosis,

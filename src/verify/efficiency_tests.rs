@@ -193,13 +193,14 @@ fn cpu_time_counts_where_the_machine_is_quiet() {
     assert!((v.value.expect("a ratio") / 2.0 - 1.0).abs() < 0.2, "{v:?}");
 }
 
-/// The timer also counts the time of the arm before: the control, which follows another arm, differs.
+/// The timer also counts the time of the arm before: half of the control follows another arm, and differs.
 #[test]
 fn a_timer_that_counts_another_arms_time_is_found() {
     let cost = |name: &str| if name == "snee" { 0.3 } else { 1.0 };
     let leaking = timed(scored(0.1, 0.05), |name, batch| {
-        // A B C, C B A: before the control comes `snee`, before `mis` another `mis`.
-        let before = if name == "mis (control)" { cost("snee") } else { cost("mis") };
+        // A C B, B C A: before the control comes `mis` or `snee`, before `mis` itself or the control.
+        let after_mis = if name == "mis (control)" { 0.5 } else { 1.0 };
+        let before = after_mis * cost("mis") + (1.0 - after_mis) * cost("snee");
         cost(name) * noisy(name, batch) + before
     });
     assert_invalid(&by_cpu(leaking, 1.5), "machine too noisy");
@@ -219,11 +220,15 @@ fn what_a_control_arm_shows_is_in_the_interval() {
     assert_invalid(&by(1.2), "machine too noisy");
 }
 
+/// The times of an arm.
+fn batches_of<'a>(s: &'a mut Stored, name: &str) -> &'a mut Batches {
+    let timing = s.timing.as_mut().expect("a timing");
+    timing.batches.get_mut("smooth").expect("a cell").get_mut(name).expect("an arm")
+}
+
 /// Replaces the times of the passes that ran twice.
 fn set_control(s: &mut Stored, twice: [f64; 2]) {
-    let timing = s.timing.as_mut().expect("a timing");
-    let batches = timing.batches.get_mut("smooth").expect("a cell").get_mut("mis").expect("an arm");
-    batches.twice = vec![twice; BATCHES];
+    batches_of(s, "mis").twice = vec![twice; BATCHES];
 }
 
 /// The same work took 1.3 times as long at another place: a ratio of 4 says nothing any more, and neither
@@ -314,13 +319,14 @@ fn cpu_time_needs_its_conditions() {
     assert_invalid(&by_cpu(without, 1.5), "no control: mis was not run twice");
 
     let mut apart = timed(scored(0.1, 0.05), noisy);
-    let timing = apart.timing.as_mut().expect("a timing");
-    let batches = timing.batches.get_mut("smooth").expect("a cell").get_mut("snee").expect("an arm");
-    batches.settled = vec![false; BATCHES];
+    batches_of(&mut apart, "snee").settled = vec![false; BATCHES];
     assert_invalid(&by_cpu(apart, 1.5), "not interleaved");
 
+    // Neither did passes run twice, nor was the control arm interleaved.
     let mut uncontrolled = timed(scored(0.1, 0.05), noisy);
     set_control(&mut uncontrolled, [0.0; 2]);
+    assert_eq!(by_cpu(uncontrolled.clone(), 1.5).outcome, Outcome::Pass);
+    batches_of(&mut uncontrolled, "mis (control)").settled = vec![false; BATCHES];
     assert_invalid(&by_cpu(uncontrolled, 1.5), "not interleaved");
 
     assert_invalid(&by_cpu(scored(0.1, 0.05), 1.5), "no CPU time");

@@ -130,6 +130,8 @@ impl CountsFit {
 pub(super) struct EfficiencyTest {
     /// E, variance times cost of the baseline over that of the candidate.
     pub ratio: LogRatio,
+    /// The part of its logarithm's standard error that the clock's controls show; 0 by counted work.
+    pub machine: f64,
     /// The bound e that E must exceed.
     pub bound: f64,
     /// The factor by which E may be off because its cost is counted work; 1 by CPU time.
@@ -190,12 +192,29 @@ impl EfficiencyTest {
     }
 
     /// Passes over those that there are at which the interval would lie above the bound, and a
-    /// difference of the means as large as `detect` would be seen; none where E itself is too small.
+    /// difference of the means as large as `detect` would be seen; none where E itself is too small, or
+    /// too small for what the clock's controls show, which no number of passes changes.
     pub(super) fn passes_factor(&self, own_level: f64, detect: Option<f64>) -> Option<f64> {
-        let above = self.ratio.log.value - ln(self.must_exceed());
-        let shown = self.ratio.half_width(CONFIDENCE) / above;
+        let Estimate { std_error, .. } = self.ratio.log;
+        let machine = self.machine * self.machine;
+        // The half-width h of the interval is t times the standard error: (a / t)^2 = s^2 / f + r^2, with
+        // the error s of the scores and costs, and r of the machine.
+        let error = std_error * self.above_bound() / self.ratio.half_width(CONFIDENCE);
+        let shown = (std_error * std_error - machine) / (error * error - machine);
         let seen = detect.map_or(0.0, |d| self.unseen(own_level) / d);
-        (above > 0.0).then(|| (shown * shown).max(seen * seen))
+        (error > self.machine).then(|| shown.max(seen * seen))
+    }
+
+    /// ln E above that of what it must exceed.
+    fn above_bound(&self) -> f64 {
+        self.ratio.log.value - ln(self.must_exceed())
+    }
+
+    /// Whether E would be shown to exceed its bound but for what the clock's controls show.
+    fn blames_machine(&self) -> bool {
+        let share = self.machine / self.ratio.log.std_error;
+        let alone = (1.0 - share * share).max(0.0).sqrt() * self.ratio.half_width(CONFIDENCE);
+        !self.is_shown() && self.above_bound() > alone
     }
 
     /// The smallest shortfall of E below e, relative to e, that would have failed: 1 - exp(-d) with d
@@ -222,7 +241,15 @@ impl EfficiencyTest {
             Outcome::Invalid(objection) => objection.to_string(),
             Outcome::Fail if self.blames_means => self.means_differ(),
             Outcome::Underpowered if !self.is_shown() => {
-                format!("not shown to exceed {:.3}: {numbers}", self.bound)
+                let machine = match self.blames_machine() {
+                    true => format!(
+                        "; by its controls the clock favours one arm by {:.1} %, which more passes do not \
+                         change: a machine without other work may",
+                        100.0 * self.machine
+                    ),
+                    false => String::new(),
+                };
+                format!("not shown to exceed {:.3}: {numbers}{machine}", self.bound)
             }
             Outcome::Underpowered => format!(
                 "a difference of the means of {:.1} % could have gone unseen; {numbers}",
@@ -246,6 +273,7 @@ mod tests {
     fn shown(low: f64, error: f64) -> EfficiencyTest {
         EfficiencyTest {
             ratio: LogRatio { log: Estimate { value: 1.1, std_error: low, dof: 60.0 } },
+            machine: 0.0,
             bound: 1.0,
             factor: 1.0,
             kurtosis: (3.0, 3.0),
@@ -254,6 +282,32 @@ mod tests {
             fails: false,
             test: Test { statistic: 100.0, dof: 60.0, p_value: 1.0 },
         }
+    }
+
+    /// 10 % above its bound, with the errors of scores and machine; half-widths are 3.46 times the error.
+    fn above_by_a_tenth(scores: f64, machine: f64) -> EfficiencyTest {
+        let log = Estimate { value: 0.1, std_error: scores.hypot(machine), dof: 60.0 };
+        EfficiencyTest { ratio: LogRatio { log }, machine, ..shown(0.0, 1e-9) }
+    }
+
+    #[test]
+    fn no_passes_change_what_the_clock_shows() {
+        let factor = |scores, machine| above_by_a_tenth(scores, machine).passes_factor(1e-6, None);
+        // An interval of +-20 % is to be one of +-10 %.
+        let critical = above_by_a_tenth(0.1, 0.0).ratio.half_width(CONFIDENCE) / 0.1;
+        let four = factor(0.2 / critical, 0.0).expect("a number");
+        assert!((four - 4.0).abs() < 1e-9, "{four}");
+        // With 6 % of the machine, 8 % are left to scores and costs.
+        let more = factor(0.2 / critical, 0.06 / critical).expect("a number");
+        assert!((more - 6.25).abs() < 1e-9, "{more}");
+        assert_eq!(factor(0.01 / critical, 0.11 / critical), None);
+        for (machine, is_blamed) in [(0.06, false), (0.11, true)] {
+            let shown = above_by_a_tenth(0.01 / critical, machine / critical);
+            let note = shown.note(&Outcome::Underpowered, 1e-6);
+            assert_eq!(note.contains("the clock favours"), is_blamed, "{note}");
+        }
+        let note = above_by_a_tenth(0.2 / critical, 0.11 / critical).note(&Outcome::Underpowered, 1e-6);
+        assert!(!note.contains("the clock favours"), "{note}");
     }
 
     #[test]
