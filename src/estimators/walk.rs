@@ -35,7 +35,7 @@ use crate::scene::sensor::PathMeasure;
 #[cfg(test)]
 pub(super) use lanes::may_fly_side_by_side;
 pub(super) use lanes::{passes_at_once, trace_passes};
-pub(super) use rivals::{LookingRay, Meeting, Rivals, Unrivalled};
+pub(super) use rivals::{DensitySum, LookingRay, Meeting, Rivals, Unrivalled};
 
 /// How the path's current direction was drawn, as light sampling sees it.
 #[derive(Clone, Copy)]
@@ -498,7 +498,8 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
             let (radiance, pdf) = light.eval(self.band, self.ray.dir);
             if radiance > 0.0 && !R::is_expected(self, self.unscattered, index, self.ray.dir) {
                 let rivals = self.rival_densities(index, self.ray.dir);
-                let walks = self.bands.density() * (1.0 + R::extra_turns(self));
+                let extra_turns = R::extra_turns(self);
+                let walks = self.bands.density() * (1.0 + extra_turns);
                 let [bsdf, by_light] = self.taking_part();
                 if bsdf == 0.0 {
                     continue;
@@ -514,8 +515,9 @@ impl<'a, R: Rivals, B: WalkBands> CameraWalk<'a, R, B> {
                     let own = self.own_density();
                     (own, walks * (own + by_light) + rivals)
                 };
-                if rivals > 0.0 {
-                    self.rivals.weigh(sum);
+                if rivals > 0.0 || extra_turns > 0.0 {
+                    let extra_turns = self.bands.density() * extra_turns * (own + by_light);
+                    self.rivals.weigh(&DensitySum { all: sum, rivals, extra_turns });
                 }
                 let value = self.throughput * (own / sum) * radiance;
                 self.score(class, index, self.ray.origin, value);

@@ -105,16 +105,19 @@ impl<R: Rivals, B: WalkBands> CameraWalk<'_, R, B> {
             return;
         }
         let rivals = self.rival_densities(index, wi);
-        let walks = self.bands.density() * (1.0 + R::extra_turns(self));
-        let (density, sum) = match pdf {
+        let extra_turns = R::extra_turns(self);
+        let walks = self.bands.density() * (1.0 + extra_turns);
+        let (density, unidirectional) = match pdf {
             Some(pdf) => {
                 let density = choice * pdf;
-                (density, walks * (density + bsdf * own) + rivals)
+                (density, density + bsdf * own)
             }
-            None => (choice, walks * choice + rivals),
+            None => (choice, choice),
         };
-        if rivals > 0.0 {
-            self.rivals.weigh(sum);
+        let sum = walks * unidirectional + rivals;
+        if rivals > 0.0 || extra_turns > 0.0 {
+            let extra_turns = self.bands.density() * extra_turns * unidirectional;
+            self.rivals.weigh(&DensitySum { all: sum, rivals, extra_turns });
         }
         let estimate = value / density * (density / sum);
         let score = self.throughput * estimate;

@@ -25,6 +25,17 @@ pub(in crate::estimators) enum Meeting {
     Later,
 }
 
+/// Densities that make a path, as weights see them.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::estimators) struct DensitySum {
+    /// Of all techniques.
+    pub all: f64,
+    /// The part of [`Rivals::densities`].
+    pub rivals: f64,
+    /// The part of the rivals' [`Rivals::extra_turns`].
+    pub extra_turns: f64,
+}
+
 /// Techniques beside unidirectional sampling.
 pub(in crate::estimators) trait Rivals: Sized {
     /// Nothing happens at a medium vertex.
@@ -102,9 +113,9 @@ pub(in crate::estimators) trait Rivals: Sized {
     #[inline]
     fn scored(&mut self, _value: f64) {}
 
-    /// The next score is divided by this sum of densities, which the rivals' latest [`Self::densities`] are a part of.
+    /// The next score is divided by a sum of densities.
     #[inline]
-    fn weigh(&mut self, _sum: f64) {}
+    fn weigh(&mut self, _sum: &DensitySum) {}
 
     /// Sum over the rivals of their densities of the path that ends at `exit` and continues towards
     /// `wi`, light `light`, relative to the density of the walk's medium vertices.

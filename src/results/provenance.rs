@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::json::hash_hex;
 
 /// Raised by every change that alters a stored bit.
-pub const NUMERICAL_VERSION: u32 = 20;
+pub const NUMERICAL_VERSION: u32 = 21;
 
 /// The crates whose arithmetic enters a stored number.
 const NUMERICAL_CRATES: [&str; 4] = ["libm", "rand_pcg", "glam", "obvhs"];

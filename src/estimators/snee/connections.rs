@@ -22,6 +22,7 @@
 //! whichever technique it comes from. Where photons guide, p_B and p_L are
 //! 1 + q p / (p_w T) times as large ([`super::photons`]).
 
+use super::SneeOptions;
 use super::end::{End, Leg, Middle};
 use super::expected;
 use super::extra_turns;
@@ -32,7 +33,7 @@ use super::state::{AllCalls, Connections, PathTurn, Slot};
 use super::subdivision::{self, Subdivided};
 use crate::estimators::bands::WalkBands;
 use crate::estimators::vertices::{Unscattered, WalkExit, WalkVertex};
-use crate::estimators::walk::{CameraWalk, LookingRay, Rivals};
+use crate::estimators::walk::{CameraWalk, DensitySum, LookingRay, Rivals};
 use crate::geometry::{Hit, Ray, Shape};
 use crate::math::lanes::{Lanes, VectorLanes};
 use crate::math::{DVec3, Frame};
@@ -134,9 +135,13 @@ impl Rivals for Connections<'_> {
         }
     }
 
-    fn weigh(&mut self, sum: f64) {
+    fn weigh(&mut self, sum: &DensitySum) {
         if let Some(notes) = self.notes {
-            notes.borrow_mut().weigh(self.parts.map(|part| part / sum));
+            // Parts of an earlier sum are left where no rival took part in this one.
+            let [subdivision, last_vertex, connection] =
+                if sum.rivals > 0.0 { self.parts } else { [0.0; 3] };
+            let parts = [subdivision, last_vertex, connection, sum.extra_turns];
+            notes.borrow_mut().weigh(parts.map(|part| part / sum.all));
         }
     }
 
@@ -184,6 +189,10 @@ impl Rivals for Connections<'_> {
             return 0.0;
         }
         let setup = walk.rivals.setup;
+        let SneeOptions { last_vertex, strategies, .. } = &*setup.options;
+        if last_vertex.is_none() && setup.specular.is_none() && !strategies.subdivides() {
+            return 0.0;
+        }
         let Some(guide) = setup.guides.iter().find(|guide| guide.light == light) else { return 0.0 };
         let end = End::new(walk, guide, exit, wi, walk.rivals.unidirectional(), None);
         if end.by_guide == 0.0 {
@@ -240,7 +249,8 @@ pub(super) fn score_guided<B: WalkBands>(
     let rivals = by_last + by_connection + by_subdivision;
     let sum = (bands.density() + by_photons) * end.unidirectional + rivals;
     walk.rivals.parts = [by_subdivision, by_last, by_connection];
-    walk.rivals.weigh(sum);
+    let extra_turns = by_photons * end.unidirectional;
+    walk.rivals.weigh(&DensitySum { all: sum, rivals, extra_turns });
     let score = walk.throughput * end.value / sum;
     walk.score_with(&bands, walk.history.class(), guide.light, score);
 }
@@ -282,7 +292,8 @@ pub(super) fn score_subdivided<B: WalkBands>(
         return;
     }
     walk.rivals.parts = [by_subdivision, by_last, by_connection];
-    walk.rivals.weigh(sum);
+    let extra_turns = by_photons * end.unidirectional;
+    walk.rivals.weigh(&DensitySum { all: sum, rivals, extra_turns });
     let mut history = walk.history;
     history.scatter();
     walk.score_with(&bands, history.class(), guide.light, value);

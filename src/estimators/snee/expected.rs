@@ -15,7 +15,7 @@
 use super::state::Connections;
 use crate::estimators::bands::WalkBands;
 use crate::estimators::vertices::Unscattered;
-use crate::estimators::walk::{CameraWalk, Rivals};
+use crate::estimators::walk::{CameraWalk, DensitySum, Rivals};
 use crate::estimators::{Anomaly, Cost};
 use crate::geometry::{FaceId, Hit, Ray, Side};
 use crate::math::{DVec3, Frame};
@@ -118,7 +118,9 @@ fn see<B: WalkBands>(walk: &mut CameraWalk<'_, Connections<'_>, B>, view: &View,
             continue;
         }
         let (radiance, _) = walk.scene.lights[guide.light].eval(walk.band, towards);
-        let drawn = bands.density() * (1.0 + Connections::extra_turns(walk));
+        let extra_turns = Connections::extra_turns(walk);
+        walk.rivals.weigh(&DensitySum { all: 1.0 + extra_turns, rivals: 0.0, extra_turns });
+        let drawn = bands.density() * (1.0 + extra_turns);
         let value = walk.throughput * walk.look_share * factor * radiance / drawn;
         walk.score_with(bands, walk.history.class(), guide.light, value);
     }

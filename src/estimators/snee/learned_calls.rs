@@ -22,15 +22,18 @@
 //!
 //! The squared mean of a pixel does not depend on f and v; paths come in pairs of one pixel, and the mean product of a pair is an
 //! unbiased estimate of it. The cost is
-//!   cost of walks + cost of views + sum_t f_t cost of calls + cost of densities of subdivision, unless that is left out,
-//! by counted work ([`Prices`]), so that no bit depends on a clock. Chosen are the factors and views with the least variance times
-//! cost on fixed ladders. A choice that only one half of the pairs prefers to the given options is noise; then these stay.
+//!   cost of walks and of views + sum_t f_t cost of calls + cost of densities of subdivision, of guesses and of looking up photons,
+//! the last three unless all techniques that need them are left out. It is counted work ([`Prices`]), so that no bit depends on a
+//! clock. Chosen are the factors and views with the least variance times cost on fixed ladders. A choice that only one half of the
+//! pairs prefers to the given options is noise; then these stay.
 //! Emission along flights, which no call changes, is left out of the prediction.
 //!
-//! Results are unbiased for any factors above 0. Subdivision may also have the factor 0, where BSDF and light sampling draw all
-//! its paths and the last vertex draws most of them: then what its calls have scored is dropped, x_t < 1 for all other scores,
-//! and the cost of its densities is saved, too. Without the last vertex, the weights of what is left could be as large as those
-//! of path tracing, whose rare large scores a warm-up does not see.
+//! Results are unbiased for any factors above 0. A technique may also have the factor 0, where BSDF and light sampling draw all
+//! its paths and others draw most of them: then what its calls have scored is dropped, x_t < 1 for all other scores,
+//! and what its densities cost is saved, too. Subdivision may be left out beside the last vertex or photons, the last vertex beside
+//! photons, and photons beside the last vertex ([`super::left_out`]). Without the others, the weights of what is left could be as
+//! large as those of path tracing, whose rare large scores a warm-up does not see. For the same reason photons of a mesh with a sharp
+//! boundary are drawn a quarter as often at the least.
 
 use std::cell::RefCell;
 
@@ -43,9 +46,7 @@ use crate::estimators::field::Path;
 use crate::estimators::walk::LookingRay;
 use crate::estimators::{Cost, Layout, Scores};
 use crate::geometry::Shape;
-use crate::optics::boundary::Boundary;
 use crate::sampling::stream::StreamKey;
-use crate::scene::Light;
 
 /// Options of the warm-up.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -67,21 +68,19 @@ pub(super) enum CalledTechnique {
     Subdivision,
     LastVertex,
     Connection,
+    Photons,
 }
 
 impl CalledTechnique {
     /// How many there are.
-    pub(super) const COUNT: usize = 3;
+    pub(super) const COUNT: usize = 4;
 }
 
 /// One number per technique, in the order of [`CalledTechnique`].
-type PerTechnique = [f64; CalledTechnique::COUNT];
+pub(super) type PerTechnique = [f64; CalledTechnique::COUNT];
 
 /// The warm-up calls so many times as often as the options ask for, at most always.
 const MORE: f64 = 4.0;
-
-/// Factors of the warm-up's probabilities to choose from; the last only for a technique that may be left out.
-const LADDER: [f64; 7] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.0];
 
 /// Numbers of views to choose from, beside the given one.
 const VIEWS: [u32; 6] = [1, 2, 4, 8, 16, 32];
@@ -103,6 +102,12 @@ struct Prices {
     call: PerTechnique,
     /// Of asking for the density of subdivision.
     density: f64,
+    /// Of a specular guess.
+    guess: f64,
+    /// At a medium vertex, of asking whether the last vertex or subdivision is called.
+    asking: f64,
+    /// The same of photons, and of walking one by one.
+    looking_up: f64,
     /// Of a node and of a solve of the connection's search.
     node: f64,
     solve: f64,
@@ -114,8 +119,11 @@ impl Prices {
         view: 240.0,
         medium_event: 60.0,
         boundary_event: 250.0,
-        call: [1100.0, 1400.0, 400.0],
+        call: [1100.0, 1400.0, 400.0, 2300.0],
         density: 400.0,
+        guess: 450.0,
+        asking: 10.0,
+        looking_up: 20.0,
         node: 0.0,
         solve: 250.0,
     };
@@ -125,8 +133,11 @@ impl Prices {
         view: 1500.0,
         medium_event: 170.0,
         boundary_event: 700.0,
-        call: [6500.0, 6900.0, 4000.0],
+        call: [6500.0, 6900.0, 4000.0, 3000.0],
         density: 1300.0,
+        guess: 1000.0,
+        asking: 50.0,
+        looking_up: 120.0,
         node: 45.0,
         solve: 150.0,
     };
@@ -226,6 +237,10 @@ pub(super) struct CallNotes {
     /// How often the density of subdivision was asked for: by calls of each technique, and by walks.
     asked: PerTechnique,
     asked_by_walks: f64,
+    /// Number of specular guesses.
+    guesses: f64,
+    /// Boundary events of directions that photons teach, which are a part of their calls.
+    events_of_photons: f64,
 }
 
 impl CallNotes {
@@ -247,6 +262,8 @@ impl CallNotes {
             spent: [0.0; CalledTechnique::COUNT],
             asked: [0.0; CalledTechnique::COUNT],
             asked_by_walks: 0.0,
+            guesses: 0.0,
+            events_of_photons: 0.0,
         }
     }
 
@@ -276,6 +293,16 @@ impl CallNotes {
             Some(technique) => self.asked[*technique as usize] += 1.0,
             None => self.asked_by_walks += 1.0,
         }
+    }
+
+    /// A specular guess was made.
+    pub(super) fn guess(&mut self) {
+        self.guesses += 1.0;
+    }
+
+    /// A direction that photons teach has met the boundary so often.
+    pub(super) fn meet(&mut self, events: u64) {
+        self.events_of_photons += events as f64;
     }
 
     /// A connection was searched for.
@@ -382,17 +409,16 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
         if most[technique] > 0.0 { asked[technique] / most[technique] } else { 1.0 }
     };
     let mut candidates: Vec<PerTechnique> = vec![std::array::from_fn(of_given)];
-    let mut ladders =
-        most.map(|most| if most > 0.0 { &LADDER[..LADDER.len() - 1] } else { &LADDER[..1] });
-    let [subdivision, last_vertex, _] = &most;
-    if *subdivision > 0.0 && *last_vertex > 0.0 && snee.may_go_without_subdivision(index) {
-        ladders[CalledTechnique::Subdivision as usize] = &LADDER;
-    }
+    let is_used = most.map(|most| most > 0.0);
+    let ladders = snee.ladders(index, is_used);
     for &a in ladders[0] {
         for &b in ladders[1] {
-            candidates.extend(ladders[2].iter().map(|&c| [a, b, c]));
+            for &c in ladders[2] {
+                candidates.extend(ladders[3].iter().map(|&d| [a, b, c, d]));
+            }
         }
     }
+    candidates.retain(|factors| snee.may_be_left_out(index, is_used, factors));
 
     let field = snee.walks.field();
     let scene = &field.scene;
@@ -420,13 +446,15 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
         notes.borrow_mut().halves[half].squared_mean += product;
     }
     let notes = notes.into_inner();
-    notes.choice(pairs, notes.prices.walks(&scores))
+    let vertices = scores.cost[Cost::MediumEvents as usize] as f64;
+    let walks = notes.prices.walks(&scores) - notes.prices.boundary_event * notes.events_of_photons;
+    notes.choice(pairs, walks, vertices)
 }
 
 impl CallNotes {
     /// The best candidate and number of views, after so many pairs, in which walks without calls and with one view each had this
-    /// cost.
-    fn choice(&self, pairs: u64, walks: f64) -> ChosenCalls {
+    /// cost and so many medium vertices.
+    fn choice(&self, pairs: u64, walks: f64, vertices: f64) -> ChosenCalls {
         let sum = |factors: &PerTechnique, of_all: &PerTechnique| {
             factors.iter().zip(of_all).map(|(factor, all)| factor * all).sum::<f64>()
         };
@@ -437,7 +465,19 @@ impl CallNotes {
             } else {
                 0.0
             };
-            walks + looking + sum(factors, &self.spent) + self.prices.density * asked
+            let [subdivision, last_vertex, ..] = factors;
+            let guesses = if *subdivision > 0.0 || *last_vertex > 0.0 {
+                self.prices.guess * self.guesses + self.prices.asking * vertices
+            } else {
+                0.0
+            };
+            let looking_up = if factors[CalledTechnique::Photons as usize] > 0.0 {
+                self.prices.looking_up
+            } else {
+                0.0
+            };
+            let calls = sum(factors, &self.spent) + self.prices.density * asked + guesses;
+            walks + looking + looking_up * vertices + calls
         };
         // Second moments are per path, of which there are two in a pair.
         let inefficiency = |(candidate, views): (usize, u32), halves: &[HalfSums]| {
@@ -489,28 +529,12 @@ fn used_probabilities(
             } else {
                 0.0
             },
+            if setup.photons.is_some() {
+                options.photons.map_or(0.0, |photons| photons.most)
+            } else {
+                0.0
+            },
         ]
-    }
-}
-
-/// The least roughness of a mesh whose walks may go without subdivision.
-const LEAST_ROUGHNESS: f64 = 0.1;
-
-impl Snee {
-    /// Whether subdivision of this setup may be left out: BSDF and light sampling draw all its paths, and the last vertex draws
-    /// most of them. In a mesh it guesses the normal where light comes in. With a sharp boundary, paths by another normal would
-    /// be left to rare scores of light sampling, as large as the density of facets: a warm-up does not see them.
-    fn may_go_without_subdivision(&self, index: usize) -> bool {
-        let strategies = &self.options.strategies;
-        let scene = self.walks.scene();
-        let roughness = match scene.boundary[index] {
-            Boundary::Rough { ref facets, .. } => facets.alpha,
-            Boundary::Smooth { .. } | Boundary::Matched => 0.0,
-        };
-        let mut lights = self.setups[index].guides.iter().map(|guide| &scene.lights[guide.light]);
-        let is_found = roughness > 0.0 || !lights.any(Light::is_directional);
-        let is_guessed = matches!(*scene.shape, Shape::Mesh(_));
-        strategies.bsdf && strategies.light && is_found && !(is_guessed && roughness < LEAST_ROUGHNESS)
     }
 }
 
@@ -527,6 +551,10 @@ impl SneeOptions {
         options.call_alone.most = of(self.call_alone.most, CalledTechnique::Subdivision);
         if let Some(last) = &mut options.last_vertex {
             last.most = of(last.most, CalledTechnique::LastVertex);
+        }
+        options.last_vertex = options.last_vertex.filter(|last| last.most > 0.0);
+        if let Some(photons) = &mut options.photons {
+            photons.most = of(photons.most, CalledTechnique::Photons);
         }
         if let Some(call) = &mut options.connection {
             call.most = of(call.most, CalledTechnique::Connection);
@@ -566,8 +594,12 @@ pub(super) fn notes(given: &SneeOptions, setups: &[BandSetup]) -> Option<String>
     let subdivides = given.strategies.subdivides();
     add("call.most", &|setup| subdivides.then_some(setup.options.call.most));
     add("call_alone.most", &|setup| subdivides.then_some(setup.options.call_alone.most));
-    add("last_vertex.most", &|setup| setup.options.last_vertex.map(|last| last.most));
+    let has_last_vertex = given.last_vertex.is_some();
+    add("last_vertex.most", &|setup| {
+        has_last_vertex.then(|| setup.options.last_vertex.map_or(0.0, |last| last.most))
+    });
     add("connection.most", &|setup| setup.specular.as_ref().map(|technique| technique.call.most));
+    add("photons.most", &|setup| setup.options.photons.map(|photons| photons.most));
     add("views", &|setup| setup.chosen?.views.map(f64::from));
     let gains =
         learned.iter().map(|(_, ChosenCalls { gain, .. })| (100.0 * gain).round() / 100.0).collect();

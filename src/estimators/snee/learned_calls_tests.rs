@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::options::BandWalks;
 use super::super::state::Connections;
 use super::super::testing::{Lamp, ROUGH, SMOOTH, body, medium, ring, sphere};
-use super::super::{EdgeTechnique, LastVertex, Snee, SneeChoices, TwoBounce};
+use super::super::{EdgeTechnique, LastVertex, Photons, Snee, SneeChoices, TwoBounce};
 use super::*;
 use crate::error::Result;
 use crate::estimators::walk::trace_passes;
@@ -73,12 +73,24 @@ fn mean_and_error(estimates: &[f64]) -> [f64; 2] {
 fn predicted_second_moments_are_those_of_runs() {
     const BATCHES: u64 = 250;
     const PATHS: u64 = 4000;
-    let candidates = vec![[1.0; 3], [0.25, 0.5, 0.25], [0.125, 0.25, 0.5], [0.0, 0.5, 1.0]];
-    for (name, shape, boundary, connects) in
-        [("rough", sphere(), ROUGH, false), ("smooth", ring(), SMOOTH, true)]
-    {
+    let candidates = vec![
+        [1.0; 4],
+        [0.25, 0.5, 0.25, 1.0],
+        [0.125, 0.25, 0.5, 0.25],
+        [0.0, 0.5, 1.0, 0.0625],
+        [0.0, 0.0, 1.0, 1.0],
+        [1.0, 1.0, 1.0, 0.0],
+    ];
+    let photons = Some(Photons { paths: 1 << 14, most: 1.0 });
+    for (name, shape, boundary, connects, photons) in [
+        ("rough", sphere(), ROUGH, false, None),
+        ("smooth", ring(), SMOOTH, true, None),
+        ("rough, photons", ring(), ROUGH, false, photons),
+        ("smooth, photons", ring(), SMOOTH, true, photons),
+    ] {
         let scene = flux(&shape, boundary, &[medium(3.0, 0.9, 0.3)], &[Lamp::WideDisc]);
-        let snee = set_up(&scene, &SneeChoices::default(), connects).expect("a scene for it");
+        let choices = SneeChoices { photons, ..SneeChoices::default() };
+        let snee = set_up(&scene, &choices, connects).expect("a scene for it");
         let key = StreamKey::named(&format!("predicted_second_moments {name}"));
         let mut scores = Scores::new(Layout::new(&scene));
         // The warm-up's predictions, candidate by candidate, and what runs with these calls have.
@@ -96,7 +108,7 @@ fn predicted_second_moments_are_those_of_runs() {
             }
             sum / PATHS as f64
         };
-        let upper = snee.setups[0].calling(snee.options.with_calls(MORE, [1.0; 3]));
+        let upper = snee.setups[0].calling(snee.options.with_calls(MORE, [1.0; 4]));
         assert_eq!(upper.views > 1, connects);
         let mut choices: Vec<(usize, u32)> = (0..candidates.len()).map(|i| (i, upper.views)).collect();
         if connects {
@@ -131,6 +143,61 @@ fn predicted_second_moments_are_those_of_runs() {
             );
             assert!(error < 0.1 * run, "{name}, {factors:?}: {run} +- {error} cannot tell");
         }
+    }
+}
+
+/// What a walk itself scores where photons draw more rarely is what notes predict, path by path: photons change no number of the
+/// walk. Light that is scored by expectation is among it.
+#[test]
+fn scores_of_walks_beside_rarer_photons_are_predicted() {
+    let name = "scores_of_walks_beside_rarer_photons_are_predicted";
+    let no_last = LastVertex { most: 0.0, decay: 0.0, wide_share: 0.0, wide: 0.2 };
+    let alone = |last_vertex, strategies| SneeChoices {
+        photons: Some(Photons { paths: 1 << 14, most: 1.0 }),
+        last_vertex,
+        strategies,
+        ..SneeChoices::default()
+    };
+    let unidirectional = vec![EdgeTechnique::Bsdf, EdgeTechnique::Light];
+    for (kind, boundary, choices, factors) in [
+        ("rough", ROUGH, alone(Some(no_last), Some(unidirectional.clone())), [1.0, 1.0, 1.0, 0.25]),
+        ("smooth", SMOOTH, alone(Some(no_last), Some(unidirectional)), [1.0, 1.0, 1.0, 0.25]),
+        ("rough, others", ROUGH, alone(None, None), [0.5, 0.25, 1.0, 0.125]),
+        ("smooth, others", SMOOTH, alone(None, None), [0.5, 0.25, 1.0, 0.125]),
+    ] {
+        let scene = flux(&ring(), boundary, &[medium(1.0, 0.9, 0.3)], &[Lamp::WideDisc]);
+        let snee = set_up(&scene, &choices, false).expect("served");
+        let key = StreamKey::named(name);
+        let of_walk = |setup: &BandSetup, path: u64| -> Vec<NotedScore> {
+            let mut scores = Scores::new(Layout::new(&scene));
+            let notes = RefCell::new(CallNotes::new(&Prices::FLAT, vec![[1.0; 4]], setup.views));
+            let key = key.pass(path);
+            let path = Path { field: snee.walks.field(), band: 0, index: 0, key: &key };
+            snee.trace(setup, Some(&notes), path, &mut scores);
+            let all = std::mem::take(&mut notes.borrow_mut().scores);
+            all.into_iter().filter(|score| score.call.is_none()).collect()
+        };
+        // No more calls than the options ask for, so that those of the last vertex take the same numbers.
+        let upper = snee.setups[0].calling(snee.options.with_calls(1.0, [1.0; 4]));
+        let rarer = snee.setups[0].calling(snee.options.with_calls(1.0, factors));
+        let mut parts = [0; 2];
+        for path in 0..4000 {
+            let [given, found] = [&upper, &rarer].map(|setup| of_walk(setup, path));
+            assert_eq!(given.len(), found.len(), "{kind}, {path}");
+            for (given, found) in given.iter().zip(&found) {
+                let change: f64 = (0..4).map(|t| (factors[t] - 1.0) * given.parts[t]).sum();
+                let expected = given.value / (1.0 + change);
+                assert!(
+                    (found.value - expected).abs() <= 1e-9 * expected,
+                    "{kind}, {path}: {} for {expected}, {given:?}",
+                    found.value
+                );
+                parts[0] += u32::from(given.parts[3] > 0.1);
+                parts[1] += u32::from(given.parts[..2].iter().any(|part| *part > 0.1));
+            }
+        }
+        println!("{kind}: {parts:?} scores with parts of photons and of others");
+        assert!(parts[0] >= 15 && (parts[1] >= 15) == kind.ends_with("others"), "{kind}: {parts:?}");
     }
 }
 
@@ -238,18 +305,18 @@ fn the_chosen_number_of_views_is_taken() {
 /// mean for any factor of the second way. Without it the variance is twice as large, so that its cost decides.
 #[test]
 fn calls_follow_their_cost() {
-    let rarest = [0.03125, 1.0, 1.0];
-    let none = [0.0, 1.0, 1.0];
-    let candidates = vec![[1.0; 3], [0.5, 1.0, 1.0], rarest, none];
+    let rarest = [0.03125, 1.0, 1.0, 1.0];
+    let none = [0.0, 1.0, 1.0, 1.0];
+    let candidates = vec![[1.0; 4], [0.5, 1.0, 1.0, 1.0], rarest, none];
     let mut notes = CallNotes::new(&Prices::ANALYTIC, candidates, 1);
     for path in 0..400 {
         if path % 2 == 0 {
-            notes.weigh([0.5, 0.0, 0.0]);
+            notes.weigh([0.5, 0.0, 0.0, 0.0]);
             notes.score(1.0);
         }
         notes.begin(Some(CalledTechnique::Subdivision));
         if path % 4 < 2 {
-            notes.weigh([0.5, 0.0, 0.0]);
+            notes.weigh([0.5, 0.0, 0.0, 0.0]);
             notes.score(1.0);
         }
         notes.begin(None);
@@ -263,8 +330,8 @@ fn calls_follow_their_cost() {
         let found = notes.halves[0].second(candidate, 1) / 200.0;
         assert!((found - expected).abs() < 1e-12, "{factor}: {found} for {expected}");
     }
-    assert_eq!(notes.choice(200, 1e9).factors, None, "what costs nothing stays");
-    let dear = notes.choice(200, 1.0);
+    assert_eq!(notes.choice(200, 1e9, 0.0).factors, None, "what costs nothing stays");
+    let dear = notes.choice(200, 1.0, 0.0);
     assert_eq!(dear.factors, Some(none));
     assert!(dear.gain > 10.0, "{dear:?}");
 }
@@ -276,7 +343,7 @@ fn views_follow_their_cost() {
     const V: u32 = 4;
     let coin = |case: u32, ray: u32| f64::from(case >> ray & 1);
     let rest = |case: u32| 1.0 + 0.5 * coin(case, 0);
-    let mut notes = CallNotes::new(&Prices::ANALYTIC, vec![[1.0; 3]], V);
+    let mut notes = CallNotes::new(&Prices::ANALYTIC, vec![[1.0; 4]], V);
     let mut wholes = 0.0;
     for case in 0..2 * 16 {
         for ray in (0..V).rev() {
@@ -305,12 +372,12 @@ fn views_follow_their_cost() {
     let price = notes.prices.view;
     for (walk, best) in [(0.01 * price, 1), (1.5 * price, 2), (10.0 * price, 8), (1000.0 * price, 32)] {
         let cost = |views: u32| walk + f64::from(views - 1) * price;
-        let chosen = notes.choice(16, 32.0 * walk);
+        let chosen = notes.choice(16, 32.0 * walk, 0.0);
         assert_eq!(chosen.views, Some(best), "{walk}");
         let gain = variance(V) * cost(V) / (variance(best) * cost(best));
         assert!((chosen.gain - gain).abs() < 1e-12, "{walk}: {chosen:?} for {gain}");
     }
-    let stays = notes.choice(16, 32.0 * 3.0 * price);
+    let stays = notes.choice(16, 32.0 * 3.0 * price, 0.0);
     assert_eq!((stays.factors, stays.views), (None, None), "{stays:?}");
 }
 
@@ -318,13 +385,13 @@ fn views_follow_their_cost() {
 /// those that calls of other techniques ask for, as often as these are made.
 #[test]
 fn densities_of_subdivision_are_saved_without_it() {
-    let candidates = vec![[1.0; 3], [0.03125, 1.0, 1.0], [0.0, 1.0, 1.0]];
+    let candidates = vec![[1.0; 4], [0.03125, 1.0, 1.0, 1.0], [0.0, 1.0, 1.0, 1.0]];
     let mut notes = CallNotes::new(&Prices::ANALYTIC, candidates, 1);
     let asks = |notes: &mut CallNotes, times: usize| (0..times).for_each(|_| notes.ask());
     for path in 0..400 {
         // The score alternates, so that there is variance; no technique has a part in it.
         asks(&mut notes, 2);
-        notes.weigh([0.0; 3]);
+        notes.weigh([0.0; 4]);
         notes.score(f64::from(path % 2));
         notes.begin(Some(CalledTechnique::LastVertex));
         asks(&mut notes, 3);
@@ -332,21 +399,21 @@ fn densities_of_subdivision_are_saved_without_it() {
         notes.begin(None);
         notes.end_path((path / 2 % 2) as usize);
     }
-    assert_eq!((notes.asked_by_walks, notes.asked), (800.0, [0.0, 1200.0, 0.0]));
-    let chosen = notes.choice(200, 1.0);
-    let Prices { call: [subdivision, last_vertex, _], density, .. } = *notes.prices;
+    assert_eq!((notes.asked_by_walks, notes.asked), (800.0, [0.0, 1200.0, 0.0, 0.0]));
+    let chosen = notes.choice(200, 1.0, 0.0);
+    let Prices { call: [subdivision, last_vertex, ..], density, .. } = *notes.prices;
     let cost =
         |rate: f64, asked: f64| 1.0 + 400.0 * (rate * subdivision + last_vertex) + density * asked;
-    assert_eq!(chosen.factors, Some([0.0, 1.0, 1.0]));
+    assert_eq!(chosen.factors, Some([0.0, 1.0, 1.0, 1.0]));
     assert!((chosen.gain - cost(1.0, 2000.0) / cost(0.0, 0.0)).abs() < 1e-12, "{chosen:?}");
 }
 
 /// Paths that subdivision alone finds are not scored without it.
 #[test]
 fn what_only_subdivision_finds_needs_it() {
-    let mut notes = CallNotes::new(&Prices::ANALYTIC, vec![[1.0; 3], [0.0, 1.0, 1.0]], 1);
+    let mut notes = CallNotes::new(&Prices::ANALYTIC, vec![[1.0; 4], [0.0, 1.0, 1.0, 1.0]], 1);
     notes.begin(Some(CalledTechnique::Subdivision));
-    notes.weigh([1.0, 0.0, 0.0]);
+    notes.weigh([1.0, 0.0, 0.0, 0.0]);
     notes.score(3.0);
     notes.begin(None);
     notes.end_path(0);
@@ -386,6 +453,63 @@ fn subdivision_is_left_out_where_all_paths_are_drawn_without_it() {
     assert_eq!([ROUGH, sharp, SMOOTH].map(|boundary| may(mesh, boundary)), [true, false, false]);
 }
 
+/// What a guess costs at every vertex is saved where neither the last vertex nor subdivision is called, and only there.
+#[test]
+fn guesses_are_saved_without_calls_that_need_them() {
+    let candidates = [[1.0; 4], [0.0, 1.0, 1.0, 1.0], [1.0, 0.0, 1.0, 1.0], [0.0, 0.0, 1.0, 1.0]];
+    for (last, saves) in [(2, false), (3, false), (4, true)] {
+        let mut notes = CallNotes::new(&Prices::FLAT, candidates[..last].to_vec(), 1);
+        for path in 0..400 {
+            notes.guess();
+            notes.score(f64::from(path % 2));
+            notes.end_path((path / 2 % 2) as usize);
+        }
+        let chosen = notes.choice(200, 1.0, 1200.0);
+        assert_eq!(chosen.factors, saves.then_some([0.0, 0.0, 1.0, 1.0]));
+        let Prices { guess, asking, looking_up, .. } = *notes.prices;
+        let walks = 1.0 + 1200.0 * looking_up;
+        let gain = if saves { 1.0 + (400.0 * guess + 1200.0 * asking) / walks } else { 1.0 };
+        assert!((chosen.gain - gain).abs() < 1e-12 * gain, "{chosen:?} for {gain}");
+    }
+}
+
+/// Beside photons the last vertex and subdivision may be left out together, where BSDF and light sampling draw all paths. Photons
+/// may be left out where guesses are good, and then one of the two stays.
+#[test]
+fn what_photons_draw_needs_them() {
+    let facets = Microfacets { kind: MicrofacetKind::Ggx, alpha: 0.04 };
+    let sharp = Boundary::Rough { eta: 1.4, facets };
+    let with = SneeChoices { photons: Some(Photons { paths: 64, most: 1.0 }), ..SneeChoices::default() };
+    let partial = SneeChoices {
+        strategies: Some(vec![EdgeTechnique::Light, EdgeTechnique::TopToBottom]),
+        least_concentration: Some(1.0),
+        ..with.clone()
+    };
+    let none = [[0.0, 1.0, 1.0, 1.0], [0.0, 0.0, 1.0, 1.0], [1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+    for (name, shape, boundary, choices, least, may) in [
+        ("rough mesh", bumps(false), ROUGH, &with, 0.0, [true, true, true, false]),
+        ("sharp mesh", bumps(false), sharp, &with, 0.25, [true, true, true, false]),
+        ("smooth mesh", bumps(true), SMOOTH, &with, 0.25, [true, true, true, false]),
+        ("smooth ball", sphere(), SMOOTH, &with, 0.0, [true, true, true, false]),
+        ("without BSDF sampling", bumps(false), ROUGH, &partial, 0.0, [false, false, true, false]),
+    ] {
+        let scene = flux(&shape, boundary, &[medium(10.0, 0.98, 0.0)], &[Lamp::WideDisc]);
+        let snee = set_up(&scene, choices, false).expect("served");
+        let used = used_probabilities(&snee, &snee.setups[0], 0)(&snee.options).map(|most| most > 0.0);
+        assert_eq!(used, [true, true, false, true], "{name}");
+        let found = none.map(|factors| snee.may_be_left_out(0, used, &factors));
+        assert_eq!(found, may, "{name}");
+        let ladders = snee.ladders(0, used);
+        let rarest = ladders[CalledTechnique::Photons as usize].last();
+        assert_eq!(rarest, Some(&least), "{name}");
+        let lasts = [CalledTechnique::Subdivision, CalledTechnique::LastVertex];
+        assert!(
+            lasts.iter().all(|technique| ladders[*technique as usize].last() == Some(&0.0)),
+            "{name}"
+        );
+    }
+}
+
 #[test]
 fn two_bounces_learn_nothing() {
     let scene = flux(&sphere(), SMOOTH, &[medium(2.0, 0.9, 0.0)], &[Lamp::Disc]);
@@ -413,18 +537,24 @@ fn what_calls_cost() {
     for (name, shape) in bodies {
         for (kind, boundary, connects) in [("rough", ROUGH, false), ("smooth", SMOOTH, true)] {
             let scene = flux(&shape, boundary, &[medium(10.0, 0.98, 0.0)], &[Lamp::Disc]);
-            let snee = set_up(&scene, &SneeChoices::default(), connects).expect("served");
+            let photons = Some(Photons { paths: 1 << 18, most: 1.0 });
+            let choices = SneeChoices { photons, ..SneeChoices::default() };
+            let snee = set_up(&scene, &choices, connects).expect("served");
             const RARE: f64 = 1e-6;
             for factors in [
-                [0.0, RARE, RARE],
-                [RARE; 3],
-                [1.0, RARE, RARE],
-                [0.0, 1.0, RARE],
-                [RARE, 1.0, RARE],
-                [RARE, RARE, 1.0],
+                [0.0, 0.0, RARE, RARE],
+                [0.0, RARE, RARE, 0.0],
+                [RARE, RARE, RARE, 0.0],
+                [1.0, RARE, RARE, 0.0],
+                [0.0, 1.0, RARE, 0.0],
+                [RARE, 1.0, RARE, 0.0],
+                [RARE, RARE, 1.0, 0.0],
+                [0.0, 0.0, RARE, 0.25],
+                [0.0, 0.0, RARE, 1.0],
+                [0.0, RARE, RARE, 1.0],
             ] {
                 let setup = snee.setups[0].calling(snee.options.with_calls(MORE, factors));
-                let notes = CallNotes::new(Prices::of(&shape), vec![[1.0; 3]], setup.views);
+                let notes = CallNotes::new(Prices::of(&shape), vec![[1.0; 4]], setup.views);
                 let notes = RefCell::new(notes);
                 let mut scores = Scores::new(Layout::new(&scene));
                 let key = StreamKey::named("what_calls_cost");
@@ -437,17 +567,34 @@ fn what_calls_cost() {
                 let mut all = vec![scores.clone(); keys.len()];
                 let mut run = || {
                     let start = std::time::Instant::now();
-                    let connections = |path: &Path| Connections::of_path(&setup, path);
-                    trace_passes(snee.walks.field(), 0, &keys, &mut all, connections);
+                    if setup.photons.is_some() {
+                        for key in &keys {
+                            let path = Path { field: snee.walks.field(), band: 0, index: 0, key };
+                            snee.trace(&setup, None, path, &mut all[0]);
+                        }
+                    } else {
+                        let connections = |path: &Path| Connections::of_path(&setup, path);
+                        trace_passes(snee.walks.field(), 0, &keys, &mut all, connections);
+                    }
                     start.elapsed().as_secs_f64() * 1e9 / PATHS as f64
                 };
                 let least = (0..5).map(|_| run()).fold(f64::INFINITY, f64::min);
                 let notes = notes.into_inner();
                 let views = f64::from(setup.views - 1) * notes.prices.view;
-                let walks = notes.prices.walks(&scores) / PATHS as f64 + views;
+                let of_photons = notes.prices.boundary_event * notes.events_of_photons;
+                let walks = (notes.prices.walks(&scores) - of_photons) / PATHS as f64 + views;
                 let calls = notes.spent.iter().sum::<f64>() / PATHS as f64;
                 let asked = notes.asked_by_walks + notes.asked.iter().sum::<f64>();
-                let densities = asked * notes.prices.density / PATHS as f64;
+                let vertices = scores.cost[Cost::MediumEvents as usize] as f64;
+                let [subdivision, last_vertex, _, photons] = factors;
+                let mut densities = if subdivision > 0.0 { asked * notes.prices.density } else { 0.0 };
+                if subdivision + last_vertex > 0.0 {
+                    densities += notes.guesses * notes.prices.guess + vertices * notes.prices.asking;
+                }
+                if photons > 0.0 {
+                    densities += vertices * notes.prices.looking_up;
+                }
+                let densities = densities / PATHS as f64;
                 println!(
                     "{name}, {kind}, {factors:?}: {least:.0} ns a path, {walks:.0} + {calls:.0} + {densities:.0} by prices"
                 );

@@ -22,6 +22,7 @@ mod guess;
 mod guide;
 mod last_vertex;
 mod learned_calls;
+mod left_out;
 mod options;
 mod photons;
 mod probe;
@@ -51,7 +52,7 @@ use crate::scene::{Light, Scene};
 
 use guide::Guide;
 use learned_calls::{CallNotes, ChosenCalls};
-use photons::PhotonMap;
+use photons::{PhotonGuide, PhotonMap};
 use specular::Specular;
 use state::Connections;
 
@@ -77,7 +78,7 @@ struct BandSetup {
     /// Number of sensor rays per walk at which lights are scored by expectation; 1 where none is.
     views: u32,
     /// Directions against light.
-    photons: Option<Arc<PhotonMap>>,
+    photons: Option<PhotonGuide>,
     /// What has been learned of its calls.
     chosen: Option<ChosenCalls>,
 }
@@ -89,7 +90,10 @@ impl BandSetup {
             options.connection.map(|call| Specular { call, solver: solver.clone() })
         });
         let views = if self.views > 1 { options.views } else { 1 };
-        BandSetup { options: Arc::new(options), specular, views, ..self.clone() }
+        let most = options.photons.map_or(0.0, |photons| photons.most);
+        let photons = self.photons.clone().filter(|_| most > 0.0);
+        let photons = photons.map(|photons| PhotonGuide { most, ..photons });
+        BandSetup { options: Arc::new(options), specular, views, photons, ..self.clone() }
     }
 
     /// Whether every light that shines in the band is connected to as a whole.
@@ -290,7 +294,7 @@ impl Estimator for Snee {
         let technique = self.setups.iter().find_map(|setup| setup.specular.as_ref());
         // Bands share maps.
         let mut photons: Vec<_> =
-            self.setups.iter().filter_map(|setup| setup.photons.as_ref()).collect();
+            self.setups.iter().filter_map(|setup| Some(&setup.photons.as_ref()?.map)).collect();
         photons.dedup_by(|a, b| Arc::ptr_eq(a, b));
         self.walks.heap_bytes()
             + technique.map_or(0, |technique| technique.solver.heap_bytes())

@@ -138,8 +138,8 @@ pub struct SneeChoices {
     /// Whether each band has separate walks or all bands share them.
     #[serde(default)]
     pub bands: BandWalks,
-    /// A warm-up that chooses how often `call`, `call_alone`, `last_vertex` and `connection` are called (`most`), and `views`
-    /// where there are several, from the variance and the cost that it predicts.
+    /// A warm-up that chooses how often `call`, `call_alone`, `last_vertex`, `connection` and `photons` are called (`most`), and
+    /// `views` where there are several, from the variance and the cost that it predicts.
     ///
     /// Without it, the given numbers are used.
     pub learned_calls: Option<LearnedCalls>,

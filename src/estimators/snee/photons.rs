@@ -25,6 +25,9 @@
 //! as the bandwidth of a density estimate. q is proportional to the number of photons that have crossed the voxel, up to a largest
 //! and, for chains, down to a least value: most vertices receive little light, and following an extra direction takes as long as
 //! several steps of the walk.
+//!
+//! Nearly every vertex asks for q, and nearly none draws: the q of both kinds stand side by side, apart from the lists of
+//! directions. A density goes through all directions of up to four lists, eight at a time.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -36,7 +39,8 @@ use super::guide::Guide;
 use crate::estimators::crossing::other;
 use crate::estimators::walk::Meeting;
 use crate::geometry::{BoundingSphere, Ray, Side};
-use crate::math::{DVec3, Frame, cos};
+use crate::math::lanes::{LANES, VectorLanes, set_vector, vector};
+use crate::math::{DVec3, Frame, Vectorized, cos, vectorized};
 use crate::optics::boundary::{Boundary, Event};
 use crate::sampling::discrete::{choose, choose_share};
 use crate::sampling::distance::sample_exponential;
@@ -57,6 +61,35 @@ pub struct Photons {
     /// Where there are fewer, it is smaller.
     #[serde(default = "most")]
     #[schemars(range(min = 0.0, max = 1.0))]
+    pub most: f64,
+}
+
+/// The kinds of photons' flights, and of directions that are drawn against them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PhotonKind {
+    /// After one refraction: such a direction finds lights from its first meeting with the boundary.
+    Once,
+    /// Of chains: such a direction is followed beyond it.
+    OfChains,
+}
+
+impl PhotonKind {
+    pub(super) const ALL: [PhotonKind; 2] = [PhotonKind::Once, PhotonKind::OfChains];
+
+    /// The last meeting with the boundary from which such a direction finds lights.
+    pub(super) fn until(self) -> Meeting {
+        match self {
+            PhotonKind::Once => Meeting::First,
+            PhotonKind::OfChains => Meeting::Later,
+        }
+    }
+}
+
+/// Photons as a band uses them.
+#[derive(Clone, Debug)]
+pub(super) struct PhotonGuide {
+    pub map: Arc<PhotonMap>,
+    /// The probability of drawing a direction of a kind where many photons have passed.
     pub most: f64,
 }
 
@@ -89,10 +122,11 @@ struct Keep {
     least: f64,
 }
 
-/// Light after one refraction is found by other techniques, too; nothing else finds that of chains.
-const AFTER_ONE_REFRACTION: Keep = Keep { directions: 64, certain: 1.0 / 2048.0, least: 0.0 };
-
-const OF_CHAINS: Keep = Keep { directions: 256, certain: 1.0 / 8192.0, least: 0.1 };
+/// Of each kind. Light after one refraction is found by other techniques, too; nothing else finds that of chains.
+const KEEP: [Keep; 2] = [
+    Keep { directions: 64, certain: 1.0 / 8192.0, least: 0.0 },
+    Keep { directions: 256, certain: 1.0 / 8192.0, least: 0.1 },
+];
 
 /// Flights of chains are drawn with this much less extinction. Long chords carry little light, but a walk that meets the light along
 /// one that no photon has taken scores the whole radiance.
@@ -110,19 +144,10 @@ const NARROW: f64 = 0.75;
 /// Directions against the flights of photons.
 #[derive(Debug)]
 pub(super) struct PhotonMap {
-    /// The probability of drawing a direction of a kind where many photons have passed.
-    most: f64,
-    after_one_refraction: PhotonGrids,
-    of_chains: PhotonGrids,
-    /// The caps about the directions of a voxel with 0, 1, 2 .. of them, and of all with more than are listed.
-    caps: Vec<Caps>,
-}
-
-/// Directions of one kind of flight.
-#[derive(Debug)]
-pub(super) struct PhotonGrids {
     /// As in [`GRIDS`].
     grids: Vec<DirectionGrid>,
+    /// The caps about the directions of a voxel with 0, 1, 2 .. of them, and of all with more than are listed.
+    caps: Vec<Caps>,
 }
 
 /// Directions voxel by voxel.
@@ -133,20 +158,20 @@ struct DirectionGrid {
     scale: f64,
     /// Voxels along a side.
     count: usize,
-    /// As [`Self::voxel`] counts them.
-    voxels: Vec<Voxel>,
-    /// Voxel by voxel.
-    directions: Vec<DVec3>,
+    /// The probability with which a direction of each kind is drawn, over [`PhotonGuide::most`], as [`Self::voxel`] counts voxels.
+    chances: Vec<[f32; 2]>,
+    /// Directions of each kind, in the same order.
+    lists: Vec<[DirectionList; 2]>,
+    /// List by list, each filled up with NaN.
+    directions: Vec<VectorLanes>,
 }
 
-/// What is known of a voxel, side by side: most draws end here.
-#[derive(Clone, Copy, Debug)]
-struct Voxel {
-    /// With which probability one of its directions is drawn, over [`PhotonMap::most`].
-    chance: f32,
-    /// Where its directions begin.
+/// Directions of a kind in a voxel.
+#[derive(Clone, Copy, Debug, Default)]
+struct DirectionList {
+    /// Where they begin.
     start: u32,
-    /// How many it has.
+    /// How many there are.
     count: u32,
 }
 
@@ -158,11 +183,11 @@ impl PhotonMap {
         bounds: &BoundingSphere,
         guides: &[Arc<[Guide]>],
         options: Photons,
-    ) -> Vec<Option<Arc<PhotonMap>>> {
+    ) -> Vec<Option<PhotonGuide>> {
         let is_alike = |a: usize, b: usize| {
             scene.boundary[a] == scene.boundary[b] && guides[a].is_empty() == guides[b].is_empty()
         };
-        let mut maps: Vec<Option<Arc<PhotonMap>>> = Vec::new();
+        let mut maps: Vec<Option<PhotonGuide>> = Vec::new();
         for band in 0..guides.len() {
             let map = match (0..band).find(|&earlier| is_alike(earlier, band)) {
                 Some(earlier) => maps[earlier].clone(),
@@ -170,7 +195,7 @@ impl PhotonMap {
                     .filter(|&other| is_alike(band, other))
                     .min_by(|&a, &b| scene.medium[a].sigma_t.total_cmp(&scene.medium[b].sigma_t))
                     .and_then(|least| PhotonMap::new(scene, bounds, least, &guides[least], options))
-                    .map(Arc::new),
+                    .map(|map| PhotonGuide { map: Arc::new(map), most: options.most }),
             };
             maps.push(map);
         }
@@ -205,80 +230,105 @@ impl PhotonMap {
             let mut stream = key.pass(photon).stream(band as u64, Purpose::Walk);
             trace(scene, bounds, band, &guides, &mut stream, &mut flights);
         }
-        let PhotonFlights { after_one_refraction, of_chains } = flights;
-        let is_any = !(after_one_refraction.is_empty() && of_chains.is_empty());
-        let of = |flights: &[Flight], keep: Keep| PhotonGrids::new(bounds, options.paths, flights, keep);
+        let is_any = flights.iter().any(|flights| !flights.is_empty());
+        let grid =
+            |(count, _): &(usize, f64)| DirectionGrid::new(bounds, *count, options.paths, &flights);
         is_any.then(|| PhotonMap {
-            most: options.most,
-            after_one_refraction: of(&after_one_refraction, AFTER_ONE_REFRACTION),
-            of_chains: of(&of_chains, OF_CHAINS),
+            grids: GRIDS.iter().map(grid).collect(),
             caps: (0..=ENOUGH).map(caps).collect(),
         })
     }
 
-    /// Directions in which a path finds lights from this meeting with the boundary.
-    pub(super) fn of(&self, meeting: Meeting) -> &PhotonGrids {
-        match meeting {
-            Meeting::First => &self.after_one_refraction,
-            Meeting::Later => &self.of_chains,
-        }
+    /// The caps about the directions of a list.
+    fn caps(&self, list: DirectionList) -> Caps {
+        self.caps[(list.count as usize).min(ENOUGH)]
     }
 
-    /// The caps about the directions of a voxel.
-    fn caps(&self, voxel: &Voxel) -> Caps {
-        self.caps[(voxel.count as usize).min(ENOUGH)]
+    /// Memory behind it, bytes.
+    pub(super) fn heap_bytes(&self) -> usize {
+        let of = |grid: &DirectionGrid| {
+            size_of_val(&*grid.chances) + size_of_val(&*grid.lists) + size_of_val(&*grid.directions)
+        };
+        self.grids.iter().map(of).sum()
+    }
+}
+
+impl PhotonGuide {
+    /// A direction at x of each kind, if one is drawn.
+    #[inline]
+    pub(super) fn sample(&self, x: DVec3, stream: &mut Stream) -> [Option<DVec3>; 2] {
+        let Some((grid, _)) = choose_share(GRIDS.iter().map(|(_, share)| *share), stream.draw()) else {
+            return [None; 2];
+        };
+        let grid = &self.map.grids[grid];
+        let Some(voxel) = grid.voxel(x) else { return [None; 2] };
+        let chances = grid.chances[voxel];
+        PhotonKind::ALL.map(|kind| {
+            let chance = self.most * f64::from(chances[kind as usize]);
+            let is_drawn = chance > 0.0 && stream.draw() < chance;
+            is_drawn.then(|| self.sample_about(grid, grid.lists[voxel][kind as usize], stream))
+        })
     }
 
-    /// A direction at x for this meeting, if one is drawn.
-    pub(super) fn sample(&self, meeting: Meeting, x: DVec3, stream: &mut Stream) -> Option<DVec3> {
-        let (grid, _) = choose_share(GRIDS.iter().map(|(_, share)| *share), stream.draw())?;
-        let grid = &self.of(meeting).grids[grid];
-        let voxel = grid.at(x)?;
-        if stream.draw() >= self.most * f64::from(voxel.chance) {
-            return None;
-        }
-        let directions = grid.directions(voxel);
+    /// A direction about one of a list that is not empty.
+    fn sample_about(&self, grid: &DirectionGrid, list: DirectionList, stream: &mut Stream) -> DVec3 {
         let (is_narrow, u) = choose(stream.draw(), NARROW);
-        let index = ((u * directions.len() as f64) as usize).min(directions.len().checked_sub(1)?);
-        let [narrow, wide] = self.caps(voxel);
+        let index = ((u * f64::from(list.count)) as usize).min(list.count as usize - 1);
+        let [narrow, wide] = self.map.caps(list);
         let local = square_to_cap(if is_narrow { narrow } else { wide }, stream.draw2());
-        Some(Frame::about(directions[index]).to_world(local))
+        let directions = &grid.directions[list.start as usize + index / LANES];
+        Frame::about(vector(directions, index % LANES)).to_world(local)
     }
 
     /// The density per solid angle of all samples that find lights from this meeting, with the probability of drawing one at all.
     /// What is drawn for the first meeting ends there; what is drawn for later ones has met the boundary a first time, too.
     pub(super) fn density(&self, meeting: Meeting, x: DVec3, dir: DVec3) -> f64 {
-        let of_grid = |(grid, (_, share)): (&DirectionGrid, &(usize, f64))| {
-            let Some(voxel) = grid.at(x).filter(|voxel| voxel.count > 0) else { return 0.0 };
-            let (directions, [narrow, wide]) = (grid.directions(voxel), self.caps(voxel));
-            let mut near = [0_u32; 2];
-            for direction in directions {
-                let cos = direction.dot(dir);
-                near[0] += u32::from(cos >= 1.0 - narrow);
-                near[1] += u32::from(cos >= 1.0 - wide);
+        let mut density = 0.0;
+        for (grid, (_, share)) in self.map.grids.iter().zip(&GRIDS) {
+            let Some(voxel) = grid.voxel(x) else { continue };
+            for kind in PhotonKind::ALL {
+                let chance = grid.chances[voxel][kind as usize];
+                if chance == 0.0 || (kind, meeting) == (PhotonKind::Once, Meeting::Later) {
+                    continue;
+                }
+                let list = grid.lists[voxel][kind as usize];
+                let caps @ [narrow, wide] = self.map.caps(list);
+                let directions = grid.directions(list);
+                let [near_narrow, near_wide] = vectorized(CountNear { directions, dir, caps });
+                let sum =
+                    NARROW * pdf_cap(narrow) * near_narrow + (1.0 - NARROW) * pdf_cap(wide) * near_wide;
+                density += share * f64::from(chance) * sum / f64::from(list.count);
             }
-            let [near_narrow, near_wide] = near.map(f64::from);
-            let sum =
-                NARROW * pdf_cap(narrow) * near_narrow + (1.0 - NARROW) * pdf_cap(wide) * near_wide;
-            share * f64::from(voxel.chance) * sum / f64::from(voxel.count)
-        };
-        let of = |grids: &PhotonGrids| grids.grids.iter().zip(&GRIDS).map(of_grid).sum::<f64>();
-        let of_chains = of(&self.of_chains);
-        self.most
-            * match meeting {
-                Meeting::First => of_chains + of(&self.after_one_refraction),
-                Meeting::Later => of_chains,
-            }
+        }
+        self.most * density
     }
+}
 
-    /// Memory behind it, bytes.
-    pub(super) fn heap_bytes(&self) -> usize {
-        let of = |grid: &DirectionGrid| size_of_val(&*grid.voxels) + size_of_val(&*grid.directions);
-        [&self.after_one_refraction, &self.of_chains]
-            .into_iter()
-            .flat_map(|kind| &kind.grids)
-            .map(of)
-            .sum()
+/// How many directions have `dir` in each of the caps about them.
+struct CountNear<'a> {
+    directions: &'a [VectorLanes],
+    dir: DVec3,
+    caps: Caps,
+}
+
+impl Vectorized for CountNear<'_> {
+    type Output = [f64; 2];
+
+    /// Counted in f64: with whole numbers the loop takes twice as long.
+    #[inline(always)]
+    fn call(self) -> [f64; 2] {
+        let DVec3 { x, y, z } = self.dir;
+        let [narrow, wide] = self.caps;
+        let [mut near_narrow, mut near_wide] = [[0.0; LANES]; 2];
+        for [xs, ys, zs] in self.directions {
+            for lane in 0..LANES {
+                // No comparison with the NaN of an empty place holds.
+                let cos = xs[lane] * x + ys[lane] * y + zs[lane] * z;
+                near_narrow[lane] += if cos >= 1.0 - narrow { 1.0 } else { 0.0 };
+                near_wide[lane] += if cos >= 1.0 - wide { 1.0 } else { 0.0 };
+            }
+        }
+        [near_narrow, near_wide].map(|counts| counts.iter().sum())
     }
 }
 
@@ -288,11 +338,8 @@ struct Flight {
     length: f64,
 }
 
-#[derive(Default)]
-struct PhotonFlights {
-    after_one_refraction: Vec<Flight>,
-    of_chains: Vec<Flight>,
-}
+/// Flights of each kind.
+type PhotonFlights = [Vec<Flight>; 2];
 
 /// Follows one photon to its first scattering event.
 fn trace(
@@ -317,11 +364,11 @@ fn trace(
         let hit = scene.shape.intersect(&ray, side, from, STRETCH * free);
         if side == Side::Inside {
             let reach = hit.map_or(f64::INFINITY, |hit| hit.t);
-            let (flights, free) = match events {
-                1 => (&mut flights.after_one_refraction, free),
-                _ => (&mut flights.of_chains, STRETCH * free),
+            let (kind, free) = match events {
+                1 => (PhotonKind::Once, free),
+                _ => (PhotonKind::OfChains, STRETCH * free),
             };
-            flights.push(Flight { ray, length: free.min(reach) });
+            flights[kind as usize].push(Flight { ray, length: free.min(reach) });
         }
         let hit = hit?;
         let frame = Frame::about(hit.shading_normal);
@@ -340,56 +387,57 @@ fn trace(
     None
 }
 
-impl PhotonGrids {
-    fn new(bounds: &BoundingSphere, photons: u64, flights: &[Flight], keep: Keep) -> PhotonGrids {
-        let grid =
-            |(count, _): &(usize, f64)| DirectionGrid::new(bounds, *count, photons, flights, keep);
-        PhotonGrids { grids: GRIDS.iter().map(grid).collect() }
-    }
-}
-
 impl DirectionGrid {
     fn new(
         bounds: &BoundingSphere,
         count: usize,
         photons: u64,
-        flights: &[Flight],
-        keep: Keep,
+        flights: &PhotonFlights,
     ) -> DirectionGrid {
         let low = bounds.center - DVec3::splat(bounds.radius);
         let scale = count as f64 / (2.0 * bounds.radius);
-        let none = Voxel { chance: 0.0, start: 0, count: 0 };
-        let voxels = vec![none; count * count * count];
-        let mut grid = DirectionGrid { low, scale, count, voxels, directions: Vec::new() };
+        let voxels = count * count * count;
+        let (chances, lists) = (vec![[0.0; 2]; voxels], vec![[DirectionList::default(); 2]; voxels]);
+        let mut grid = DirectionGrid { low, scale, count, chances, lists, directions: Vec::new() };
+        for kind in PhotonKind::ALL {
+            grid.fill(kind, photons, &flights[kind as usize]);
+        }
+        grid
+    }
+
+    fn fill(&mut self, kind: PhotonKind, photons: u64, flights: &[Flight]) {
+        let (keep, kind) = (KEEP[kind as usize], kind as usize);
         // Voxel and flight, of which there are fewer than a u32 counts: at most 2^24 photons with 16 flights each.
         let mut crossed: Vec<[u32; 2]> = Vec::new();
         for (index, flight) in flights.iter().enumerate() {
-            grid.cross(flight, |voxel| crossed.push([voxel as u32, index as u32]));
+            self.cross(flight, |voxel| crossed.push([voxel as u32, index as u32]));
         }
         for [voxel, _] in &crossed {
-            grid.voxels[*voxel as usize].count += 1;
+            self.lists[*voxel as usize][kind].count += 1;
         }
-        let sides = FINE as f64 / count as f64;
+        let sides = FINE as f64 / self.count as f64;
         let certain = photons as f64 * keep.certain * sides * sides;
-        let mut end = 0;
-        for voxel in &mut grid.voxels {
-            if voxel.count > 0 {
-                voxel.chance = (f64::from(voxel.count) / certain).clamp(keep.least, 1.0) as f32;
+        let mut end = self.directions.len();
+        for (chances, lists) in self.chances.iter_mut().zip(&mut self.lists) {
+            let list = &mut lists[kind];
+            if list.count > 0 {
+                chances[kind] = (f64::from(list.count) / certain).clamp(keep.least, 1.0) as f32;
             }
-            voxel.start = end;
-            end += voxel.count.min(keep.directions);
-            voxel.count = 0;
+            list.start = end as u32;
+            end += list.count.min(keep.directions).div_ceil(LANES as u32) as usize;
+            list.count = 0;
         }
-        grid.directions = vec![DVec3::ZERO; end as usize];
+        self.directions.resize(end, [[f64::NAN; LANES]; 3]);
         // Photons come in no order: the first ones of a voxel are as good as any.
         for [voxel, flight] in crossed {
-            let Voxel { start, count, .. } = &mut grid.voxels[voxel as usize];
-            if *count < keep.directions {
-                grid.directions[(*start + *count) as usize] = -flights[flight as usize].ray.dir;
-                *count += 1;
+            let list = &mut self.lists[voxel as usize][kind];
+            if list.count < keep.directions {
+                let index = list.count as usize;
+                let block = &mut self.directions[list.start as usize + index / LANES];
+                set_vector(block, index % LANES, -flights[flight as usize].ray.dir);
+                list.count += 1;
             }
         }
-        grid
     }
 
     fn voxel(&self, point: DVec3) -> Option<usize> {
@@ -413,13 +461,8 @@ impl DirectionGrid {
         }
     }
 
-    /// The voxel of a point.
-    fn at(&self, x: DVec3) -> Option<&Voxel> {
-        self.voxel(x).map(|voxel| &self.voxels[voxel])
-    }
-
-    fn directions(&self, voxel: &Voxel) -> &[DVec3] {
-        &self.directions[voxel.start as usize..][..voxel.count as usize]
+    fn directions(&self, list: DirectionList) -> &[VectorLanes] {
+        &self.directions[list.start as usize..][..list.count.div_ceil(LANES as u32) as usize]
     }
 }
 

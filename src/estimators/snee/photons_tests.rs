@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::super::state::{Connections, ExtraTurns};
 use super::super::testing::{Lamp, ROUGH, SMOOTH, body, medium, point_inside, ring, sphere};
-use super::super::{Snee, SneeChoices, TwoBounce};
+use super::super::{BandSetup, Snee, SneeChoices, TwoBounce};
 use super::*;
 use crate::estimators::bands::OneBand;
 use crate::estimators::field::Path;
@@ -54,14 +54,18 @@ fn directions_have_their_density() {
     {
         let scene = flux(&shape, boundary, &[Lamp::WideDisc, Lamp::Disc]);
         let snee = set_up(&scene, &photons(4096, 0.8), false);
-        let map = snee.setups[0].photons.as_ref().expect("photons");
+        let photons = snee.setups[0].photons.as_ref().expect("photons");
         let mut stream =
             StreamKey::named("directions_have_their_density").pass(0).stream(0, Purpose::Walk);
         let mut done = 0;
         while done < 24 {
             let meeting = if done % 2 == 0 { Meeting::First } else { Meeting::Later };
             let Some(x) = point_inside(&scene, &mut stream) else { continue };
-            if map.of(meeting).grids.iter().all(|grid| grid.at(x).is_none_or(|voxel| voxel.count == 0)) {
+            let kind = if meeting == Meeting::First { PhotonKind::Once } else { PhotonKind::OfChains };
+            let has_none = |grid: &DirectionGrid| {
+                grid.voxel(x).is_none_or(|voxel| grid.lists[voxel][kind as usize].count == 0)
+            };
+            if photons.map.grids.iter().all(has_none) {
                 continue;
             }
             done += 1;
@@ -76,13 +80,13 @@ fn directions_have_their_density() {
                 }
             };
             for _ in 0..DRAWS {
-                let [once, on] = [Meeting::First, Meeting::Later]
-                    .map(|drawn| map.sample(drawn, x, &mut stream).map_or([0.0; 3], powers));
+                let [once, on] =
+                    photons.sample(x, &mut stream).map(|drawn| drawn.map_or([0.0; 3], powers));
                 // What goes on has met the boundary a first time, too.
                 let finding = if meeting == Meeting::First { 1.0 } else { 0.0 };
                 add(&mut drawn, [0, 1, 2].map(|i| finding * once[i] + on[i]));
                 let w = square_to_cap(2.0, stream.draw2());
-                let density = map.density(meeting, x, w) / pdf_cap(2.0);
+                let density = photons.density(meeting, x, w) / pdf_cap(2.0);
                 add(&mut expected, powers(w).map(|power| density * power));
             }
             for i in 0..3 {
@@ -165,7 +169,7 @@ fn light_beyond_the_first_meeting_is_left_to_chains() {
     let name = "light_beyond_the_first_meeting_is_left_to_chains";
     let scene = flux(&ring(), ROUGH, &[Lamp::WideDisc]);
     let snee = set_up(&scene, &photons(1 << 14, 0.7), false);
-    let map = snee.setups[0].photons.as_ref().expect("photons");
+    let photons = snee.setups[0].photons.as_ref().expect("photons");
     let key = StreamKey::named(name).pass(0);
     let mut stream = key.stream(0, Purpose::Sensor);
     let on = Path { field: snee.walks.field(), band: 0, index: 0, key: &key };
@@ -173,9 +177,8 @@ fn light_beyond_the_first_meeting_is_left_to_chains() {
     while inside.min(outside) < 20 {
         let [start, x] = [(); 2].map(|()| point_inside(&scene, &mut stream));
         let (Some(start), Some(x)) = (start, x) else { continue };
-        let meeting = if inside % 2 == 0 { Meeting::First } else { Meeting::Later };
-        let Some(dir) = map.sample(meeting, x, &mut stream) else { continue };
-        if map.density(Meeting::First, x, dir) <= map.density(Meeting::Later, x, dir) {
+        let Some(dir) = photons.sample(x, &mut stream)[inside % 2] else { continue };
+        if photons.density(Meeting::First, x, dir) <= photons.density(Meeting::Later, x, dir) {
             continue;
         }
         let Some(hit) = scene.shape.leave(&Ray { origin: x, dir }) else { continue };
@@ -191,7 +194,7 @@ fn light_beyond_the_first_meeting_is_left_to_chains() {
         let Medium { phase, sigma_t, .. } = scene.medium[0];
         let drawn = phase.pdf(turns) * transmittance(sigma_t, hit.t);
         let is_weighed = |walk: &CameraWalk<'_, Connections<'_>, OneBand>, meeting: Meeting| {
-            let (a, b) = (Connections::extra_turns(walk) * drawn, map.density(meeting, x, dir));
+            let (a, b) = (Connections::extra_turns(walk) * drawn, photons.density(meeting, x, dir));
             assert!((a - b).abs() <= 1e-9 * b, "{meeting:?} {x} {dir}: {a} and {b}");
         };
         is_weighed(&walk, Meeting::First);
@@ -213,7 +216,8 @@ fn light_beyond_the_first_meeting_is_left_to_chains() {
 fn bands_share_maps() {
     let scene = flux(&ring(), SMOOTH, &[Lamp::WideDisc]);
     let shared = set_up(&scene, &photons(4096, 0.5), true);
-    let maps = |snee: &Snee| [0, 1].map(|band| snee.setups[band].photons.clone().expect("a map"));
+    let map = |setup: &BandSetup| setup.photons.clone().expect("a map").map;
+    let maps = |snee: &Snee| [0, 1].map(|band| map(&snee.setups[band]));
     let [a, b] = maps(&shared);
     assert!(Arc::ptr_eq(&a, &b));
     let mut scene = Arc::into_inner(flux(&ring(), SMOOTH, &[Lamp::WideDisc])).expect("not shared");

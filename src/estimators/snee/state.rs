@@ -110,8 +110,8 @@ pub(super) struct Connections<'a> {
     pub extra_turns: Option<Box<ExtraTurns>>,
     /// Memory for the roots of a connection.
     pub roots: Vec<Root>,
-    /// What the techniques add to the sum of densities that was formed last, in the order of [`CalledTechnique`].
-    pub parts: [f64; CalledTechnique::COUNT],
+    /// What subdivision, the last vertex and the connection add to the sum of densities that was formed last.
+    pub parts: [f64; 3],
     /// What a warm-up writes down.
     pub notes: Option<&'a RefCell<CallNotes>>,
 }
@@ -151,7 +151,7 @@ impl<'a> Connections<'a> {
             seen: None,
             extra_turns: None,
             roots: Vec::new(),
-            parts: [0.0; CalledTechnique::COUNT],
+            parts: [0.0; 3],
             notes: None,
         }
     }
@@ -249,6 +249,9 @@ impl<B: WalkBands> CameraWalk<'_, Connections<'_>, B> {
             Some((light, guess)) if light == guide.light => guess,
             _ => {
                 let guess = Guess::new(self, vertex.point, guide.axis);
+                if let Some(notes) = self.rivals.notes {
+                    notes.borrow_mut().guess();
+                }
                 self.rivals.held[index].guess = Some((guide.light, guess));
                 guess
             }

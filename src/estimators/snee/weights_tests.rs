@@ -370,10 +370,10 @@ fn guided_over_plain(snee: &Snee, path: &FixedPath, course: Course) -> ([f64; 5]
         let flown =
             if is_last { heading.passage_ratio(sigma_t, t) } else { heading.flight_ratio(sigma_t, t) };
         ratios.push(ratios[ratios.len() - 1] * flown);
-        if let (Some(map), true) = (&snee.setups[0].photons, is_last) {
+        if let (Some(photons), true) = (&snee.setups[0].photons, is_last) {
             let phase = snee.walks.field().scene.medium[0].phase.pdf(arrival.dot(dir));
             by_photons =
-                map.density(Meeting::First, at, dir) / (phase * transmittance(sigma_t, t) * flown);
+                photons.density(Meeting::First, at, dir) / (phase * transmittance(sigma_t, t) * flown);
         }
     }
     let [.., at_j, at_end] = ratios[..] else { panic!("two steps at least") };
