@@ -159,11 +159,17 @@ fn scores_of_walks_beside_rarer_photons_are_predicted() {
         ..SneeChoices::default()
     };
     let unidirectional = vec![EdgeTechnique::Bsdf, EdgeTechnique::Light];
-    for (kind, boundary, choices, factors) in [
-        ("rough", ROUGH, alone(Some(no_last), Some(unidirectional.clone())), [1.0, 1.0, 1.0, 0.25]),
-        ("smooth", SMOOTH, alone(Some(no_last), Some(unidirectional)), [1.0, 1.0, 1.0, 0.25]),
-        ("rough, others", ROUGH, alone(None, None), [0.5, 0.25, 1.0, 0.125]),
-        ("smooth, others", SMOOTH, alone(None, None), [0.5, 0.25, 1.0, 0.125]),
+    for (kind, boundary, choices, factors, paths) in [
+        (
+            "rough",
+            ROUGH,
+            alone(Some(no_last), Some(unidirectional.clone())),
+            [1.0, 1.0, 1.0, 0.25],
+            4000,
+        ),
+        ("smooth", SMOOTH, alone(Some(no_last), Some(unidirectional)), [1.0, 1.0, 1.0, 0.25], 40_000),
+        ("rough, others", ROUGH, alone(None, None), [0.5, 0.25, 1.0, 0.125], 4000),
+        ("smooth, others", SMOOTH, alone(None, None), [0.5, 0.25, 1.0, 0.125], 4000),
     ] {
         let scene = flux(&ring(), boundary, &[medium(1.0, 0.9, 0.3)], &[Lamp::WideDisc]);
         let snee = set_up(&scene, &choices, false).expect("served");
@@ -181,7 +187,7 @@ fn scores_of_walks_beside_rarer_photons_are_predicted() {
         let upper = snee.setups[0].calling(snee.options.with_calls(1.0, [1.0; 4]));
         let rarer = snee.setups[0].calling(snee.options.with_calls(1.0, factors));
         let mut parts = [0; 2];
-        for path in 0..4000 {
+        for path in 0..paths {
             let [given, found] = [&upper, &rarer].map(|setup| of_walk(setup, path));
             assert_eq!(given.len(), found.len(), "{kind}, {path}");
             for (given, found) in given.iter().zip(&found) {
@@ -485,13 +491,26 @@ fn what_photons_draw_needs_them() {
         least_concentration: Some(1.0),
         ..with.clone()
     };
-    let none = [[0.0, 1.0, 1.0, 1.0], [0.0, 0.0, 1.0, 1.0], [1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+    let none = [
+        [0.0, 1.0, 1.0, 1.0],
+        [0.0, 0.0, 1.0, 1.0],
+        [1.0, 1.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0, 0.0],
+        [1.0, 0.0, 1.0, 0.0],
+    ];
     for (name, shape, boundary, choices, least, may) in [
-        ("rough mesh", bumps(false), ROUGH, &with, 0.0, [true, true, true, false]),
-        ("sharp mesh", bumps(false), sharp, &with, 0.25, [true, true, true, false]),
-        ("smooth mesh", bumps(true), SMOOTH, &with, 0.25, [true, true, true, false]),
-        ("smooth ball", sphere(), SMOOTH, &with, 0.0, [true, true, true, false]),
-        ("without BSDF sampling", bumps(false), ROUGH, &partial, 0.0, [false, false, true, false]),
+        ("rough mesh", bumps(false), ROUGH, &with, 0.0, [true, true, true, false, false]),
+        ("sharp mesh", bumps(false), sharp, &with, 0.25, [true, true, true, false, false]),
+        ("smooth mesh", bumps(true), SMOOTH, &with, 0.25, [true, true, true, false, false]),
+        ("smooth ball", sphere(), SMOOTH, &with, 0.0, [true, true, true, false, false]),
+        (
+            "without BSDF sampling",
+            bumps(false),
+            ROUGH,
+            &partial,
+            0.0,
+            [false, false, true, false, false],
+        ),
     ] {
         let scene = flux(&shape, boundary, &[medium(10.0, 0.98, 0.0)], &[Lamp::WideDisc]);
         let snee = set_up(&scene, choices, false).expect("served");
