@@ -522,10 +522,11 @@ fn what_photons_draw_needs_them() {
         let rarest = ladders[CalledTechnique::Photons as usize].last();
         assert_eq!(rarest, Some(&least), "{name}");
         let lasts = [CalledTechnique::Subdivision, CalledTechnique::LastVertex];
-        assert!(
-            lasts.iter().all(|technique| ladders[*technique as usize].last() == Some(&0.0)),
-            "{name}"
-        );
+        // Where guesses fail, and photons and path tracing draw all paths, there is nothing to choose.
+        let count = if least > 0.0 { 1 } else { 7 };
+        for ladder in lasts.map(|technique| ladders[technique as usize]) {
+            assert_eq!((ladder.len(), ladder.last()), (count, Some(&0.0)), "{name}");
+        }
     }
 }
 

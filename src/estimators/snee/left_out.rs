@@ -13,6 +13,9 @@ const LADDER: [f64; 7] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.0];
 const PHOTON_LADDER: [f64; 4] = [1.0, 0.25, 0.0625, 0.0];
 const SHARP_PHOTON_LADDER: [f64; 3] = [1.0, 0.5, 0.25];
 
+/// That of what is left out.
+const NEVER: [f64; 1] = [0.0];
+
 /// The least roughness of a mesh whose walks may go without subdivision.
 const LEAST_ROUGHNESS: f64 = 0.1;
 
@@ -63,6 +66,14 @@ impl Snee {
         }
         if last_vertex && photons {
             ladders[CalledTechnique::LastVertex as usize] = &LADDER;
+        }
+        // Beside photons guesses at facets gain nothing, and what a warm-up sees of them is noise.
+        if photons && !self.guesses_well(index) && self.draws_all_without_calls(index) {
+            for technique in [CalledTechnique::Subdivision, CalledTechnique::LastVertex] {
+                if is_used[technique as usize] {
+                    ladders[technique as usize] = &NEVER;
+                }
+            }
         }
         ladders
     }
