@@ -408,9 +408,16 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
     let of_given = |technique: usize| {
         if most[technique] > 0.0 { asked[technique] / most[technique] } else { 1.0 }
     };
-    let mut candidates: Vec<PerTechnique> = vec![std::array::from_fn(of_given)];
     let is_used = most.map(|most| most > 0.0);
     let ladders = snee.ladders(index, is_used);
+    let leaves_out_guesses = snee.leaves_out_guesses(index, is_used);
+    // Of a ladder of one factor, nothing else stays.
+    let stays = |technique: usize| match ladders[technique] {
+        &[0.0] => 0.0,
+        _ => of_given(technique),
+    };
+    let given_factors: PerTechnique = std::array::from_fn(stays);
+    let mut candidates = vec![given_factors];
     for &a in ladders[0] {
         for &b in ladders[1] {
             for &c in ladders[2] {
@@ -448,7 +455,9 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
     let notes = notes.into_inner();
     let vertices = scores.cost[Cost::MediumEvents as usize] as f64;
     let walks = notes.prices.walks(&scores) - notes.prices.boundary_event * notes.events_of_photons;
-    notes.choice(pairs, walks, vertices)
+    let chosen = notes.choice(pairs, walks, vertices);
+    let stays = leaves_out_guesses.then_some(given_factors);
+    ChosenCalls { factors: chosen.factors.or(stays), ..chosen }
 }
 
 impl CallNotes {

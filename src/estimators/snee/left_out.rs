@@ -48,6 +48,17 @@ impl Snee {
         self.draws_all_without_calls(index) && self.guesses_well(index)
     }
 
+    /// Whether guesses are left out whatever a warm-up sees: beside photons those at facets gain nothing, and the rest is noise.
+    pub(super) fn leaves_out_guesses(
+        &self,
+        index: usize,
+        is_used: [bool; CalledTechnique::COUNT],
+    ) -> bool {
+        is_used[CalledTechnique::Photons as usize]
+            && !self.guesses_well(index)
+            && self.draws_all_without_calls(index)
+    }
+
     /// The factors of the techniques to choose from.
     pub(super) fn ladders(
         &self,
@@ -67,8 +78,7 @@ impl Snee {
         if last_vertex && photons {
             ladders[CalledTechnique::LastVertex as usize] = &LADDER;
         }
-        // Beside photons guesses at facets gain nothing, and what a warm-up sees of them is noise.
-        if photons && !self.guesses_well(index) && self.draws_all_without_calls(index) {
+        if self.leaves_out_guesses(index, is_used) {
             for technique in [CalledTechnique::Subdivision, CalledTechnique::LastVertex] {
                 if is_used[technique as usize] {
                     ladders[technique as usize] = &NEVER;
