@@ -15,10 +15,10 @@
 //! it up, and a turn that an earlier process had run in part is not in that order; neither is timed
 //! (`Work::settled`).
 //!
-//! *Why half a second.* The passes that follow those of another arm find that arm's data in the caches. After
-//! guided subdivision on a mesh, unidirectional passes of 1.85 ms took 0.20, 0.09, 0.07, 0.05, 0.03 and 0.02 ms
-//! longer, in this order, and then the usual time (AMD EPYC of the Zen 4 kind): half a millisecond, whatever
-//! the length of the turn. It is 2.5 % of the time of an arm that has 8 ms in each half of a turn.
+//! *Why half a second.* The passes that follow those of another arm find that arm's data in the caches, which costs
+//! them a fixed time, whatever the length of the turn: about half a millisecond for unidirectional passes after
+//! guided subdivision on a mesh. In turns of an eighth of a second the controls of such cells took 1.4 to 2.9 %
+//! longer than their baselines, and widened the intervals of all cells (`experiments/verify/snee-matrix.toml`).
 //!
 //! Where a claim uses CPU time, its baseline has a control arm, the same estimator on streams of its own, next
 //! in the order: A C B .. B C A. Elsewhere the first arm's passes run twice in every eighth turn, A C B .. B C A:

@@ -243,8 +243,8 @@ impl EfficiencyTest {
             Outcome::Underpowered if !self.is_shown() => {
                 let machine = match self.blames_machine() {
                     true => format!(
-                        "; by its controls the clock favours one arm by {:.1} %, which more passes do not \
-                         change: a machine without other work may",
+                        "; the clock's controls are off by {:.1} %, and more passes do not change that: run it \
+                         again on a machine without other work",
                         100.0 * self.machine
                     ),
                     false => String::new(),
@@ -304,10 +304,10 @@ mod tests {
         for (machine, is_blamed) in [(0.06, false), (0.11, true)] {
             let shown = above_by_a_tenth(0.01 / critical, machine / critical);
             let note = shown.note(&Outcome::Underpowered, 1e-6);
-            assert_eq!(note.contains("the clock favours"), is_blamed, "{note}");
+            assert_eq!(note.contains("the clock's controls"), is_blamed, "{note}");
         }
         let note = above_by_a_tenth(0.2 / critical, 0.11 / critical).note(&Outcome::Underpowered, 1e-6);
-        assert!(!note.contains("the clock favours"), "{note}");
+        assert!(!note.contains("the clock's controls"), "{note}");
     }
 
     #[test]

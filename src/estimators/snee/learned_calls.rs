@@ -216,8 +216,10 @@ impl HalfSums {
 #[derive(Debug)]
 pub(super) struct CallNotes {
     prices: &'static Prices,
-    /// Factors of the warm-up's probabilities.
+    /// Factors of the warm-up's probabilities; the first are those of the given options.
     candidates: Vec<PerTechnique>,
+    /// Which candidate stays where a choice is noise; none before it is chosen.
+    stays: usize,
     /// Views of the warm-up.
     views: u32,
     /// Scores of the present path.
@@ -250,6 +252,7 @@ impl CallNotes {
         CallNotes {
             prices,
             candidates,
+            stays: 0,
             views,
             scores: Vec::new(),
             seen: Seen::default(),
@@ -411,13 +414,11 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
     let is_used = most.map(|most| most > 0.0);
     let ladders = snee.ladders(index, is_used);
     let leaves_out_guesses = snee.leaves_out_guesses(index, is_used);
-    // Of a ladder of one factor, nothing else stays.
-    let stays = |technique: usize| match ladders[technique] {
-        &[0.0] => 0.0,
-        _ => of_given(technique),
-    };
-    let given_factors: PerTechnique = std::array::from_fn(stays);
-    let mut candidates = vec![given_factors];
+    let mut candidates: Vec<PerTechnique> = vec![std::array::from_fn(of_given)];
+    if leaves_out_guesses {
+        let [_, _, connection, photons] = candidates[0];
+        candidates.push([0.0, 0.0, connection, photons]);
+    }
     for &a in ladders[0] {
         for &b in ladders[1] {
             for &c in ladders[2] {
@@ -431,7 +432,9 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
     let scene = &field.scene;
     let key = StreamKey::named("what calls learn from");
     let rays = scene.sensor.rays_per_pass() as u64;
-    let notes = RefCell::new(CallNotes::new(Prices::of(&scene.shape), candidates, setup.views));
+    let mut notes = CallNotes::new(Prices::of(&scene.shape), candidates, setup.views);
+    notes.stays = usize::from(leaves_out_guesses);
+    let notes = RefCell::new(notes);
     let mut scores = Scores::new(Layout::new(scene));
     let pairs = paths / 2;
     for pair in 0..pairs {
@@ -455,9 +458,7 @@ fn choose(snee: &Snee, index: usize, LearnedCalls { paths }: LearnedCalls) -> Ch
     let notes = notes.into_inner();
     let vertices = scores.cost[Cost::MediumEvents as usize] as f64;
     let walks = notes.prices.walks(&scores) - notes.prices.boundary_event * notes.events_of_photons;
-    let chosen = notes.choice(pairs, walks, vertices);
-    let stays = leaves_out_guesses.then_some(given_factors);
-    ChosenCalls { factors: chosen.factors.or(stays), ..chosen }
+    notes.choice(pairs, walks, vertices)
 }
 
 impl CallNotes {
@@ -496,24 +497,26 @@ impl CallNotes {
             variance * cost(&self.candidates[candidate], views)
         };
         let whole = |choice| inefficiency(choice, &self.halves);
-        let given = (0, self.views);
+        let (given, stays) = ((0, self.views), (self.stays, self.views));
         // A warm-up with one view does not tell what further ones would see.
         let ladder = if self.views > 1 { &VIEWS[..] } else { &[] };
         let views = || std::iter::once(self.views).chain(ladder.iter().copied());
-        let all = (0..self.candidates.len()).flat_map(|candidate| views().map(move |n| (candidate, n)));
+        let all = (self.stays..self.candidates.len())
+            .flat_map(|candidate| views().map(move |n| (candidate, n)));
         let best = all.min_by(|a, b| whole(*a).total_cmp(&whole(*b)));
         let is_better = |half: &HalfSums, best| {
             let half = std::slice::from_ref(half);
-            inefficiency(best, half) < inefficiency(given, half)
+            inefficiency(best, half) < inefficiency(stays, half)
         };
-        match best.filter(|best| pairs > 0 && self.halves.iter().all(|half| is_better(half, *best))) {
-            Some(best @ (candidate, views)) => {
-                let gain = whole(given) / whole(best);
-                let views = (self.views > 1).then_some(views);
-                ChosenCalls { factors: Some(self.candidates[candidate]), views, gain }
-            }
-            None => ChosenCalls { factors: None, views: None, gain: 1.0 },
+        let best =
+            best.filter(|best| pairs > 0 && self.halves.iter().all(|half| is_better(half, *best)));
+        let chosen @ (candidate, views) = best.unwrap_or(stays);
+        if chosen == given {
+            return ChosenCalls { factors: None, views: None, gain: 1.0 };
         }
+        let gain = whole(given) / whole(chosen);
+        let views = (self.views > 1).then_some(views);
+        ChosenCalls { factors: Some(self.candidates[candidate]), views, gain }
     }
 }
 

@@ -35,9 +35,9 @@ impl Snee {
         strategies.bsdf && strategies.light && is_found
     }
 
-    /// Whether guesses and lobes are such that no technique alone draws some of the light. In a mesh the last vertex and subdivision
-    /// guess the normal where light comes in. With a sharp boundary, paths by another normal are left to photons, or to rare
-    /// scores of light sampling, as large as the density of facets: a warm-up does not see them.
+    /// Whether the last vertex and subdivision find nearly all light. In a mesh they guess the normal where it comes in. With a sharp
+    /// boundary, paths by another normal are left to photons, or to rare scores of light sampling, as large as the density of
+    /// facets: a warm-up does not see them.
     fn guesses_well(&self, index: usize) -> bool {
         !matches!(*self.walks.scene().shape, Shape::Mesh(_)) || self.roughness(index) >= LEAST_ROUGHNESS
     }

@@ -22,8 +22,8 @@
 //! reaching the boundary and draws later flights by its guide, so that all densities are formed over those of a plain walk.)
 //!
 //! Caps are as wide as the lights, the boundary's lobes and the differences between facets are; where n is small they are wider,
-//! as the bandwidth of a density estimate. The widest is for facets next to those that photons have met: behind the smooth
-//! boundary of a scan, one walk in 3e6 met a disc 0.12 rad from the nearest of 56 directions, and scored 40 % of the variance. q is proportional to the number of photons that have crossed the voxel, up to a largest
+//! as the bandwidth of a density estimate. The widest is for facets next to those that photons have met: a walk that meets
+//! the light by one of these, beyond the other caps, scores the whole radiance. q is proportional to the number of photons that have crossed the voxel, up to a largest
 //! and, for chains, down to a least value: most vertices receive little light, and following an extra direction takes as long as
 //! several steps of the walk.
 //!
